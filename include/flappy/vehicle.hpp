@@ -1,0 +1,116 @@
+// A vehicle as its designer states it: the figures of a vehicle file, in double, SI units, nothing derived.
+// Every leaf number has one path ("left.motor.resistance_ohm") that the vehicle file, `--set`, the
+// randomisation table and identification share; `parameters()` is the one list of them.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace flappy::model {
+
+struct Triple {
+  double x = 0, y = 0, z = 0;
+};
+
+/// Inertia tensor elements as in a URDF: off-diagonal elements are those of the matrix (I_xy = -integral of xy).
+struct InertiaTensor {
+  double xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, xz = 0;
+};
+
+struct RigidBody {
+  double mass_kg = 0;
+  Triple com_m;                 ///< in the frame of the link
+  InertiaTensor inertia_kg_m2;  ///< about the centre of mass, axes of the link
+};
+
+struct Joint {
+  double lower_rad = 0, upper_rad = 0;  ///< hard stops, restitution 0
+  double damping_Nm_s = 0;              ///< viscous, per rad/s
+  double friction_Nm = 0;               ///< dry
+};
+
+struct Spring {
+  double stiffness_positive_Nm_rad = 0;  ///< for stroke above the rest angle
+  double stiffness_negative_Nm_rad = 0;  ///< for stroke below it
+  double rest_angle_rad = 0;
+};
+
+/// Brushed motor behind a gear; friction, damping and inertia are on the motor's side of the gear.
+struct Motor {
+  double resistance_ohm = 0;
+  double torque_constant_Nm_A = 0;  ///< also the back-EMF constant, V s/rad
+  double gear_ratio = 0;
+  double efficiency = 0;
+  double friction_Nm = 0;
+  double damping_Nm_s = 0;
+  double rotor_inertia_kg_m2 = 0;
+  double voltage_limit_V = 0;
+};
+
+/// Blade-element planform. The dimensionless moments have their powers already taken
+/// (r22 is r2-hat squared, z_cp* carry chord squared, z_rd chord to the fourth).
+struct Planform {
+  double wing_length_m = 0;
+  double mean_chord_m = 0;
+  double r33 = 0, r22 = 0, r11 = 0, r00 = 0;
+  double z_cp2 = 0, z_cp1 = 0, z_cp0 = 0, z_rd = 0;
+  double rotational_damping_coefficient = 0;
+};
+
+struct Side {
+  RigidBody leading_edge;  ///< frame: shoulder, turned with the stroke
+  RigidBody wing;          ///< frame: shoulder, turned with stroke and rotation
+  Triple shoulder_m;       ///< in B; both hinge axes pass through it
+  Joint stroke;            ///< axis +z on the left, -z on the right
+  Joint rotation;          ///< axis +y of the leading edge on both sides
+  Motor motor;
+  Spring spring;
+  Planform planform;
+};
+
+/// What the wing-beat driver accepts and how it drives.
+struct Driver {
+  double flapping_Hz = 0;
+  double hold_s = 0;  ///< the voltage is held between updates
+  double amplitude_limit_V = 0, difference_limit_V = 0, bias_limit_V = 0, split_cycle_limit = 0;
+};
+
+/// Extent of the vehicle from its origin, for support and contact.
+struct Extent {
+  double below_m = 0;   ///< origin above the ground when the vehicle stands
+  double above_m = 0;   ///< to the highest point
+  double around_m = 0;  ///< to the farthest point sideways
+};
+
+struct Vehicle {
+  std::string name;
+  RigidBody torso;
+  Side left, right;
+  Driver driver;
+  Extent extent;
+  double air_density_kg_m3 = 0;
+  /// Effects beyond the base model: identifier -> parameter -> value (src/model/effects).
+  std::map<std::string, std::map<std::string, double>> effects;
+};
+
+/// One leaf of a vehicle: where it is, and what is accepted there (closed interval).
+struct Parameter {
+  std::string path;
+  double* value;
+  double low, high;
+};
+
+/// All parameters of `vehicle`, in the order of the vehicle file. Pointers live as long as the vehicle.
+std::vector<Parameter> parameters(Vehicle& vehicle);
+
+/// What no real vehicle has, though each number alone is accepted.
+struct PhysicalFault {
+  std::string path, what, accepted;
+};
+
+/// The first inertia that breaks the triangle inequality, if any.
+std::optional<PhysicalFault> physical_fault(const Vehicle& vehicle);
+
+}  // namespace flappy::model

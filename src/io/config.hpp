@@ -1,0 +1,105 @@
+// Typed reading of TOML. Every fault is an InputError that says where it is, what is wrong and what is
+// accepted:
+//
+//   v.toml:3:11: torso.mass_kg: -0.01 is out of range; accepted: a number above 0, at most 1
+//
+// Keys are dotted paths below the table they are asked of. A reader asks for every key it knows, then calls
+// finish(), which refuses the rest.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/files.hpp"
+
+namespace flappy::io {
+
+namespace detail {
+struct Document;
+struct Section;
+}  // namespace detail
+
+/// Finite numbers from low to high; `above_low` leaves low itself out.
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool above_low = false;
+};
+
+constexpr Range positive(double high = std::numeric_limits<double>::infinity()) { return {0, high, true}; }
+constexpr Range non_negative(double high = std::numeric_limits<double>::infinity()) {
+  return {0, high, false};
+}
+
+/// A handle on one table; copies share it, and it keeps the configuration alive.
+///
+/// A reader refuses a key that is missing, of another type or not accepted. The `_or` readers return the
+/// fallback for a missing key and write it into Config::resolved(); a fallback that is itself not accepted
+/// means "not set" and is not written.
+class Table {
+ public:
+  double number(std::string_view key, Range range = {}) const;
+  double number_or(std::string_view key, double fallback, Range range = {}) const;
+  std::int64_t integer(std::string_view key, std::int64_t low, std::int64_t high) const;
+  std::int64_t integer_or(std::string_view key, std::int64_t fallback, std::int64_t low,
+                          std::int64_t high) const;
+  bool boolean(std::string_view key) const;
+  bool boolean_or(std::string_view key, bool fallback) const;
+  std::string string(std::string_view key) const;
+  std::string string_or(std::string_view key, std::string_view fallback) const;
+  std::string choice(std::string_view key, const std::vector<std::string>& accepted) const;
+  std::vector<double> numbers(std::string_view key, Range each = {}) const;
+  std::vector<std::string> strings(std::string_view key) const;
+  /// A file name; a relative one starts at the folder of the configuration file. The file need not exist.
+  std::filesystem::path file(std::string_view key) const;
+
+  Table table(std::string_view key) const;
+  std::optional<Table> optional_table(std::string_view key) const;
+  /// The tables of an array of tables; none when it is missing.
+  std::vector<Table> tables(std::string_view key) const;
+
+  /// Names of the keys present, sorted.
+  std::vector<std::string> keys() const;
+  /// Full dotted path of this table; empty for the root.
+  std::string path() const;
+  /// Reports the caller's own fault at a key, or at this table when `key` is empty.
+  [[noreturn]] void fail(std::string_view key, std::string_view what, std::string_view accepted) const;
+  /// Refuses every key, here and in the tables below, that nobody asked for.
+  void finish() const;
+
+ private:
+  friend class Config;
+  explicit Table(std::shared_ptr<detail::Section> section);
+  Table below(detail::Section& section) const;
+
+  std::shared_ptr<detail::Section> section_;
+};
+
+class Config {
+ public:
+  /// Reads a file. Overrides are "a.b.c=value", as given to --set: the value is TOML, or else a bare word,
+  /// which is taken as a string. They replace values and create tables; an element of an array cannot be
+  /// overridden.
+  static Config load(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
+  /// Reads text; `name` stands for the file in messages, and its folder is where relative file names start.
+  static Config parse(std::string_view text, const std::string& name,
+                      const std::vector<std::string>& overrides = {});
+
+  Table root() const;
+  /// TOML text of everything, overrides applied and defaults filled in; it reads identically when parsed
+  /// under the same name. Relative file names stay as written.
+  std::string resolved() const;
+
+ private:
+  explicit Config(std::shared_ptr<detail::Document> document);
+
+  std::shared_ptr<detail::Document> document_;
+};
+
+}  // namespace flappy::io

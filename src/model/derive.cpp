@@ -1,0 +1,86 @@
+#include "model/derive.hpp"
+
+namespace flappy::model {
+namespace {
+
+Vec3<double> vec(const Triple& t) { return {t.x, t.y, t.z}; }
+
+/// First moment of mass about the frame's origin, kg m.
+Vec3<double> first_moment(const RigidBody& b) { return b.mass_kg * vec(b.com_m); }
+
+Sym3<double> outer(double mass, const Vec3<double>& r) {
+  return {mass * r.x * r.x, mass * r.y * r.y, mass * r.z * r.z, mass * r.x * r.y, mass * r.y * r.z, mass * r.x * r.z};
+}
+
+/// Second moment of mass (integral of r r^T) about the frame's origin, from the inertia I about the centre of mass:
+/// P = tr(I)/2 1 - I + m c c^T.
+Sym3<double> second_moment(const RigidBody& b) {
+  const InertiaTensor& i = b.inertia_kg_m2;
+  const double half = (i.xx + i.yy + i.zz) / 2;
+  const Sym3<double> about_com{half - i.xx, half - i.yy, half - i.zz, -i.xy, -i.yz, -i.xz};
+  return about_com + outer(b.mass_kg, vec(b.com_m));
+}
+
+double wing_mass(const Side& s) { return s.leading_edge.mass_kg + s.wing.mass_kg; }
+
+SideParameters<double> derive_side(const Side& s, double air_density) {
+  SideParameters<double> p;
+  p.shoulder_m = vec(s.shoulder_m);
+  p.edge_moment_kg_m = first_moment(s.leading_edge);
+  p.edge_second_kg_m2 = second_moment(s.leading_edge);
+  p.wing_moment_kg_m = first_moment(s.wing);
+  p.wing_second_kg_m2 = second_moment(s.wing);
+
+  const Planform& w = s.planform;
+  const double R = w.wing_length_m, c = w.mean_chord_m;
+  const double pressure = 0.5 * air_density;
+  p.force2 = pressure * c * R * R * R * w.r22;
+  p.force1 = pressure * c * R * R * w.r11;
+  p.force0 = pressure * c * R * w.r00;
+  p.moment2 = pressure * c * c * R * R * R * w.z_cp2;
+  p.moment1 = pressure * c * c * R * R * w.z_cp1;
+  p.moment0 = pressure * c * c * R * w.z_cp0;
+  p.rotational_damping_Nm_s2 = 0.125 * air_density * w.rotational_damping_coefficient * R * c * c * c * c * w.z_rd;
+  p.span_to_pressure_m = R * w.r33 / w.r22;
+
+  const Motor& m = s.motor;
+  const double N = m.gear_ratio, K = m.torque_constant_Nm_A;
+  p.stroke_torque_per_V_Nm = N * m.efficiency * K / m.resistance_ohm;
+  p.stroke_damping_Nm_s = m.efficiency * N * N * (K * K / m.resistance_ohm + m.damping_Nm_s) + s.stroke.damping_Nm_s;
+  p.stroke_friction_Nm = m.efficiency * N * m.friction_Nm + s.stroke.friction_Nm;
+  p.rotor_kg_m2 = m.efficiency * N * N * m.rotor_inertia_kg_m2;
+  p.voltage_limit_V = m.voltage_limit_V;
+  p.spring_positive_Nm_rad = s.spring.stiffness_positive_Nm_rad;
+  p.spring_negative_Nm_rad = s.spring.stiffness_negative_Nm_rad;
+  p.spring_rest_rad = s.spring.rest_angle_rad;
+  p.stroke_lower_rad = s.stroke.lower_rad;
+  p.stroke_upper_rad = s.stroke.upper_rad;
+  p.rotation_lower_rad = s.rotation.lower_rad;
+  p.rotation_upper_rad = s.rotation.upper_rad;
+  p.rotation_damping_Nm_s = s.rotation.damping_Nm_s;
+  p.rotation_friction_Nm = s.rotation.friction_Nm;
+  return p;
+}
+
+}  // namespace
+
+double total_mass_kg(const Vehicle& v) { return v.torso.mass_kg + wing_mass(v.left) + wing_mass(v.right); }
+
+Parameters<double> derive(const Vehicle& v, double step_s) {
+  Parameters<double> p;
+  p.left = derive_side(v.left, v.air_density_kg_m3);
+  p.right = derive_side(v.right, v.air_density_kg_m3);
+  p.inverse_mass_1_kg = 1 / total_mass_kg(v);
+  p.fixed_moment_kg_m =
+      first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
+  p.fixed_second_kg_m2 = second_moment(v.torso) + (outer(wing_mass(v.left), p.left.shoulder_m) +
+                                                   outer(wing_mass(v.right), p.right.shoulder_m));
+  p.air_density_kg_m3 = v.air_density_kg_m3;
+  p.below_m = v.extent.below_m;
+  p.above_m = v.extent.above_m;
+  p.around_m = v.extent.around_m;
+  p.beat_steps = 2 / (v.driver.flapping_Hz * step_s);
+  return p;
+}
+
+}  // namespace flappy::model

@@ -1,0 +1,15 @@
+// From a vehicle's published figures to the constants of the step.
+#pragma once
+
+#include "model/flapper.hpp"
+#include "flappy/vehicle.hpp"
+
+namespace flappy::model {
+
+/// Constants of one flapper in double precision. `step_s`: physics step, s.
+Parameters<double> derive(const Vehicle& vehicle, double step_s);
+
+/// Mass of the whole vehicle, kg.
+double total_mass_kg(const Vehicle& vehicle);
+
+}  // namespace flappy::model

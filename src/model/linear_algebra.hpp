@@ -1,0 +1,147 @@
+// Three-vectors, symmetric tensors and quaternions over a scalar type; no more than the physics needs.
+#pragma once
+
+#include "model/scalar.hpp"
+
+namespace flappy::model {
+inline namespace FLAPPY_ISA {
+
+template <class T>
+struct Vec3 {
+  T x, y, z;
+
+  friend FLAPPY_INLINE Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+  friend FLAPPY_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend FLAPPY_INLINE Vec3 operator*(const T& s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
+};
+
+template <class T>
+FLAPPY_INLINE T dot(const Vec3<T>& a, const Vec3<T>& b) {
+  return a.x * b.x + (a.y * b.y + a.z * b.z);
+}
+
+template <class T>
+FLAPPY_INLINE Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// a + s b, fused.
+template <class T>
+FLAPPY_INLINE Vec3<T> add_scaled(const Vec3<T>& a, const T& s, const Vec3<T>& b) {
+  return {a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
+}
+
+template <class T>
+FLAPPY_INLINE Vec3<T> where(auto condition, const Vec3<T>& yes, const Vec3<T>& no) {
+  return {where(condition, yes.x, no.x), where(condition, yes.y, no.y), where(condition, yes.z, no.z)};
+}
+
+/// Symmetric 3x3 tensor.
+template <class T>
+struct Sym3 {
+  T xx, yy, zz, xy, yz, xz;
+
+  friend FLAPPY_INLINE Sym3 operator+(const Sym3& a, const Sym3& b) {
+    return {a.xx + b.xx, a.yy + b.yy, a.zz + b.zz, a.xy + b.xy, a.yz + b.yz, a.xz + b.xz};
+  }
+  friend FLAPPY_INLINE Vec3<T> operator*(const Sym3& m, const Vec3<T>& v) {
+    return {m.xx * v.x + (m.xy * v.y + m.xz * v.z), m.xy * v.x + (m.yy * v.y + m.yz * v.z),
+            m.xz * v.x + (m.yz * v.y + m.zz * v.z)};
+  }
+};
+
+template <class T>
+FLAPPY_INLINE Sym3<T> inverse(const Sym3<T>& m) {
+  const T xx = m.yy * m.zz - m.yz * m.yz, xy = m.xz * m.yz - m.xy * m.zz, xz = m.xy * m.yz - m.xz * m.yy;
+  const T determinant = m.xx * xx + (m.xy * xy + m.xz * xz);
+  const T scale = T(1) / determinant;
+  return {scale * xx,
+          scale * T(m.xx * m.zz - m.xz * m.xz),
+          scale * T(m.xx * m.yy - m.xy * m.xy),
+          scale * xy,
+          scale * T(m.xy * m.xz - m.xx * m.yz),
+          scale * xz};
+}
+
+/// Inertia tensor of a second-moment tensor (integral of r r^T): tr(P) 1 - P.
+template <class T>
+FLAPPY_INLINE Sym3<T> inertia_of(const Sym3<T>& p) {
+  return {p.yy + p.zz, p.xx + p.zz, p.xx + p.yy, -p.xy, -p.yz, -p.xz};
+}
+
+/// Turns a vector by an angle about z, given its sine and cosine.
+template <class T>
+FLAPPY_INLINE Vec3<T> turn_z(const T& s, const T& c, const Vec3<T>& v) {
+  return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
+}
+/// Turns it back.
+template <class T>
+FLAPPY_INLINE Vec3<T> turn_back_z(const T& s, const T& c, const Vec3<T>& v) {
+  return {c * v.x + s * v.y, c * v.y - s * v.x, v.z};
+}
+
+/// R P R^T for a turn about z: the xy block turns by the double angle.
+template <class T>
+FLAPPY_INLINE Sym3<T> turn_z(const T& s, const T& c, const Sym3<T>& p) {
+  const T s2 = T(s + s) * c, c2 = c * c - s * s;
+  const T mean = T(0.5) * T(p.xx + p.yy), half = T(0.5) * T(p.xx - p.yy);
+  const T d = half * c2 - p.xy * s2;
+  return {mean + d, mean - d, p.zz, half * s2 + p.xy * c2, s * p.xz + c * p.yz, c * p.xz - s * p.yz};
+}
+
+/// R P R^T for a turn about y.
+template <class T>
+FLAPPY_INLINE Sym3<T> turn_y(const T& s, const T& c, const Sym3<T>& p) {
+  const T s2 = T(s + s) * c, c2 = c * c - s * s;
+  const T mean = T(0.5) * T(p.xx + p.zz), half = T(0.5) * T(p.xx - p.zz);
+  const T d = half * c2 + p.xz * s2;
+  return {mean + d, p.yy, mean - d, c * p.xy + s * p.yz, c * p.yz - s * p.xy, p.xz * c2 - half * s2};
+}
+
+/// Unit quaternion, body to world.
+template <class T>
+struct Quaternion {
+  T w, x, y, z;
+};
+
+/// Rotation matrix by rows.
+template <class T>
+struct Matrix3 {
+  Vec3<T> row_x, row_y, row_z;
+
+  friend FLAPPY_INLINE Vec3<T> operator*(const Matrix3& m, const Vec3<T>& v) {
+    return {dot(m.row_x, v), dot(m.row_y, v), dot(m.row_z, v)};
+  }
+};
+
+template <class T>
+FLAPPY_INLINE Vec3<T> transpose_times(const Matrix3<T>& m, const Vec3<T>& v) {
+  return {m.row_x.x * v.x + (m.row_y.x * v.y + m.row_z.x * v.z),
+          m.row_x.y * v.x + (m.row_y.y * v.y + m.row_z.y * v.z),
+          m.row_x.z * v.x + (m.row_y.z * v.y + m.row_z.z * v.z)};
+}
+
+template <class T>
+FLAPPY_INLINE Matrix3<T> rotation_matrix(const Quaternion<T>& q) {
+  const T x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
+  const T wx = q.w * x2, wy = q.w * y2, wz = q.w * z2;
+  const T xx = q.x * x2, yy = q.y * y2, zz = q.z * z2;
+  return {{T(1) - (yy + zz), q.x * y2 - wz, q.x * z2 + wy},
+          {q.x * y2 + wz, T(1) - (xx + zz), q.y * z2 - wx},
+          {q.x * z2 - wy, q.y * z2 + wx, T(1) - (xx + yy)}};
+}
+
+/// Attitude after turning by the small rotation vector `turn_rad` given in body axes: q (1, turn/2), brought back
+/// to unit length by one Newton step, exact to (turn/2)^4 and free of drift.
+template <class T>
+FLAPPY_INLINE Quaternion<T> turned(const Quaternion<T>& q, const Vec3<T>& turn_rad) {
+  const Vec3<T> e = T(0.5) * turn_rad;
+  const Quaternion<T> r{q.w - (q.x * e.x + (q.y * e.y + q.z * e.z)), q.x + (q.w * e.x + (q.y * e.z - q.z * e.y)),
+                        q.y + (q.w * e.y + (q.z * e.x - q.x * e.z)), q.z + (q.w * e.z + (q.x * e.y - q.y * e.x))};
+  const T norm2 = r.w * r.w + (r.x * r.x + (r.y * r.y + r.z * r.z));
+  const T scale = T(1.5) - T(0.5) * norm2;
+  return {scale * r.w, scale * r.x, scale * r.y, scale * r.z};
+}
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::model

@@ -1,0 +1,121 @@
+#include "flappy/vehicle.hpp"
+
+#include <Eigen/Dense>
+
+#include "model/math.hpp"
+
+namespace flappy::model {
+namespace {
+
+constexpr double kLongest_m = 1.0;  // no part of a vehicle is farther from its frame than this
+
+class Lister {
+ public:
+  explicit Lister(std::vector<Parameter>& list) : list_(list) {}
+
+  void add(const std::string& path, double& value, double low, double high) { list_.push_back({path, &value, low, high}); }
+
+  void add(const std::string& path, Triple& t) {
+    add(path + ".x", t.x, -kLongest_m, kLongest_m);
+    add(path + ".y", t.y, -kLongest_m, kLongest_m);
+    add(path + ".z", t.z, -kLongest_m, kLongest_m);
+  }
+  void add(const std::string& path, RigidBody& b) {
+    add(path + ".mass_kg", b.mass_kg, 1e-9, 10);
+    add(path + ".com_m", b.com_m);
+    InertiaTensor& i = b.inertia_kg_m2;
+    add(path + ".inertia_kg_m2.xx", i.xx, 1e-15, 1);
+    add(path + ".inertia_kg_m2.yy", i.yy, 1e-15, 1);
+    add(path + ".inertia_kg_m2.zz", i.zz, 1e-15, 1);
+    add(path + ".inertia_kg_m2.xy", i.xy, -1, 1);
+    add(path + ".inertia_kg_m2.yz", i.yz, -1, 1);
+    add(path + ".inertia_kg_m2.xz", i.xz, -1, 1);
+  }
+  void add(const std::string& path, Joint& j) {
+    add(path + ".lower_rad", j.lower_rad, -kLargestAngle_rad, 0);
+    add(path + ".upper_rad", j.upper_rad, 0, kLargestAngle_rad);
+    add(path + ".damping_Nm_s", j.damping_Nm_s, 0, 1);
+    add(path + ".friction_Nm", j.friction_Nm, 0, 1);
+  }
+  void add(const std::string& path, Motor& m) {
+    add(path + ".resistance_ohm", m.resistance_ohm, 1e-3, 1e4);
+    add(path + ".torque_constant_Nm_A", m.torque_constant_Nm_A, 0, 1);
+    add(path + ".gear_ratio", m.gear_ratio, 1e-3, 1e4);
+    add(path + ".efficiency", m.efficiency, 1e-3, 1);
+    add(path + ".friction_Nm", m.friction_Nm, 0, 1);
+    add(path + ".damping_Nm_s", m.damping_Nm_s, 0, 1);
+    add(path + ".rotor_inertia_kg_m2", m.rotor_inertia_kg_m2, 0, 1);
+    add(path + ".voltage_limit_V", m.voltage_limit_V, 0, 1e3);
+  }
+  void add(const std::string& path, Spring& s) {
+    add(path + ".stiffness_positive_Nm_rad", s.stiffness_positive_Nm_rad, 0, 100);
+    add(path + ".stiffness_negative_Nm_rad", s.stiffness_negative_Nm_rad, 0, 100);
+    add(path + ".rest_angle_rad", s.rest_angle_rad, -kLargestAngle_rad, kLargestAngle_rad);
+  }
+  void add(const std::string& path, Planform& w) {
+    add(path + ".wing_length_m", w.wing_length_m, 1e-4, kLongest_m);
+    add(path + ".mean_chord_m", w.mean_chord_m, 1e-5, kLongest_m);
+    for (auto [name, value] : {std::pair<const char*, double*>{"r33", &w.r33}, {"r22", &w.r22}, {"r11", &w.r11},
+                               {"r00", &w.r00}, {"z_cp2", &w.z_cp2}, {"z_cp1", &w.z_cp1}, {"z_cp0", &w.z_cp0},
+                               {"z_rd", &w.z_rd}})
+      add(path + "." + name, *value, 1e-6, 10);
+    add(path + ".rotational_damping_coefficient", w.rotational_damping_coefficient, 0, 100);
+  }
+  void add(const std::string& path, Side& s) {
+    add(path + ".shoulder_m", s.shoulder_m);
+    add(path + ".leading_edge", s.leading_edge);
+    add(path + ".wing", s.wing);
+    add(path + ".stroke", s.stroke);
+    add(path + ".rotation", s.rotation);
+    add(path + ".motor", s.motor);
+    add(path + ".spring", s.spring);
+    add(path + ".planform", s.planform);
+  }
+
+ private:
+  std::vector<Parameter>& list_;
+};
+
+/// A rigid body is possible when its principal moments are positive and none exceeds the sum of the others.
+bool possible(const InertiaTensor& i) {
+  Eigen::Matrix3d m;
+  m << i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz;
+  const Eigen::Vector3d e = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
+  return e[0] > 0 && e[0] + e[1] >= e[2];
+}
+
+}  // namespace
+
+std::vector<Parameter> parameters(Vehicle& v) {
+  std::vector<Parameter> list;
+  Lister l(list);
+  l.add("air.density_kg_m3", v.air_density_kg_m3, 0, 100);
+  l.add("driver.flapping_Hz", v.driver.flapping_Hz, 0.1, 1000);
+  l.add("driver.hold_s", v.driver.hold_s, 1e-6, 1);
+  l.add("driver.amplitude_limit_V", v.driver.amplitude_limit_V, 0, 1e3);
+  l.add("driver.difference_limit_V", v.driver.difference_limit_V, 0, 1e3);
+  l.add("driver.bias_limit_V", v.driver.bias_limit_V, 0, 1e3);
+  l.add("driver.split_cycle_limit", v.driver.split_cycle_limit, 0, 0.45);
+  l.add("extent.below_m", v.extent.below_m, 0, kLongest_m);
+  l.add("extent.above_m", v.extent.above_m, 0, kLongest_m);
+  l.add("extent.around_m", v.extent.around_m, 0, kLongest_m);
+  l.add("torso", v.torso);
+  l.add("left", v.left);
+  l.add("right", v.right);
+  return list;
+}
+
+std::optional<PhysicalFault> physical_fault(const Vehicle& v) {
+  const std::pair<const char*, const RigidBody*> bodies[] = {{"torso", &v.torso},
+                                                             {"left.leading_edge", &v.left.leading_edge},
+                                                             {"left.wing", &v.left.wing},
+                                                             {"right.leading_edge", &v.right.leading_edge},
+                                                             {"right.wing", &v.right.wing}};
+  for (const auto& [path, body] : bodies)
+    if (!possible(body->inertia_kg_m2))
+      return PhysicalFault{std::string(path) + ".inertia_kg_m2", "no rigid body has this inertia",
+                           "positive principal moments, none above the sum of the other two"};
+  return std::nullopt;
+}
+
+}  // namespace flappy::model

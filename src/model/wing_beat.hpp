@@ -1,0 +1,30 @@
+// Wing-beat signal with split cycle (Fei et al. 2019). Within a beat of fraction t in [0, 1):
+//   V = A cos(pi t / s) + V_0              for t < s
+//   V = A cos(pi (t - 1) / (1 - s)) + V_0  after
+//   left:  A = V_amp + V_d, s = 0.5 - d_sigma      right: A = V_amp - V_d, s = 0.5 + d_sigma
+#pragma once
+
+#include "model/flapper.hpp"
+#include "model/math.hpp"
+
+namespace flappy::model {
+inline namespace FLAPPY_ISA {
+
+/// The four inputs of a flapper.
+template <class T>
+struct WingBeat {
+  T amplitude_V, difference_V, bias_V, split_cycle;
+};
+
+/// Voltage of one motor. `fraction` of the beat in [-1/2, 1/2), where -x stands for 1 - x; inputs already clipped.
+template <int side, class T>
+FLAPPY_INLINE T wing_beat_voltage(const WingBeat<T>& u, const T& fraction, const T& limit_V) {
+  const T s = T(0.5) - T(T(side) * u.split_cycle);
+  const T t = where(fraction < T(0), T(fraction + T(1)), fraction);
+  const T x = where(t < s, T(t / s), T((t - T(1)) / (T(1) - s)));
+  const T amplitude = u.amplitude_V + T(side) * u.difference_V;
+  return clamp(T(amplitude * cos_pi(x) + u.bias_V), T(-limit_V), limit_V);
+}
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::model

@@ -1,0 +1,278 @@
+#include "flappy/batch.hpp"
+
+#include <omp.h>
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+#include "model/derive.hpp"
+#include "model/effects/registry.hpp"
+#include "model/vehicle_dynamics.hpp"
+#include "sim/kernels.hpp"
+
+namespace flappy::sim {
+namespace {
+
+using model::Parameters;
+using model::State;
+using model::Vec3;
+
+/// Copies a struct of numbers into one lane of its rows, or back.
+template <class S, class T, int lanes>
+void put(const S& s, T (*rows)[lanes], int lane) {
+  const double* from = reinterpret_cast<const double*>(&s);
+  for (std::size_t i = 0; i < sizeof(S) / sizeof(double); ++i) rows[i][lane] = static_cast<T>(from[i]);
+}
+template <class S, class T, int lanes>
+S get(const T (*rows)[lanes], int lane) {
+  S s;
+  double* to = reinterpret_cast<double*>(&s);
+  for (std::size_t i = 0; i < sizeof(S) / sizeof(double); ++i) to[i] = rows[i][lane];
+  return s;
+}
+
+/// How the centre of mass moves relative to the torso origin, in W.
+Vec3<double> com_minus_origin_velocity(const Parameters<double>& p, const State<double>& x) {
+  const auto left = model::place_wing<+1>(p.left, x.left, x.body_rate_rad_s);
+  const auto right = model::place_wing<-1>(p.right, x.right, x.body_rate_rad_s);
+  const auto whole = model::whole_vehicle(p, left, right);
+  return model::rotation_matrix(x.attitude) * (model::cross(x.body_rate_rad_s, whole.com) + whole.com_rate);
+}
+
+std::uint64_t mixed(std::uint64_t h, std::uint64_t word) {  // splitmix64's finaliser
+  h = (h ^ word) * 0x9e3779b97f4a7c15ULL;
+  h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  h = (h ^ (h >> 27)) * 0x94d049bb133111ebULL;
+  return h ^ (h >> 31);
+}
+
+template <class T>
+std::uint64_t bits(T value) {
+  if constexpr (sizeof(T) == 4) return std::bit_cast<std::uint32_t>(value);
+  else return std::bit_cast<std::uint64_t>(value);
+}
+
+}  // namespace
+
+template <class T>
+struct Batch<T>::Storage {
+  std::size_t count = 0;
+  int threads = 1;
+  StepPlan plan;
+  double hold_s = 0;
+  std::int64_t steps = 0;
+  StepBlock<T> kernel = nullptr;
+  std::vector<Block<T>> blocks;
+  std::vector<std::uint64_t> lane_effects;   // set of each lane; empty while no flapper has an effect
+  std::vector<std::uint64_t> block_effects;  // their union
+  std::vector<T> effect_rows;                // [block][row][lane]
+
+  struct Place {
+    Block<T>& block;
+    int lane;
+  };
+  Place at(std::size_t i) {
+    if (i >= count) throw std::out_of_range("no flapper " + std::to_string(i) + " in a batch of " + std::to_string(count));
+    return {blocks[i / kLanes<T>], static_cast<int>(i % kLanes<T>)};
+  }
+
+  void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v) {
+    put(model::derive(v, plan.step_s), block.parameters, lane);
+    auto drive = get<Drive<double>>(block.drive, lane);
+    drive.limit = {v.driver.amplitude_limit_V, v.driver.difference_limit_V, v.driver.bias_limit_V, v.driver.split_cycle_limit};
+    put(drive, block.drive, lane);
+    block.phase_per_update[lane] = static_cast<std::uint32_t>(std::llround(v.driver.flapping_Hz * v.driver.hold_s * 0x1p32));
+  }
+
+  /// A lane without an effect that its block has gets the value at which the effect vanishes.
+  void put_effects(std::size_t i, const model::Vehicle& v) {
+    if (v.effects.empty() && lane_effects.empty()) return;
+    if (lane_effects.empty()) {
+      lane_effects.assign(blocks.size() * kLanes<T>, 0);
+      block_effects.assign(blocks.size(), 0);
+      effect_rows.assign(blocks.size() * model::kEffectRows * kLanes<T>, T(0));
+      for (std::size_t j = 0; j < lane_effects.size(); ++j) put_effect_rows(j, model::Vehicle{});
+    }
+    put_effect_rows(i, v);
+    const std::size_t b = i / kLanes<T>;
+    block_effects[b] = 0;
+    for (int lane = 0; lane < kLanes<T>; ++lane) block_effects[b] |= lane_effects[b * kLanes<T> + static_cast<std::size_t>(lane)];
+  }
+  void put_effect_rows(std::size_t i, const model::Vehicle& v) {
+    T* rows = &effect_rows[i / kLanes<T> * model::kEffectRows * kLanes<T> + i % kLanes<T>];
+    lane_effects[i] = 0;
+    for (std::size_t e = 0; e < model::effects().size(); ++e) {
+      const model::EffectEntry& entry = model::effects()[e];
+      const auto own = v.effects.find(entry.info.id);
+      if (own != v.effects.end()) lane_effects[i] |= std::uint64_t{1} << e;
+      for (std::size_t k = 0; k < entry.parameters.size(); ++k) {
+        const model::EffectParameter& parameter = entry.parameters[k];
+        double value = static_cast<int>(k) == entry.info.vanishing ? entry.info.vanishing_value : parameter.typical;
+        if (own != v.effects.end()) {
+          const auto given = own->second.find(parameter.name);
+          value = given != own->second.end() ? given->second : parameter.typical;
+        }
+        rows[(static_cast<std::size_t>(entry.first_row) + k) * kLanes<T>] = static_cast<T>(value);
+      }
+    }
+  }
+};
+
+template <class T>
+Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, BatchOptions options)
+    : storage_(std::make_unique<Storage>()) {
+  Storage& s = *storage_;
+  const double steps = vehicle.driver.hold_s / options.step_s;
+  if (!(options.step_s > 0) || std::llround(steps) < 1 || std::abs(steps - std::round(steps)) > 1e-6)
+    throw std::invalid_argument("the driver's hold (" + std::to_string(vehicle.driver.hold_s) +
+                                " s) is no whole number of physics steps");
+  s.count = count;
+  s.threads = options.threads > 0 ? options.threads : omp_get_num_procs();
+  s.plan = {options.step_s, static_cast<int>(std::llround(steps)), std::move(options.world)};
+  s.hold_s = vehicle.driver.hold_s;
+  s.kernel = kernel_named(options.instruction_set).template of<T>().step;
+  s.blocks.resize((count + kLanes<T> - 1) / kLanes<T>);
+  // lanes beyond the last flapper fly along as copies, so that no lane ever holds numbers of no vehicle
+  Block<T> block{};
+  for (int lane = 0; lane < kLanes<T>; ++lane) {
+    s.put_vehicle(block, lane, vehicle);
+    State<double> x{};
+    x.attitude.w = 1;
+    put(x, block.state, lane);
+  }
+  for (Block<T>& b : s.blocks) b = block;
+  for (std::size_t i = 0; i < count && !vehicle.effects.empty(); ++i) s.put_effects(i, vehicle);
+}
+
+template <class T>
+Batch<T>::~Batch() = default;
+template <class T>
+Batch<T>::Batch(Batch&&) noexcept = default;
+template <class T>
+Batch<T>& Batch<T>::operator=(Batch&&) noexcept = default;
+
+template <class T>
+std::size_t Batch<T>::size() const {
+  return storage_->count;
+}
+
+template <class T>
+void Batch<T>::set_vehicle(std::size_t i, const model::Vehicle& vehicle) {
+  if (vehicle.driver.hold_s != storage_->hold_s) throw std::invalid_argument("all flappers of a batch share the driver's hold");
+  const auto [block, lane] = storage_->at(i);
+  storage_->put_vehicle(block, lane, vehicle);
+  storage_->put_effects(i, vehicle);
+}
+
+template <class T>
+void Batch<T>::reset(std::size_t i, const FlapperState& f, Start start) {
+  const auto [block, lane] = storage_->at(i);
+  State<double> x{};
+  x.position_m = {f.position_m[0], f.position_m[1], f.position_m[2]};
+  x.attitude = {f.attitude[0], f.attitude[1], f.attitude[2], f.attitude[3]};
+  x.body_rate_rad_s = {f.body_rate_rad_s[0], f.body_rate_rad_s[1], f.body_rate_rad_s[2]};
+  x.left = {f.stroke_rad[0], f.rotation_rad[0], f.stroke_rate_rad_s[0], f.rotation_rate_rad_s[0]};
+  x.right = {f.stroke_rad[1], f.rotation_rad[1], f.stroke_rate_rad_s[1], f.rotation_rate_rad_s[1]};
+  const Vec3<double> velocity{f.velocity_m_s[0], f.velocity_m_s[1], f.velocity_m_s[2]};
+  x.com_velocity_m_s = velocity + com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
+  if (start == Start::standing) x.support = static_cast<double>(model::Support::standing);
+  if (start == Start::welded) x.support = static_cast<double>(model::Support::welded);
+  put(x, block.state, lane);
+  auto drive = get<Drive<double>>(block.drive, lane);
+  drive.input = {0, 0, 0, 0};
+  drive.left_V = drive.right_V = 0;
+  put(drive, block.drive, lane);
+  block.phase[lane] = 0;
+  block.status[lane] = 0;
+}
+
+template <class T>
+void Batch<T>::set_input(std::size_t i, const Input& u) {
+  const auto [block, lane] = storage_->at(i);
+  auto drive = get<Drive<double>>(block.drive, lane);
+  drive.input = {u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle};
+  put(drive, block.drive, lane);
+}
+
+template <class T>
+void Batch<T>::step(int steps) {
+  Storage& s = *storage_;
+  const auto blocks = static_cast<std::ptrdiff_t>(s.blocks.size());
+#pragma omp parallel for schedule(static) num_threads(s.threads)
+  for (std::ptrdiff_t b = 0; b < blocks; ++b) {
+    BlockEffects<T> effects;
+    const auto i = static_cast<std::size_t>(b);
+    if (!s.block_effects.empty()) effects = {s.block_effects[i], &s.effect_rows[i * model::kEffectRows * kLanes<T>]};
+    s.kernel(s.blocks[i], effects, s.plan, s.steps, steps);
+  }
+  s.steps += steps;
+}
+
+template <class T>
+FlapperState Batch<T>::state(std::size_t i) const {
+  const auto [block, lane] = storage_->at(i);
+  const auto x = get<State<double>>(block.state, lane);
+  const Vec3<double> v = x.com_velocity_m_s - com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
+  return {{x.position_m.x, x.position_m.y, x.position_m.z},
+          {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z},
+          {v.x, v.y, v.z},
+          {x.body_rate_rad_s.x, x.body_rate_rad_s.y, x.body_rate_rad_s.z},
+          {x.left.stroke_rad, x.right.stroke_rad},
+          {x.left.rotation_rad, x.right.rotation_rad},
+          {x.left.stroke_rate_rad_s, x.right.stroke_rate_rad_s},
+          {x.left.rotation_rate_rad_s, x.right.rotation_rate_rad_s}};
+}
+
+template <class T>
+HeldImpulse Batch<T>::held_impulse(std::size_t i) const {
+  const auto [block, lane] = storage_->at(i);
+  const auto x = get<State<double>>(block.state, lane);
+  return {{x.impulse_N_s.x, x.impulse_N_s.y, x.impulse_N_s.z},
+          {x.angular_impulse_Nm_s.x, x.angular_impulse_Nm_s.y, x.angular_impulse_Nm_s.z}};
+}
+
+template <class T>
+Start Batch<T>::support(std::size_t i) const {
+  const auto [block, lane] = storage_->at(i);
+  const double support = get<State<double>>(block.state, lane).support;
+  return support > 1.5 ? Start::welded : support > 0.5 ? Start::standing : Start::flying;
+}
+
+template <class T>
+std::uint32_t Batch<T>::status(std::size_t i) const {
+  const auto [block, lane] = storage_->at(i);
+  return block.status[lane];
+}
+
+template <class T>
+std::size_t Batch<T>::count_status(std::uint32_t mask) const {
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < size(); ++i) n += (status(i) & mask) != 0;
+  return n;
+}
+
+template <class T>
+std::uint64_t Batch<T>::hash(std::size_t first, std::size_t last) const {
+  std::uint64_t all = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    const auto [block, lane] = storage_->at(i);
+    std::uint64_t h = 0;
+    for (const auto& row : block.state) h = mixed(h, bits(row[lane]));
+    for (const auto& row : block.drive) h = mixed(h, bits(row[lane]));
+    h = mixed(mixed(h, block.phase[lane]), block.status[lane]);
+    all = mixed(all, h);
+  }
+  return all;
+}
+
+template <class T>
+std::size_t Batch<T>::bytes_per_flapper() {
+  return sizeof(Block<T>) / kLanes<T>;
+}
+
+template class Batch<float>;
+template class Batch<double>;
+
+}  // namespace flappy::sim

@@ -1,0 +1,45 @@
+// Counter-based random numbers (Philox 4x32-10, Random123): a draw depends on its key alone, so it is the same for any
+// number of threads and any order of asking.
+#pragma once
+
+#include <Random123/philox.h>
+
+#include <cstdint>
+
+#include "model/math.hpp"
+
+namespace flappy::sim {
+
+/// What a random number is for; part of its key. Never renumber: recorded runs depend on it.
+enum class Stream : std::uint32_t { vehicle = 1 };
+
+struct RandomKey {
+  std::uint64_t seed = 0;
+  std::uint32_t flapper = 0, episode = 0;
+  Stream stream = Stream::vehicle;
+};
+
+/// Two uniform doubles in (0, 1), 53 bits each; `index` counts within the stream.
+struct UniformPair {
+  double first, second;
+};
+
+inline UniformPair uniform_pair(const RandomKey& key, std::uint32_t index) {
+  using Philox = r123::Philox4x32;
+  const Philox::ctr_type counter{{index, static_cast<std::uint32_t>(key.stream), key.flapper, key.episode}};
+  const Philox::key_type k{{static_cast<std::uint32_t>(key.seed), static_cast<std::uint32_t>(key.seed >> 32)}};
+  const Philox::ctr_type r = Philox()(counter, k);
+  const auto unit = [](std::uint32_t high, std::uint32_t low) {
+    const std::uint64_t bits = (std::uint64_t{high} << 21) ^ (low >> 11);
+    return (static_cast<double>(bits) + 0.5) * 0x1p-53;
+  };
+  return {unit(r[0], r[1]), unit(r[2], r[3])};
+}
+
+/// Standard normal (Box and Muller 1958).
+inline double normal(const RandomKey& key, std::uint32_t index) {
+  const UniformPair u = uniform_pair(key, index);
+  return model::sqrt(-2 * model::log(u.first)) * model::cos_pi(2 * u.second - 1);
+}
+
+}  // namespace flappy::sim

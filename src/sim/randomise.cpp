@@ -1,0 +1,92 @@
+#include "sim/randomise.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace flappy::sim {
+namespace {
+
+constexpr std::uint32_t kIndicesPerDraw = 64;  // a cut at 1 sd is redrawn 63 times once in 1e31
+
+}  // namespace
+
+Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : nominal_(std::move(nominal)) {
+  model::Vehicle vehicle = nominal_;
+  const std::vector<model::Parameter> parameters = model::parameters(vehicle);
+  for (const io::Table& table : config.tables("randomise")) draws_.push_back(read_draw(table, parameters));
+}
+
+Randomisation::Draw Randomisation::read_draw(const io::Table& table, const std::vector<model::Parameter>& parameters) {
+  static const std::vector<std::string> kLaws = {"scale_normal", "scale_half_normal", "replace_normal",
+                                                 "add_normal",   "scale_uniform",     "replace_uniform"};
+  Draw draw{};
+  for (const std::string& name : table.strings("parameters")) {
+    const std::size_t before = draw.parameters.size();
+    for (std::size_t i = 0; i < parameters.size(); ++i)
+      if (parameters[i].path == name || parameters[i].path.starts_with(name + "."))
+        draw.parameters.push_back(i);
+    if (draw.parameters.size() == before) {
+      std::vector<std::string> known;
+      for (const model::Parameter& p : parameters) known.push_back(p.path);
+      table.fail("parameters", "no parameter \"" + name + "\"",
+                 "paths of the vehicle file" + io::did_you_mean(name, known));
+    }
+  }
+  const std::string law = table.choice("law", kLaws);
+  draw.law = static_cast<Law>(std::ranges::find(kLaws, law) - kLaws.begin());
+  if (draw.law == Law::scale_uniform || draw.law == Law::replace_uniform) {
+    draw.a = table.number("low");
+    draw.b = table.number("high", {draw.a, 1e12});
+    draw.cut_sd = 1;
+  } else {
+    draw.a = draw.law == Law::replace_normal ? table.number("mean") : 0;
+    draw.b = table.number("sd", io::non_negative());
+    draw.cut_sd = table.number_or("cut_sd", 3, {1, 8});
+  }
+  for (const std::size_t i : draw.parameters)
+    for (const double extreme : {-draw.cut_sd, 0.0, draw.cut_sd}) {
+      const model::Parameter& p = parameters[i];
+      const double value = apply(draw, *p.value, extreme);
+      if (value < p.low || value > p.high)
+        table.fail("parameters", p.path + " could become " + std::to_string(value),
+                   "draws between " + std::to_string(p.low) + " and " + std::to_string(p.high));
+    }
+  return draw;
+}
+
+double Randomisation::apply(const Draw& draw, double nominal, double variate) {
+  const double uniform = draw.a + (draw.b - draw.a) * std::clamp((variate + 1) / 2, 0.0, 1.0);
+  switch (draw.law) {
+    case Law::scale_normal: return nominal * (1 + draw.b * variate);
+    case Law::scale_half_normal: return nominal * (1 + std::abs(draw.b * variate));
+    case Law::replace_normal: return draw.a + draw.b * variate;
+    case Law::add_normal: return nominal + draw.b * variate;
+    case Law::scale_uniform: return nominal * uniform;
+    case Law::replace_uniform: return uniform;
+  }
+  return nominal;
+}
+
+model::Vehicle Randomisation::sample(RandomKey key) const {
+  key.stream = Stream::vehicle;
+  model::Vehicle vehicle = nominal_;
+  if (draws_.empty()) return vehicle;
+  const std::vector<model::Parameter> parameters = model::parameters(vehicle);
+  std::uint32_t base = 0;
+  for (const Draw& draw : draws_) {
+    double variate = 0;
+    if (draw.law == Law::scale_uniform || draw.law == Law::replace_uniform) {
+      variate = 2 * uniform_pair(key, base).first - 1;
+    } else {
+      for (std::uint32_t i = 0; i < kIndicesPerDraw; ++i) {
+        variate = normal(key, base + i);
+        if (std::abs(variate) <= draw.cut_sd) break;
+      }
+    }
+    for (const std::size_t i : draw.parameters) *parameters[i].value = apply(draw, *parameters[i].value, variate);
+    base += kIndicesPerDraw;
+  }
+  return vehicle;
+}
+
+}  // namespace flappy::sim

@@ -1,0 +1,33 @@
+// The step of a block, compiled once for each instruction set.
+#pragma once
+
+#include "flappy/world.hpp"
+#include "sim/block.hpp"
+
+namespace flappy::sim {
+
+/// How a batch advances; the same for all of its blocks.
+struct StepPlan {
+  double step_s;
+  int steps_per_update;  // physics steps between updates of the driver
+  World world;
+};
+
+/// Effects in force in a block, and their parameters: rows as in the registry, kLanes wide.
+template <class T>
+struct BlockEffects {
+  std::uint64_t set = 0;  // bit i: entry i of the registry
+  const T* rows = nullptr;
+};
+
+/// Advances all lanes of a block by `steps` physics steps, of which the first is number `first` of the batch.
+template <class T>
+using StepBlock = void (*)(Block<T>&, BlockEffects<T>, const StepPlan&, std::int64_t first, int steps);
+
+template <class T>
+struct Kernel {
+  const char* instruction_set;
+  StepBlock<T> step;
+};
+
+}  // namespace flappy::sim
