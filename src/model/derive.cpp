@@ -23,7 +23,7 @@ Sym3<double> second_moment(const RigidBody& b) {
 
 double wing_mass(const Side& s) { return s.leading_edge.mass_kg + s.wing.mass_kg; }
 
-SideParameters<double> derive_side(const Side& s, double air_density) {
+SideParameters<double> derive_side(const Side& s, double air_density, double step_s) {
   SideParameters<double> p;
   p.shoulder_m = vec(s.shoulder_m);
   p.edge_moment_kg_m = first_moment(s.leading_edge);
@@ -35,10 +35,10 @@ SideParameters<double> derive_side(const Side& s, double air_density) {
   const double R = w.wing_length_m, c = w.mean_chord_m;
   const double pressure = 0.5 * air_density;
   p.force2 = pressure * c * R * R * R * w.r22;
-  p.force1 = pressure * c * R * R * w.r11;
+  p.force1 = 2 * pressure * c * R * R * w.r11;
   p.force0 = pressure * c * R * w.r00;
   p.moment2 = pressure * c * c * R * R * R * w.z_cp2;
-  p.moment1 = pressure * c * c * R * R * w.z_cp1;
+  p.moment1 = 2 * pressure * c * c * R * R * w.z_cp1;
   p.moment0 = pressure * c * c * R * w.z_cp0;
   p.rotational_damping_Nm_s2 = 0.125 * air_density * w.rotational_damping_coefficient * R * c * c * c * c * w.z_rd;
   p.span_to_pressure_m = R * w.r33 / w.r22;
@@ -59,6 +59,9 @@ SideParameters<double> derive_side(const Side& s, double air_density) {
   p.rotation_upper_rad = s.rotation.upper_rad;
   p.rotation_damping_Nm_s = s.rotation.damping_Nm_s;
   p.rotation_friction_Nm = s.rotation.friction_Nm;
+  p.stroke_stiffening_kg_m2 = step_s / 2 * p.stroke_damping_Nm_s;
+  p.rotation_stiffening_kg_m2 = step_s / 2 * p.rotation_damping_Nm_s;
+  p.rotation_stiffening_kg_m2_s = step_s * p.rotational_damping_Nm_s2;
   return p;
 }
 
@@ -68,8 +71,8 @@ double total_mass_kg(const Vehicle& v) { return v.torso.mass_kg + wing_mass(v.le
 
 Parameters<double> derive(const Vehicle& v, double step_s) {
   Parameters<double> p;
-  p.left = derive_side(v.left, v.air_density_kg_m3);
-  p.right = derive_side(v.right, v.air_density_kg_m3);
+  p.left = derive_side(v.left, v.air_density_kg_m3, step_s);
+  p.right = derive_side(v.right, v.air_density_kg_m3, step_s);
   p.inverse_mass_1_kg = 1 / total_mass_kg(v);
   p.fixed_moment_kg_m =
       first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);

@@ -24,7 +24,8 @@ struct HingedWing {
   Vec3<T> moment;                          // h
   Sym3<T> second;                          // P
   Vec3<T> momentum;                        // of the relative motion
-  Vec3<T> stroke_column, rotation_column;  // d momentum / d beta', d theta'
+  Planar<T> stroke_column;                 // d momentum / d beta'
+  Vec3<T> rotation_column;                 // d momentum / d theta'
   Vec3<T> stroke_spin, rotation_spin;      // d angular momentum about the shoulder / d beta', d theta'
   T stroke_inertia, rotation_inertia, cross_inertia;
   // bias: what inertia asks of the hinges at zero acceleration
@@ -58,14 +59,15 @@ FLAPPY_INLINE HingedWing<T> place_wing(const SideParameters<T>& p, const SideSta
   const auto to_body = [&](const Vec3<T>& v) { return turn_z(g.beta.sin, g.beta.cos, v); };
   g.moment = to_body(h);
   g.second = turn_z(g.beta.sin, g.beta.cos, P);
-  g.stroke_column = {-g.moment.y, g.moment.x, T(0)};
-  g.rotation_column = to_body({hw.z, T(0), -hw.x});
+  g.stroke_column = {-g.moment.y, g.moment.x};
+  g.rotation_column = turn_z(g.beta.sin, g.beta.cos, hw.z, T(-hw.x));
   g.stroke_spin = to_body({-P.xz, -P.yz, P.xx + P.yy});
   g.rotation_spin = to_body({-pw.xy, pw.xx + pw.zz, -pw.yz});
   g.stroke_inertia = P.xx + P.yy;
   g.rotation_inertia = pw.xx + pw.zz;
   g.cross_inertia = -pw.yz;
-  g.momentum = add_scaled(B * g.stroke_column, W, g.rotation_column);
+  g.momentum = {B * g.stroke_column.x + W * g.rotation_column.x, B * g.stroke_column.y + W * g.rotation_column.y,
+                W * g.rotation_column.z};
 
   const Vec3<T> w = g.body_rate_L = turn_back_z(g.beta.sin, g.beta.cos, body_rate);
   const T Pw_x = P.xx * w.x + (P.xy * w.y + P.xz * w.z), Pw_y = P.xy * w.x + (P.yy * w.y + P.yz * w.z);

@@ -15,14 +15,35 @@ struct Vec3 {
   friend FLAPPY_INLINE Vec3 operator*(const T& s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
 };
 
+/// A vector in the xy plane: what is known to be zero is not computed.
+template <class T>
+struct Planar {
+  T x, y;
+
+  friend FLAPPY_INLINE Planar operator*(const T& s, const Planar& a) { return {s * a.x, s * a.y}; }
+};
+
 template <class T>
 FLAPPY_INLINE T dot(const Vec3<T>& a, const Vec3<T>& b) {
   return a.x * b.x + (a.y * b.y + a.z * b.z);
+}
+template <class T>
+FLAPPY_INLINE T dot(const Planar<T>& a, const Vec3<T>& b) {
+  return a.x * b.x + a.y * b.y;
+}
+template <class T>
+FLAPPY_INLINE T dot(const Planar<T>& a, const Planar<T>& b) {
+  return a.x * b.x + a.y * b.y;
 }
 
 template <class T>
 FLAPPY_INLINE Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+template <class T>
+FLAPPY_INLINE Vec3<T> cross(const Vec3<T>& a, const Planar<T>& b) {
+  return {-(a.z * b.y), a.z * b.x, a.x * b.y - a.y * b.x};
 }
 
 /// a + s b, fused.
@@ -74,6 +95,11 @@ template <class T>
 FLAPPY_INLINE Vec3<T> turn_z(const T& s, const T& c, const Vec3<T>& v) {
   return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
 }
+/// Turns (x, 0, z).
+template <class T>
+FLAPPY_INLINE Vec3<T> turn_z(const T& s, const T& c, const T& x, const T& z) {
+  return {c * x, s * x, z};
+}
 /// Turns it back.
 template <class T>
 FLAPPY_INLINE Vec3<T> turn_back_z(const T& s, const T& c, const Vec3<T>& v) {
@@ -83,7 +109,7 @@ FLAPPY_INLINE Vec3<T> turn_back_z(const T& s, const T& c, const Vec3<T>& v) {
 /// R P R^T for a turn about z: the xy block turns by the double angle.
 template <class T>
 FLAPPY_INLINE Sym3<T> turn_z(const T& s, const T& c, const Sym3<T>& p) {
-  const T s2 = T(s + s) * c, c2 = c * c - s * s;
+  const T twice = s + s, s2 = twice * c, c2 = T(1) - twice * s;
   const T mean = T(0.5) * T(p.xx + p.yy), half = T(0.5) * T(p.xx - p.yy);
   const T d = half * c2 - p.xy * s2;
   return {mean + d, mean - d, p.zz, half * s2 + p.xy * c2, s * p.xz + c * p.yz, c * p.xz - s * p.yz};
@@ -92,7 +118,7 @@ FLAPPY_INLINE Sym3<T> turn_z(const T& s, const T& c, const Sym3<T>& p) {
 /// R P R^T for a turn about y.
 template <class T>
 FLAPPY_INLINE Sym3<T> turn_y(const T& s, const T& c, const Sym3<T>& p) {
-  const T s2 = T(s + s) * c, c2 = c * c - s * s;
+  const T twice = s + s, s2 = twice * c, c2 = T(1) - twice * s;
   const T mean = T(0.5) * T(p.xx + p.zz), half = T(0.5) * T(p.xx - p.zz);
   const T d = half * c2 + p.xz * s2;
   return {mean + d, p.yy, mean - d, c * p.xy + s * p.yz, c * p.yz - s * p.xy, p.xz * c2 - half * s2};

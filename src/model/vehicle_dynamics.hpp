@@ -24,7 +24,8 @@ inline namespace FLAPPY_ISA {
 /// What acts on one side during a step.
 template <class T>
 struct SideLoad {
-  Vec3<T> force_L, moment_L;                       // on the wing at the shoulder
+  T force_x_N, force_z_N;                          // on the wing at the shoulder, in L; none along the span
+  Vec3<T> moment_Nm;                               // the same
   T stroke_torque_Nm, rotation_torque_Nm;          // about beta and theta, dry friction and inertia excluded
   T stroke_stiffening, rotation_stiffening;        // implicit damping, as inertia added to the hinge
 };
@@ -72,33 +73,31 @@ FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const Hing
           o.xy - m.x * com.y, o.yz - m.y * com.z, o.xz - m.x * com.z};
 }
 
-/// Rates of the hinges at the end of the step, and the accelerations that led there.
+/// What a step does to the vehicle.
 template <class T>
 struct Motion {
-  T stroke_left, stroke_right, rotation_left, rotation_right;  // beta', theta'
+  T stroke_left, stroke_right, rotation_left, rotation_right;  // turns of beta and theta in this step, rad
   Vec3<T> body_acceleration;                                   // w'
   Vec3<T> force_B;                                             // F
 };
 
-/// Angles, stops and friction of one hinge, in the sense of beta or theta.
+/// Rate, stops and friction of one hinge, about beta or theta. Stops as the turns in one step that just reach them.
 template <class T>
 struct Hinge {
-  T rate, lowest_rate, highest_rate, friction;
+  T rate, lowest_turn, highest_turn, friction;
 };
 
-/// The stroke hinge, about beta.
 template <int side, class T>
-FLAPPY_INLINE Hinge<T> stroke_hinge(const SideParameters<T>& p, const SideState<T>& q, const T& per_step) {
-  const T lowest = T(p.stroke_lower_rad - q.stroke_rad) * per_step;
-  const T highest = T(p.stroke_upper_rad - q.stroke_rad) * per_step;
+FLAPPY_INLINE Hinge<T> stroke_hinge(const SideParameters<T>& p, const SideState<T>& q) {
+  const T lowest = p.stroke_lower_rad - q.stroke_rad, highest = p.stroke_upper_rad - q.stroke_rad;
   if constexpr (side > 0) return {q.stroke_rate_rad_s, lowest, highest, p.stroke_friction_Nm};
   else return {-q.stroke_rate_rad_s, -highest, -lowest, p.stroke_friction_Nm};
 }
 
 template <class T>
-FLAPPY_INLINE Hinge<T> rotation_hinge(const SideParameters<T>& p, const SideState<T>& q, const T& per_step) {
-  return {q.rotation_rate_rad_s, T(p.rotation_lower_rad - q.rotation_rad) * per_step,
-          T(p.rotation_upper_rad - q.rotation_rad) * per_step, p.rotation_friction_Nm};
+FLAPPY_INLINE Hinge<T> rotation_hinge(const SideParameters<T>& p, const SideState<T>& q) {
+  return {q.rotation_rate_rad_s, p.rotation_lower_rad - q.rotation_rad, p.rotation_upper_rad - q.rotation_rad,
+          p.rotation_friction_Nm};
 }
 
 /// Dry friction: the torque that would stop the hinge within the step, no more than the friction.
@@ -108,8 +107,8 @@ FLAPPY_INLINE T dry_friction(const T& inertia, const Hinge<T>& q, const T& torqu
 }
 
 template <class T>
-FLAPPY_INLINE T clamp_rate(const Hinge<T>& q, const T& rate) {
-  return clamp(rate, q.lowest_rate, q.highest_rate);
+FLAPPY_INLINE T stopped(const Hinge<T>& q, const T& turn) {
+  return clamp(turn, q.lowest_turn, q.highest_turn);
 }
 
 /// A symmetric 2x2 matrix, left and right.
@@ -130,17 +129,16 @@ FLAPPY_INLINE Motion<T> solve(const Parameters<T>& p, const State<T>& x, const H
                               const SideLoad<T>& load_l, const SideLoad<T>& load_r, const BodyLoad<T>& body,
                               const T& step, const T& per_step) {
   const Vec3<T>& w = x.body_rate_rad_s;
-  const Hinge<T> stroke_l = stroke_hinge<+1>(p.left, x.left, per_step);
-  const Hinge<T> stroke_r = stroke_hinge<-1>(p.right, x.right, per_step);
-  const Hinge<T> rotation_l = rotation_hinge(p.left, x.left, per_step);
-  const Hinge<T> rotation_r = rotation_hinge(p.right, x.right, per_step);
+  const Hinge<T> stroke_l = stroke_hinge<+1>(p.left, x.left), stroke_r = stroke_hinge<-1>(p.right, x.right);
+  const Hinge<T> rotation_l = rotation_hinge(p.left, x.left), rotation_r = rotation_hinge(p.right, x.right);
 
   // forces less what the wings' relative motion takes
   const auto in_body = [](const HingedWing<T>& g, const Vec3<T>& a) { return turn_z(g.beta.sin, g.beta.cos, a); };
-  const Vec3<T> aero_l = in_body(l, load_l.force_L), aero_r = in_body(r, load_r.force_L);
+  const Vec3<T> aero_l = turn_z(l.beta.sin, l.beta.cos, load_l.force_x_N, load_l.force_z_N);
+  const Vec3<T> aero_r = turn_z(r.beta.sin, r.beta.cos, load_r.force_x_N, load_r.force_z_N);
   const Vec3<T> net_l = aero_l - in_body(l, l.relative_force_L), net_r = aero_r - in_body(r, r.relative_force_L);
-  const Vec3<T> moment_l = in_body(l, load_l.moment_L - l.relative_moment_L);
-  const Vec3<T> moment_r = in_body(r, load_r.moment_L - r.relative_moment_L);
+  const Vec3<T> moment_l = in_body(l, load_l.moment_Nm - l.relative_moment_L);
+  const Vec3<T> moment_r = in_body(r, load_r.moment_Nm - r.relative_moment_L);
 
   const Sym3<T> second = second_moment_about_com(p, l, r, v.com);
   Sym3<T> inverse_inertia = inverse(inertia_of(second));
@@ -166,27 +164,27 @@ FLAPPY_INLINE Motion<T> solve(const Parameters<T>& p, const State<T>& x, const H
   }
 
   // G, and I^-1 G
-  const auto column = [](const Vec3<T>& spin, const Vec3<T>& arm, const Vec3<T>& e) { return spin + cross(arm, e); };
-  const Vec3<T> gsl = column(l.stroke_spin, v.arm_left, l.stroke_column);
-  const Vec3<T> gsr = column(r.stroke_spin, v.arm_right, r.stroke_column);
-  const Vec3<T> grl = column(l.rotation_spin, v.arm_left, l.rotation_column);
-  const Vec3<T> grr = column(r.rotation_spin, v.arm_right, r.rotation_column);
+  const auto& esl = l.stroke_column;
+  const auto& esr = r.stroke_column;
+  const auto& erl = l.rotation_column;
+  const auto& err = r.rotation_column;
+  const Vec3<T> gsl = l.stroke_spin + cross(v.arm_left, esl), gsr = r.stroke_spin + cross(v.arm_right, esr);
+  const Vec3<T> grl = l.rotation_spin + cross(v.arm_left, erl), grr = r.rotation_spin + cross(v.arm_right, err);
   const Vec3<T> xsl = inverse_inertia * gsl, xsr = inverse_inertia * gsr;
   const Vec3<T> xrl = inverse_inertia * grl, xrr = inverse_inertia * grr;
 
-  // hinges after the body is eliminated
-  const auto coupling = [&](const Vec3<T>& e, const Vec3<T>& f) { return T(inverse_mass * dot(e, f)); };
-  const Vec3<T>&esl = l.stroke_column, &esr = r.stroke_column, &erl = l.rotation_column, &err = r.rotation_column;
-  const Sym2<T> S{(l.stroke_inertia + p.left.rotor_kg_m2 + load_l.stroke_stiffening) - (coupling(esl, esl) + dot(gsl, xsl)),
-                  (r.stroke_inertia + p.right.rotor_kg_m2 + load_r.stroke_stiffening) - (coupling(esr, esr) + dot(gsr, xsr)),
-                  -(coupling(esl, esr) + dot(gsl, xsr))};
-  const Sym2<T> R{(l.rotation_inertia + load_l.rotation_stiffening) - (coupling(erl, erl) + dot(grl, xrl)),
-                  (r.rotation_inertia + load_r.rotation_stiffening) - (coupling(err, err) + dot(grr, xrr)),
-                  -(coupling(erl, err) + dot(grl, xrr))};
-  const T c_ll = l.cross_inertia - (coupling(esl, erl) + dot(gsl, xrl));  // stroke left, rotation left
-  const T c_rr = r.cross_inertia - (coupling(esr, err) + dot(gsr, xrr));
-  const T c_lr = -(coupling(esl, err) + dot(gsl, xrr));                   // stroke left, rotation right
-  const T c_rl = -(coupling(esr, erl) + dot(gsr, xrl));
+  // hinges after the body is eliminated: S strokes, R rotations, C between them (stroke, rotation)
+  const auto taken = [&](const auto& e, const auto& f, const Vec3<T>& g, const Vec3<T>& y) {
+    return T(inverse_mass * dot(e, f) + dot(g, y));
+  };
+  const Sym2<T> S{T(l.stroke_inertia + (p.left.rotor_kg_m2 + load_l.stroke_stiffening)) - taken(esl, esl, gsl, xsl),
+                  T(r.stroke_inertia + (p.right.rotor_kg_m2 + load_r.stroke_stiffening)) - taken(esr, esr, gsr, xsr),
+                  -taken(esl, esr, gsl, xsr)};
+  const Sym2<T> R{T(l.rotation_inertia + load_l.rotation_stiffening) - taken(erl, erl, grl, xrl),
+                  T(r.rotation_inertia + load_r.rotation_stiffening) - taken(err, err, grr, xrr),
+                  -taken(erl, err, grl, xrr)};
+  const T C_ll = l.cross_inertia - taken(esl, erl, gsl, xrl), C_rr = r.cross_inertia - taken(esr, err, gsr, xrr);
+  const T C_lr = -taken(esl, err, gsl, xrr), C_rl = -taken(esr, erl, gsr, xrl);
 
   T s_l = (load_l.stroke_torque_Nm - l.stroke_bias) - (dot(esl, shoulder_l) + dot(xsl, t));
   T s_r = (load_r.stroke_torque_Nm - r.stroke_bias) - (dot(esr, shoulder_r) + dot(xsr, t));
@@ -195,53 +193,59 @@ FLAPPY_INLINE Motion<T> solve(const Parameters<T>& p, const State<T>& x, const H
   s_l += dry_friction(S.ll, stroke_l, s_l, per_step);
   s_r += dry_friction(S.rr, stroke_r, s_r, per_step);
 
-  // strokes eliminated by K: beta'' = K (s - C theta''), plus what a stop prescribes
+  // strokes: beta'' = given + K (s - C theta''); K loses the row of a stroke that its stop prescribes
   Sym2<T> K = inverse(S);
-  T fixed_l(0), fixed_r(0);
-  T rate_sl, rate_sr, rate_rl, rate_rr, a_sl, a_sr, a_rl, a_rr;
-  const auto eliminate = [&] {
-    const T z_ll = K.ll * c_ll + K.lr * c_rl, z_lr = K.ll * c_lr + K.lr * c_rr;
-    const T z_rl = K.lr * c_ll + K.rr * c_rl, z_rr = K.lr * c_lr + K.rr * c_rr;
-    const T y_l = fixed_l + (K.ll * s_l + K.lr * s_r), y_r = fixed_r + (K.lr * s_l + K.rr * s_r);
-    const Sym2<T> A{R.ll - (c_ll * z_ll + c_rl * z_rl), R.rr - (c_lr * z_lr + c_rr * z_rr),
-                    R.lr - (c_ll * z_lr + c_rl * z_rr)};
-    T b_l = r_l - (c_ll * y_l + c_rl * y_r), b_r = r_r - (c_lr * y_l + c_rr * y_r);
+  T given_l(0), given_r(0);
+  T a_sl, a_sr, a_rl, a_rr;  // beta'', theta''
+  Motion<T> m;
+  const T step2 = step * step, per_step2 = per_step * per_step;
+  const auto accelerate = [&] {
+    const T z_ll = K.ll * C_ll + K.lr * C_rl, z_lr = K.ll * C_lr + K.lr * C_rr;
+    const T z_rl = K.lr * C_ll + K.rr * C_rl, z_rr = K.lr * C_lr + K.rr * C_rr;
+    const T y_l = given_l + (K.ll * s_l + K.lr * s_r), y_r = given_r + (K.lr * s_l + K.rr * s_r);
+    const Sym2<T> A{R.ll - (C_ll * z_ll + C_rl * z_rl), R.rr - (C_lr * z_lr + C_rr * z_rr),
+                    R.lr - (C_ll * z_lr + C_rl * z_rr)};
+    T b_l = r_l - (C_ll * y_l + C_rl * y_r), b_r = r_r - (C_lr * y_l + C_rr * y_r);
     b_l += dry_friction(A.ll, rotation_l, b_l, per_step);
     b_r += dry_friction(A.rr, rotation_r, b_r, per_step);
     const Sym2<T> N = inverse(A);
-    // a rotation on its stop changes the other only through the body; one sweep settles the pair
-    const T free_l = rotation_l.rate + step * T(N.ll * b_l + N.lr * b_r);
-    const T free_r = rotation_r.rate + step * T(N.lr * b_l + N.rr * b_r);
-    const T first_l = clamp_rate(rotation_l, free_l);
-    rate_rr = clamp_rate(rotation_r, T(free_r - T(N.lr * T(free_l - first_l)) / N.ll));
-    rate_rl = clamp_rate(rotation_l, T(free_l - T(N.lr * T(free_r - rate_rr)) / N.rr));
-    a_rl = T(rate_rl - rotation_l.rate) * per_step;
-    a_rr = T(rate_rr - rotation_r.rate) * per_step;
+    const T coast_l = step * rotation_l.rate, coast_r = step * rotation_r.rate;
+    const T free_l = coast_l + step2 * T(N.ll * b_l + N.lr * b_r);
+    const T free_r = coast_r + step2 * T(N.lr * b_l + N.rr * b_r);
+    // what one stop takes from its wing moves the other, through the body: by N_lr / N_ll = -A_lr / A_rr of it
+    const T coupling = A.lr / T(A.ll * A.rr);
+    const T taken_l = free_l - stopped(rotation_l, free_l), taken_r = free_r - stopped(rotation_r, free_r);
+    m.rotation_left = stopped(rotation_l, T(free_l + T(coupling * A.rr) * taken_r));
+    m.rotation_right = stopped(rotation_r, T(free_r + T(coupling * A.ll) * taken_l));
+    a_rl = T(m.rotation_left - coast_l) * per_step2;
+    a_rr = T(m.rotation_right - coast_r) * per_step2;
     a_sl = y_l - (z_ll * a_rl + z_lr * a_rr);
     a_sr = y_r - (z_rl * a_rl + z_rr * a_rr);
-    rate_sl = stroke_l.rate + step * a_sl;
-    rate_sr = stroke_r.rate + step * a_sr;
+    m.stroke_left = step * stroke_l.rate + step2 * a_sl;
+    m.stroke_right = step * stroke_r.rate + step2 * a_sr;
   };
-  eliminate();
-  const auto out_l = (rate_sl < stroke_l.lowest_rate) | (rate_sl > stroke_l.highest_rate);
-  const auto out_r = (rate_sr < stroke_r.lowest_rate) | (rate_sr > stroke_r.highest_rate);
-  if (any(out_l | out_r)) {  // a stroke reaches its stop: solve again with its rate given
+  accelerate();
+  const auto out_l = (m.stroke_left < stroke_l.lowest_turn) | (m.stroke_left > stroke_l.highest_turn);
+  const auto out_r = (m.stroke_right < stroke_r.lowest_turn) | (m.stroke_right > stroke_r.highest_turn);
+  if (any(out_l | out_r)) {  // a stroke reaches its stop: once more, with its turn given
     const T zero(0);
-    const T given_l = T(clamp_rate(stroke_l, rate_sl) - stroke_l.rate) * per_step;
-    const T given_r = T(clamp_rate(stroke_r, rate_sr) - stroke_r.rate) * per_step;
+    const T stop_l = T(stopped(stroke_l, m.stroke_left) - step * stroke_l.rate) * per_step2;
+    const T stop_r = T(stopped(stroke_r, m.stroke_right) - step * stroke_r.rate) * per_step2;
     const Sym2<T> free = K;
     K.ll = where(out_l, zero, where(out_r, T(T(1) / S.ll), free.ll));
     K.rr = where(out_r, zero, where(out_l, T(T(1) / S.rr), free.rr));
     K.lr = where(out_l | out_r, zero, free.lr);
-    fixed_l = where(out_l, given_l, where(out_r, T(-(T(S.lr / S.ll) * given_r)), zero));
-    fixed_r = where(out_r, given_r, where(out_l, T(-(T(S.lr / S.rr) * given_l)), zero));
-    eliminate();
-    rate_sl = clamp_rate(stroke_l, rate_sl);
-    rate_sr = clamp_rate(stroke_r, rate_sr);
+    given_l = where(out_l, stop_l, where(out_r, T(-(T(S.lr / S.ll) * stop_r)), zero));
+    given_r = where(out_r, stop_r, where(out_l, T(-(T(S.lr / S.rr) * stop_l)), zero));
+    accelerate();
+    m.stroke_left = stopped(stroke_l, m.stroke_left);
+    m.stroke_right = stopped(stroke_r, m.stroke_right);
   }
 
   const Vec3<T> hinges = add_scaled(add_scaled(add_scaled(a_sl * gsl, a_sr, gsr), a_rl, grl), a_rr, grr);
-  return {rate_sl, rate_sr, rate_rl, rate_rr, inverse_inertia * (t - hinges), (aero_l + aero_r) + body.force_B};
+  m.body_acceleration = inverse_inertia * (t - hinges);
+  m.force_B = (aero_l + aero_r) + body.force_B;
+  return m;
 }
 
 }  // namespace FLAPPY_ISA

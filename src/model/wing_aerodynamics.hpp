@@ -43,13 +43,13 @@ FLAPPY_INLINE NormalForceCoefficients<T> coefficients(const T& sin_alpha, const 
 template <class T>
 struct WingWrench {
   T normal_force_N;      // F_N
-  Vec3<T> force_N;
+  T force_x_N, force_z_N;  // none along the span
   Vec3<T> moment_Nm;     // y: about the rotation hinge; z: about the leading edge's z
 };
 
 template <class T>
 FLAPPY_INLINE WingWrench<T> scaled(const WingWrench<T>& w, const T& factor) {
-  return {factor * w.normal_force_N, factor * w.force_N, factor * w.moment_Nm};
+  return {factor * w.normal_force_N, factor * w.force_x_N, factor * w.force_z_N, factor * w.moment_Nm};
 }
 
 /// `v`, `w`: velocity of the shoulder and angular velocity of E relative to the air, in E. `side`: +1 left, -1 right.
@@ -67,16 +67,17 @@ FLAPPY_INLINE WingWrench<T> blade_element(const SideParameters<T>& p, const SinC
   const NormalForceCoefficients<T> c = coefficients(sin_alpha, cos_alpha);
 
   const T a2 = ui1 * ui1 + uo1 * uo1;
-  const T a1 = T(2) * T(ui1 * ui0 + uo1 * uo0);
+  const T half_a1 = ui1 * ui0 + uo1 * uo0;
   const T a0 = ui0 * ui0 + uo0 * uo0;
-  const T normal = c.force * T(a2 * p.force2 + (a1 * p.force1 + a0 * p.force0));
-  const T pressure = -(T(c.force * c.pressure_centre) * T(a2 * p.moment2 + (a1 * p.moment1 + a0 * p.moment0)));
+  const T normal = c.force * T(a2 * p.force2 + (half_a1 * p.force1 + a0 * p.force0));
+  const T pressure = -(T(c.force * c.pressure_centre) * T(a2 * p.moment2 + (half_a1 * p.moment1 + a0 * p.moment0)));
   const T damping = -(T(p.rotational_damping_Nm_s2 * abs(theta_rate)) * theta_rate);
 
   // (F_N, 0, 0) at (0, s r_cp, -D) of the wing frame, turned by theta about y
   const T arm = T(-s) * p.span_to_pressure_m * normal;
   return {normal,
-          {theta.cos * normal, T(0), -(theta.sin * normal)},
+          theta.cos * normal,
+          -(theta.sin * normal),
           {theta.sin * arm, pressure + damping, theta.cos * arm}};
 }
 

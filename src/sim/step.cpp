@@ -98,15 +98,15 @@ struct ActiveEffects {
 /// What air and motor do to one side.
 template <int side, class T>
 FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<T>& q, const WingWrench<T>& air,
-                                    const T& voltage_V, const T& step) {
+                                    const T& voltage_V) {
   SideLoad<T> load;
-  load.force_L = air.force_N;
-  load.moment_L = air.moment_Nm;
+  load.force_x_N = air.force_x_N;
+  load.force_z_N = air.force_z_N;
+  load.moment_Nm = air.moment_Nm;
   load.stroke_torque_Nm = air.moment_Nm.z + T(side) * drive_torque(p, q, voltage_V);
   load.rotation_torque_Nm = air.moment_Nm.y - p.rotation_damping_Nm_s * q.rotation_rate_rad_s;
-  load.stroke_stiffening = T(T(0.5) * step) * p.stroke_damping_Nm_s;
-  load.rotation_stiffening =
-      step * T(T(0.5) * p.rotation_damping_Nm_s + p.rotational_damping_Nm_s2 * abs(q.rotation_rate_rad_s));
+  load.stroke_stiffening = p.stroke_stiffening_kg_m2;
+  load.rotation_stiffening = p.rotation_stiffening_kg_m2 + p.rotation_stiffening_kg_m2_s * abs(q.rotation_rate_rad_s);
   return load;
 }
 
@@ -115,6 +115,15 @@ template <int side, class T>
 FLAPPY_INLINE WingWrench<T> air_on_wing(const SideParameters<T>& p, const HingedWing<T>& g, const Vec3<T>& velocity_B) {
   return blade_element<side>(p, g.theta, g.theta_rate, turn_back_z(g.beta.sin, g.beta.cos, velocity_B),
                              {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate});
+}
+
+/// Turns the hinges of one side. The last clamp takes the rounding of a landing on a stop.
+template <int side, class T>
+FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& beta, const T& theta, const T& per_step) {
+  q.stroke_rate_rad_s = T(side) * T(beta * per_step);
+  q.rotation_rate_rad_s = theta * per_step;
+  q.stroke_rad = clamp(T(q.stroke_rad + T(T(side) * beta)), p.stroke_lower_rad, p.stroke_upper_rad);
+  q.rotation_rad = clamp(T(q.rotation_rad + theta), p.rotation_lower_rad, p.rotation_upper_rad);
 }
 
 /// One physics step. `com_m`: the vehicle's centre of mass in W, carried along because it is what inertia moves.
@@ -159,33 +168,26 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Drive
   }
 
   // new rates
-  const SideLoad<T> load_left = load_side<+1>(p.left, x.left, air_left, drive.left_V, k.step);
-  const SideLoad<T> load_right = load_side<-1>(p.right, x.right, air_right, drive.right_V, k.step);
+  const SideLoad<T> load_left = load_side<+1>(p.left, x.left, air_left, drive.left_V);
+  const SideLoad<T> load_right = load_side<-1>(p.right, x.right, air_right, drive.right_V);
   const Motion<T> m = solve(p, x, left, right, whole, k.gravity * R.row_z, load_left, load_right, body, k.step, k.per_step);
   const Vec3<T> force = R * m.force_B;
   x.body_rate_rad_s = add_scaled(x.body_rate_rad_s, k.step, m.body_acceleration);
   x.com_velocity_m_s = add_scaled(x.com_velocity_m_s, T(k.step * p.inverse_mass_1_kg), force);
   x.com_velocity_m_s.z -= k.step * k.gravity;
-  x.left.stroke_rate_rad_s = m.stroke_left;
-  x.right.stroke_rate_rad_s = -m.stroke_right;
-  x.left.rotation_rate_rad_s = m.rotation_left;
-  x.right.rotation_rate_rad_s = m.rotation_right;
 
   // new positions, with the new rates
-  const auto advance = [&](const SideParameters<T>& s, SideState<T>& q) {
-    q.stroke_rad = clamp(T(q.stroke_rad + k.step * q.stroke_rate_rad_s), s.stroke_lower_rad, s.stroke_upper_rad);
-    q.rotation_rad =
-        clamp(T(q.rotation_rad + k.step * q.rotation_rate_rad_s), s.rotation_lower_rad, s.rotation_upper_rad);
-  };
-  advance(p.left, x.left);
-  advance(p.right, x.right);
+  turn<+1>(p.left, x.left, m.stroke_left, m.rotation_left, k.per_step);
+  turn<-1>(p.right, x.right, m.stroke_right, m.rotation_right, k.per_step);
   com_m = add_scaled(com_m, k.step, x.com_velocity_m_s);
   x.attitude = turned(x.attitude, k.step * x.body_rate_rad_s);
 
   // what holds the body feels the air, and lets go when the wings carry a standing vehicle
   if (any(held)) {
     const auto to_body = [](const HingedWing<T>& g, const Vec3<T>& v) { return turn_z(g.beta.sin, g.beta.cos, v); };
-    const Vec3<T> force_l = to_body(left, air_left.force_N), force_r = to_body(right, air_right.force_N);
+    const T none(0);
+    const Vec3<T> force_l = to_body(left, {air_left.force_x_N, none, air_left.force_z_N});
+    const Vec3<T> force_r = to_body(right, {air_right.force_x_N, none, air_right.force_z_N});
     const Vec3<T> moment = (to_body(left, air_left.moment_Nm) + to_body(right, air_right.moment_Nm)) +
                            (cross(p.left.shoulder_m, force_l) + cross(p.right.shoulder_m, force_r));
     x.impulse_N_s = where(held, add_scaled(x.impulse_N_s, k.step, force_l + force_r), x.impulse_N_s);
