@@ -72,8 +72,8 @@ FLAPPY_INLINE HingedWing<T> place_wing(const SideParameters<T>& p, const SideSta
   const Vec3<T> w = g.body_rate_L = turn_back_z(g.beta.sin, g.beta.cos, body_rate);
   const T Pw_x = P.xx * w.x + (P.xy * w.y + P.xz * w.z), Pw_y = P.xy * w.x + (P.yy * w.y + P.yz * w.z);
   const T pw_x = pw.xx * w.x + (pw.xy * w.y + pw.xz * w.z), pw_z = pw.xz * w.x + (pw.yz * w.y + pw.zz * w.z);
-  const T m_x = T(2) * Pw_x + (B * P.xz + W * pw.xy), m_y = T(2) * Pw_y + (B * P.yz + W * pw.yy);
-  const T k_x = T(2) * pw_x + (B * pw.xz + W * pw.xy), k_z = T(2) * pw_z + (B * pw.zz + W * pw.yz);
+  const T m_x = (Pw_x + Pw_x) + (B * P.xz + W * pw.xy), m_y = (Pw_y + Pw_y) + (B * P.yz + W * pw.yy);
+  const T k_x = (pw_x + pw_x) + (B * pw.xz + W * pw.xy), k_z = (pw_z + pw_z) + (B * pw.zz + W * pw.yz);
   const T BW = B * W, W2 = W * W;
   const T wing_y = BW * pw.xy - k_x * B;
   g.relative_moment_L = {m_y * B - (k_z * W + BW * T(pw.yy + pw.zz)), BW * pw.xy - m_x * B, k_x * W + BW * pw.xz};

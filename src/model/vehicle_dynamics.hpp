@@ -27,7 +27,6 @@ struct SideLoad {
   T force_x_N, force_z_N;                          // on the wing at the shoulder, in L; none along the span
   Vec3<T> moment_Nm;                               // the same
   T stroke_torque_Nm, rotation_torque_Nm;          // about beta and theta, dry friction and inertia excluded
-  T stroke_stiffening, rotation_stiffening;        // implicit damping, as inertia added to the hinge
 };
 
 template <class T>
@@ -73,14 +72,6 @@ FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const Hing
           o.xy - m.x * com.y, o.yz - m.y * com.z, o.xz - m.x * com.z};
 }
 
-/// What a step does to the vehicle.
-template <class T>
-struct Motion {
-  T stroke_left, stroke_right, rotation_left, rotation_right;  // turns of beta and theta in this step, rad
-  Vec3<T> body_acceleration;                                   // w'
-  Vec3<T> force_B;                                             // F
-};
-
 /// Rate, stops and friction of one hinge, about beta or theta. Stops as the turns in one step that just reach them.
 template <class T>
 struct Hinge {
@@ -122,129 +113,196 @@ FLAPPY_INLINE Sym2<T> inverse(const Sym2<T>& m) {
   return {scale * m.rr, scale * m.ll, -(scale * m.lr)};
 }
 
-/// `against_gravity_B`: what a body at rest accelerates by relative to free fall, in B, m/s^2.
+/// What the body opposes to forces and moments about C. A body that is held opposes everything.
 template <class T>
-FLAPPY_INLINE Motion<T> solve(const Parameters<T>& p, const State<T>& x, const HingedWing<T>& l,
-                              const HingedWing<T>& r, const WholeVehicle<T>& v, const Vec3<T>& against_gravity_B,
-                              const SideLoad<T>& load_l, const SideLoad<T>& load_r, const BodyLoad<T>& body,
-                              const T& step, const T& per_step) {
-  const Vec3<T>& w = x.body_rate_rad_s;
-  const Hinge<T> stroke_l = stroke_hinge<+1>(p.left, x.left), stroke_r = stroke_hinge<-1>(p.right, x.right);
-  const Hinge<T> rotation_l = rotation_hinge(p.left, x.left), rotation_r = rotation_hinge(p.right, x.right);
+struct BodyInertia {
+  T inverse_mass;
+  Sym3<T> second_moment, inverse;  // of the whole vehicle about C, wings frozen
+};
 
-  // forces less what the wings' relative motion takes
+template <class T>
+FLAPPY_INLINE BodyInertia<T> body_inertia(const Parameters<T>& p, const State<T>& x, const HingedWing<T>& l,
+                                          const HingedWing<T>& r, const WholeVehicle<T>& v) {
+  BodyInertia<T> b{p.inverse_mass_1_kg, second_moment_about_com(p, l, r, v.com), {}};
+  b.inverse = inverse(inertia_of(b.second_moment));
+  const auto held = x.support > T(0);
+  if (any(held)) {
+    const auto drop = [&](T& t) { t = where(held, T(0), t); };
+    drop(b.inverse_mass);
+    drop(b.inverse.xx), drop(b.inverse.yy), drop(b.inverse.zz), drop(b.inverse.xy), drop(b.inverse.yz), drop(b.inverse.xz);
+  }
+  return b;
+}
+
+/// What drives the body and the shoulders while the hinges do not accelerate.
+template <class T>
+struct BodyDrive {
+  Vec3<T> force, moment;                // F, and t about C
+  Vec3<T> shoulder_left, shoulder_right;  // A
+};
+
+/// `up_B`: the vertical in B; `gravity`: m/s^2.
+template <class T>
+FLAPPY_INLINE BodyDrive<T> drive_body(const Parameters<T>& p, const State<T>& x, const HingedWing<T>& l,
+                                      const HingedWing<T>& r, const WholeVehicle<T>& v, const BodyInertia<T>& inertia,
+                                      const SideLoad<T>& load_l, const SideLoad<T>& load_r, const BodyLoad<T>& body,
+                                      const Vec3<T>& up_B, const T& gravity) {
+  const Vec3<T>& w = x.body_rate_rad_s;
   const auto in_body = [](const HingedWing<T>& g, const Vec3<T>& a) { return turn_z(g.beta.sin, g.beta.cos, a); };
-  const Vec3<T> aero_l = turn_z(l.beta.sin, l.beta.cos, load_l.force_x_N, load_l.force_z_N);
-  const Vec3<T> aero_r = turn_z(r.beta.sin, r.beta.cos, load_r.force_x_N, load_r.force_z_N);
-  const Vec3<T> net_l = aero_l - in_body(l, l.relative_force_L), net_r = aero_r - in_body(r, r.relative_force_L);
+  const Vec3<T> air_l = turn_z(l.beta.sin, l.beta.cos, load_l.force_x_N, load_l.force_z_N);
+  const Vec3<T> air_r = turn_z(r.beta.sin, r.beta.cos, load_r.force_x_N, load_r.force_z_N);
+  const Vec3<T> net_l = air_l - in_body(l, l.relative_force_L), net_r = air_r - in_body(r, r.relative_force_L);
   const Vec3<T> moment_l = in_body(l, load_l.moment_Nm - l.relative_moment_L);
   const Vec3<T> moment_r = in_body(r, load_r.moment_Nm - r.relative_moment_L);
-
-  const Sym3<T> second = second_moment_about_com(p, l, r, v.com);
-  Sym3<T> inverse_inertia = inverse(inertia_of(second));
-  T inverse_mass = p.inverse_mass_1_kg;
   const Vec3<T> t = ((moment_l + moment_r) + (cross(v.arm_left, net_l) + cross(v.arm_right, net_r))) +
-                    (body.moment_B - cross(second * w, w));
+                    (body.moment_B - cross(inertia.second_moment * w, w));
 
-  // acceleration of the shoulders less gravity
   const T w2 = dot(w, w);
-  const Vec3<T> common = inverse_mass * ((net_l + net_r) + body.force_B);
+  const Vec3<T> common = p.inverse_mass_1_kg * ((net_l + net_r) + body.force_B);
   const auto shoulder = [&](const Vec3<T>& d) { return common + (dot(w, d) * w - w2 * d); };
-  Vec3<T> shoulder_l = shoulder(v.arm_left), shoulder_r = shoulder(v.arm_right);
-
+  BodyDrive<T> drive{(air_l + air_r) + body.force_B, t, shoulder(v.arm_left), shoulder(v.arm_right)};
   const auto held = x.support > T(0);
-  if (any(held)) {  // standing or welded: the body does not move, so its inertia is infinite
-    const T zero(0);
-    inverse_mass = where(held, zero, inverse_mass);
-    inverse_inertia = {where(held, zero, inverse_inertia.xx), where(held, zero, inverse_inertia.yy),
-                       where(held, zero, inverse_inertia.zz), where(held, zero, inverse_inertia.xy),
-                       where(held, zero, inverse_inertia.yz), where(held, zero, inverse_inertia.xz)};
-    shoulder_l = where(held, against_gravity_B, shoulder_l);
-    shoulder_r = where(held, against_gravity_B, shoulder_r);
+  if (any(held)) {
+    const Vec3<T> rest = gravity * up_B;
+    drive.shoulder_left = where(held, rest, drive.shoulder_left);
+    drive.shoulder_right = where(held, rest, drive.shoulder_right);
   }
+  return drive;
+}
 
-  // G, and I^-1 G
+/// The hinges after the body is eliminated.
+template <class T>
+struct HingeSystem {
+  Vec3<T> stroke_l, stroke_r, rotation_l, rotation_r;  // columns of G
+  Sym2<T> strokes, rotations;                          // blocks of H - G^T I^-1 G
+  T ll, rr, lr, rl;                                    // and between them: (stroke, rotation)
+  T s_l, s_r, r_l, r_r;                                // what drives strokes and rotations, dry friction excluded
+};
+
+template <class T>
+FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const HingedWing<T>& l, const HingedWing<T>& r,
+                                            const WholeVehicle<T>& v, const BodyInertia<T>& body,
+                                            const BodyDrive<T>& drive, const SideLoad<T>& load_l, const SideLoad<T>& load_r) {
+  HingeSystem<T> h;
+  h.stroke_l = l.stroke_spin + cross(v.arm_left, l.stroke_column);
+  h.stroke_r = r.stroke_spin + cross(v.arm_right, r.stroke_column);
+  h.rotation_l = l.rotation_spin + cross(v.arm_left, l.rotation_column);
+  h.rotation_r = r.rotation_spin + cross(v.arm_right, r.rotation_column);
+  const Vec3<T> xsl = body.inverse * h.stroke_l, xsr = body.inverse * h.stroke_r;
+  const Vec3<T> xrl = body.inverse * h.rotation_l, xrr = body.inverse * h.rotation_r;
+
+  const auto taken = [&](const auto& e, const auto& f, const Vec3<T>& g, const Vec3<T>& y) {
+    return T(body.inverse_mass * dot(e, f) + dot(g, y));
+  };
   const auto& esl = l.stroke_column;
   const auto& esr = r.stroke_column;
   const auto& erl = l.rotation_column;
   const auto& err = r.rotation_column;
-  const Vec3<T> gsl = l.stroke_spin + cross(v.arm_left, esl), gsr = r.stroke_spin + cross(v.arm_right, esr);
-  const Vec3<T> grl = l.rotation_spin + cross(v.arm_left, erl), grr = r.rotation_spin + cross(v.arm_right, err);
-  const Vec3<T> xsl = inverse_inertia * gsl, xsr = inverse_inertia * gsr;
-  const Vec3<T> xrl = inverse_inertia * grl, xrr = inverse_inertia * grr;
-
-  // hinges after the body is eliminated: S strokes, R rotations, C between them (stroke, rotation)
-  const auto taken = [&](const auto& e, const auto& f, const Vec3<T>& g, const Vec3<T>& y) {
-    return T(inverse_mass * dot(e, f) + dot(g, y));
+  const auto stroke = [](const HingedWing<T>& g, const SideParameters<T>& s) {
+    return T(g.stroke_inertia + (s.rotor_kg_m2 + s.stroke_stiffening_kg_m2));
   };
-  const Sym2<T> S{T(l.stroke_inertia + (p.left.rotor_kg_m2 + load_l.stroke_stiffening)) - taken(esl, esl, gsl, xsl),
-                  T(r.stroke_inertia + (p.right.rotor_kg_m2 + load_r.stroke_stiffening)) - taken(esr, esr, gsr, xsr),
-                  -taken(esl, esr, gsl, xsr)};
-  const Sym2<T> R{T(l.rotation_inertia + load_l.rotation_stiffening) - taken(erl, erl, grl, xrl),
-                  T(r.rotation_inertia + load_r.rotation_stiffening) - taken(err, err, grr, xrr),
-                  -taken(erl, err, grl, xrr)};
-  const T C_ll = l.cross_inertia - taken(esl, erl, gsl, xrl), C_rr = r.cross_inertia - taken(esr, err, gsr, xrr);
-  const T C_lr = -taken(esl, err, gsl, xrr), C_rl = -taken(esr, erl, gsr, xrl);
+  const auto rotation = [](const HingedWing<T>& g, const SideParameters<T>& s) {
+    return T(g.rotation_inertia + (s.rotation_stiffening_kg_m2 + s.rotation_stiffening_kg_m2_s * abs(g.theta_rate)));
+  };
+  h.strokes = {stroke(l, p.left) - taken(esl, esl, h.stroke_l, xsl),
+               stroke(r, p.right) - taken(esr, esr, h.stroke_r, xsr),
+               -taken(esl, esr, h.stroke_l, xsr)};
+  h.rotations = {rotation(l, p.left) - taken(erl, erl, h.rotation_l, xrl),
+                 rotation(r, p.right) - taken(err, err, h.rotation_r, xrr),
+                 -taken(erl, err, h.rotation_l, xrr)};
+  h.ll = l.cross_inertia - taken(esl, erl, h.stroke_l, xrl);
+  h.rr = r.cross_inertia - taken(esr, err, h.stroke_r, xrr);
+  h.lr = -taken(esl, err, h.stroke_l, xrr);
+  h.rl = -taken(esr, erl, h.stroke_r, xrl);
 
-  T s_l = (load_l.stroke_torque_Nm - l.stroke_bias) - (dot(esl, shoulder_l) + dot(xsl, t));
-  T s_r = (load_r.stroke_torque_Nm - r.stroke_bias) - (dot(esr, shoulder_r) + dot(xsr, t));
-  const T r_l = (load_l.rotation_torque_Nm - l.rotation_bias) - (dot(erl, shoulder_l) + dot(xrl, t));
-  const T r_r = (load_r.rotation_torque_Nm - r.rotation_bias) - (dot(err, shoulder_r) + dot(xrr, t));
-  s_l += dry_friction(S.ll, stroke_l, s_l, per_step);
-  s_r += dry_friction(S.rr, stroke_r, s_r, per_step);
+  const Vec3<T>& t = drive.moment;
+  h.s_l = (load_l.stroke_torque_Nm - l.stroke_bias) - (dot(esl, drive.shoulder_left) + dot(xsl, t));
+  h.s_r = (load_r.stroke_torque_Nm - r.stroke_bias) - (dot(esr, drive.shoulder_right) + dot(xsr, t));
+  h.r_l = (load_l.rotation_torque_Nm - l.rotation_bias) - (dot(erl, drive.shoulder_left) + dot(xrl, t));
+  h.r_r = (load_r.rotation_torque_Nm - r.rotation_bias) - (dot(err, drive.shoulder_right) + dot(xrr, t));
+  return h;
+}
 
-  // strokes: beta'' = given + K (s - C theta''); K loses the row of a stroke that its stop prescribes
-  Sym2<T> K = inverse(S);
-  T given_l(0), given_r(0);
+/// The rotations' 2x2 after the strokes are eliminated: beta'' = given + K s - Z theta'', with Z = K C. A stroke that its
+/// stop prescribes has no row in K.
+template <class T>
+struct RotationInertia {
+  T z_ll, z_rr, z_lr, z_rl;
+  Sym2<T> A, inverse_A;
+  T left_per_right, right_per_left;  // turn that a stop's turn of the other side gives this one: A_lr / A_own
+};
+
+template <class T>
+FLAPPY_INLINE RotationInertia<T> eliminate_strokes(const HingeSystem<T>& h, const Sym2<T>& K) {
+  RotationInertia<T> e;
+  e.z_ll = K.ll * h.ll + K.lr * h.rl, e.z_lr = K.ll * h.lr + K.lr * h.rr;
+  e.z_rl = K.lr * h.ll + K.rr * h.rl, e.z_rr = K.lr * h.lr + K.rr * h.rr;
+  e.A = {h.rotations.ll - (h.ll * e.z_ll + h.rl * e.z_rl), h.rotations.rr - (h.lr * e.z_lr + h.rr * e.z_rr),
+         h.rotations.lr - (h.ll * e.z_lr + h.rl * e.z_rr)};
+  e.inverse_A = inverse(e.A);
+  const T ratio = e.A.lr / T(e.A.ll * e.A.rr);
+  e.left_per_right = ratio * e.A.rr;
+  e.right_per_left = ratio * e.A.ll;
+  return e;
+}
+
+/// What a step does to the vehicle.
+template <class T>
+struct Motion {
+  T stroke_left, stroke_right, rotation_left, rotation_right;  // turns of beta and theta in this step, rad
+  Vec3<T> body_acceleration;                                   // w'
+};
+
+template <class T>
+FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const BodyInertia<T>& body,
+                             const BodyDrive<T>& drive, const HingeSystem<T>& h, const T& step, const T& per_step) {
+  const Hinge<T> stroke_l = stroke_hinge<+1>(p.left, x.left), stroke_r = stroke_hinge<-1>(p.right, x.right);
+  const Hinge<T> rotation_l = rotation_hinge(p.left, x.left), rotation_r = rotation_hinge(p.right, x.right);
+  const T s_l = h.s_l + dry_friction(h.strokes.ll, stroke_l, h.s_l, per_step);
+  const T s_r = h.s_r + dry_friction(h.strokes.rr, stroke_r, h.s_r, per_step);
+
   T a_sl, a_sr, a_rl, a_rr;  // beta'', theta''
   Motion<T> m;
   const T step2 = step * step, per_step2 = per_step * per_step;
-  const auto accelerate = [&] {
-    const T z_ll = K.ll * C_ll + K.lr * C_rl, z_lr = K.ll * C_lr + K.lr * C_rr;
-    const T z_rl = K.lr * C_ll + K.rr * C_rl, z_rr = K.lr * C_lr + K.rr * C_rr;
+  const auto accelerate = [&](const Sym2<T>& K, const T& given_l, const T& given_r) __attribute__((always_inline)) {
+    const RotationInertia<T> e = eliminate_strokes(h, K);
     const T y_l = given_l + (K.ll * s_l + K.lr * s_r), y_r = given_r + (K.lr * s_l + K.rr * s_r);
-    const Sym2<T> A{R.ll - (C_ll * z_ll + C_rl * z_rl), R.rr - (C_lr * z_lr + C_rr * z_rr),
-                    R.lr - (C_ll * z_lr + C_rl * z_rr)};
-    T b_l = r_l - (C_ll * y_l + C_rl * y_r), b_r = r_r - (C_lr * y_l + C_rr * y_r);
-    b_l += dry_friction(A.ll, rotation_l, b_l, per_step);
-    b_r += dry_friction(A.rr, rotation_r, b_r, per_step);
-    const Sym2<T> N = inverse(A);
+    T b_l = h.r_l - (h.ll * y_l + h.rl * y_r), b_r = h.r_r - (h.lr * y_l + h.rr * y_r);
+    b_l += dry_friction(e.A.ll, rotation_l, b_l, per_step);
+    b_r += dry_friction(e.A.rr, rotation_r, b_r, per_step);
     const T coast_l = step * rotation_l.rate, coast_r = step * rotation_r.rate;
-    const T free_l = coast_l + step2 * T(N.ll * b_l + N.lr * b_r);
-    const T free_r = coast_r + step2 * T(N.lr * b_l + N.rr * b_r);
-    // what one stop takes from its wing moves the other, through the body: by N_lr / N_ll = -A_lr / A_rr of it
-    const T coupling = A.lr / T(A.ll * A.rr);
+    const T free_l = coast_l + step2 * T(e.inverse_A.ll * b_l + e.inverse_A.lr * b_r);
+    const T free_r = coast_r + step2 * T(e.inverse_A.lr * b_l + e.inverse_A.rr * b_r);
     const T taken_l = free_l - stopped(rotation_l, free_l), taken_r = free_r - stopped(rotation_r, free_r);
-    m.rotation_left = stopped(rotation_l, T(free_l + T(coupling * A.rr) * taken_r));
-    m.rotation_right = stopped(rotation_r, T(free_r + T(coupling * A.ll) * taken_l));
+    m.rotation_left = stopped(rotation_l, T(free_l + e.left_per_right * taken_r));
+    m.rotation_right = stopped(rotation_r, T(free_r + e.right_per_left * taken_l));
     a_rl = T(m.rotation_left - coast_l) * per_step2;
     a_rr = T(m.rotation_right - coast_r) * per_step2;
-    a_sl = y_l - (z_ll * a_rl + z_lr * a_rr);
-    a_sr = y_r - (z_rl * a_rl + z_rr * a_rr);
+    a_sl = y_l - (e.z_ll * a_rl + e.z_lr * a_rr);
+    a_sr = y_r - (e.z_rl * a_rl + e.z_rr * a_rr);
     m.stroke_left = step * stroke_l.rate + step2 * a_sl;
     m.stroke_right = step * stroke_r.rate + step2 * a_sr;
   };
-  accelerate();
+  const Sym2<T> free = inverse(h.strokes);
+  accelerate(free, T(0), T(0));
   const auto out_l = (m.stroke_left < stroke_l.lowest_turn) | (m.stroke_left > stroke_l.highest_turn);
   const auto out_r = (m.stroke_right < stroke_r.lowest_turn) | (m.stroke_right > stroke_r.highest_turn);
-  if (any(out_l | out_r)) {  // a stroke reaches its stop: once more, with its turn given
+  if (any(out_l | out_r)) {  // a stroke reaches its stop: once more, with its turn given and its row of K gone
     const T zero(0);
+    const Sym2<T>& S = h.strokes;
     const T stop_l = T(stopped(stroke_l, m.stroke_left) - step * stroke_l.rate) * per_step2;
     const T stop_r = T(stopped(stroke_r, m.stroke_right) - step * stroke_r.rate) * per_step2;
-    const Sym2<T> free = K;
-    K.ll = where(out_l, zero, where(out_r, T(T(1) / S.ll), free.ll));
-    K.rr = where(out_r, zero, where(out_l, T(T(1) / S.rr), free.rr));
-    K.lr = where(out_l | out_r, zero, free.lr);
-    given_l = where(out_l, stop_l, where(out_r, T(-(T(S.lr / S.ll) * stop_r)), zero));
-    given_r = where(out_r, stop_r, where(out_l, T(-(T(S.lr / S.rr) * stop_l)), zero));
-    accelerate();
+    const Sym2<T> K{where(out_l, zero, where(out_r, T(T(1) / S.ll), free.ll)),
+                    where(out_r, zero, where(out_l, T(T(1) / S.rr), free.rr)), where(out_l | out_r, zero, free.lr)};
+    accelerate(K, where(out_l, stop_l, where(out_r, T(-(T(S.lr / S.ll) * stop_r)), zero)),
+               where(out_r, stop_r, where(out_l, T(-(T(S.lr / S.rr) * stop_l)), zero)));
     m.stroke_left = stopped(stroke_l, m.stroke_left);
     m.stroke_right = stopped(stroke_r, m.stroke_right);
   }
 
-  const Vec3<T> hinges = add_scaled(add_scaled(add_scaled(a_sl * gsl, a_sr, gsr), a_rl, grl), a_rr, grr);
-  m.body_acceleration = inverse_inertia * (t - hinges);
-  m.force_B = (aero_l + aero_r) + body.force_B;
+  const Vec3<T> hinges =
+      add_scaled(add_scaled(add_scaled(a_sl * h.stroke_l, a_sr, h.stroke_r), a_rl, h.rotation_l), a_rr, h.rotation_r);
+  m.body_acceleration = body.inverse * (drive.moment - hinges);
   return m;
 }
 

@@ -105,8 +105,6 @@ FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<
   load.moment_Nm = air.moment_Nm;
   load.stroke_torque_Nm = air.moment_Nm.z + T(side) * drive_torque(p, q, voltage_V);
   load.rotation_torque_Nm = air.moment_Nm.y - p.rotation_damping_Nm_s * q.rotation_rate_rad_s;
-  load.stroke_stiffening = p.stroke_stiffening_kg_m2;
-  load.rotation_stiffening = p.rotation_stiffening_kg_m2 + p.rotation_stiffening_kg_m2_s * abs(q.rotation_rate_rad_s);
   return load;
 }
 
@@ -170,8 +168,12 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Drive
   // new rates
   const SideLoad<T> load_left = load_side<+1>(p.left, x.left, air_left, drive.left_V);
   const SideLoad<T> load_right = load_side<-1>(p.right, x.right, air_right, drive.right_V);
-  const Motion<T> m = solve(p, x, left, right, whole, k.gravity * R.row_z, load_left, load_right, body, k.step, k.per_step);
-  const Vec3<T> force = R * m.force_B;
+  const BodyInertia<T> inertia = body_inertia(p, x, left, right, whole);
+  const BodyDrive<T> body_drive =
+      drive_body(p, x, left, right, whole, inertia, load_left, load_right, body, R.row_z, k.gravity);
+  const HingeSystem<T> hinges = eliminate_body(p, left, right, whole, inertia, body_drive, load_left, load_right);
+  const Motion<T> m = move(p, x, inertia, body_drive, hinges, k.step, k.per_step);
+  const Vec3<T> force = R * body_drive.force;
   x.body_rate_rad_s = add_scaled(x.body_rate_rad_s, k.step, m.body_acceleration);
   x.com_velocity_m_s = add_scaled(x.com_velocity_m_s, T(k.step * p.inverse_mass_1_kg), force);
   x.com_velocity_m_s.z -= k.step * k.gravity;
