@@ -1,0 +1,106 @@
+// The determinism contract for simulation: one hash for any number of threads, batch size, place in the batch,
+// instruction set and optimisation level. This file is linked twice: against the library as built, and at -O0.
+#include <gtest/gtest.h>
+
+#include "flappy/batch.hpp"
+#include "sim/randomise.hpp"
+#include "vehicles.hpp"
+
+namespace flappy::sim {
+namespace {
+
+// A change here means that every recorded run and every trained policy flies differently: say so in the commit.
+constexpr std::uint64_t kGoldenFloat = 0;
+constexpr std::uint64_t kGoldenDouble = 0;
+
+constexpr std::size_t kFlappers = 4096, kSmall = 68;
+constexpr int kPeriods = 6, kSteps = 20;
+
+const Randomisation& randomisation() {
+  static const Randomisation r = [] {
+    const auto config = io::Config::load(test::source_path("configs/sim/hover_batch.toml"));
+    return Randomisation(test::identified(), config.root());
+  }();
+  return r;
+}
+
+model::Vehicle vehicle(std::size_t id) {
+  model::Vehicle v = randomisation().sample({.seed = 11, .flapper = static_cast<std::uint32_t>(id), .episode = 2});
+  if (id % 5 == 0) v.effects["body_drag"] = {{"drag_area_m2", 0.001}, {"centre_z_m", 0.01}};
+  if (id % 7 == 0) v.effects["ground_effect"] = {{"gain", 0.2}, {"length_m", 0.05}};
+  return v;
+}
+
+void reset(auto& batch, std::size_t i, std::size_t id, const Input& input) {
+  FlapperState s;
+  s.position_m[2] = id % 3 == 0 ? 0 : 0.4;
+  s.velocity_m_s[0] = 0.1 * static_cast<double>(id % 11);
+  batch.reset(i, s, id % 3 == 0 ? Start::standing : Start::flying);
+  batch.set_input(i, input);
+}
+
+/// Flies flappers [first, first + count): every kind of start, stops under 18 V, effects, and a reset on the way.
+template <class T>
+Batch<T> fly(std::size_t first, std::size_t count, int threads, const std::string& instruction_set) {
+  BatchOptions options;
+  options.threads = threads;
+  options.instruction_set = instruction_set;
+  options.world.ground_z_m = 0;
+  options.world.walls = {{1, 0, -1, 0}};
+  Batch<T> batch(count, test::identified(), options);
+  const auto input = [](std::size_t id) {
+    return Input{8 + static_cast<double>(id % 21) / 2, 0.1 * static_cast<double>(id % 7), -0.2, 0.01 * static_cast<double>(id % 5)};
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    batch.set_vehicle(i, vehicle(first + i));
+    reset(batch, i, first + i, input(first + i));
+  }
+  for (int period = 0; period < kPeriods; ++period) {
+    batch.step(kSteps);
+    for (std::size_t i = 0; i < count && period == 2; ++i)
+      if ((first + i) % 13 == 0) reset(batch, i, first + i, input(first + i + 1));
+  }
+  return batch;
+}
+
+/// Hash of the first kSmall flappers, flown in batches of `size`.
+template <class T>
+std::uint64_t hash_in_batches_of(std::size_t size, int threads, const std::string& instruction_set) {
+  std::uint64_t all = 0;
+  for (std::size_t first = 0; first < kSmall; first += size) {
+    const Batch<T> batch = fly<T>(first, size, threads, instruction_set);
+    for (std::size_t i = 0; i < size && first + i < kSmall; ++i) all = all * 31 + batch.hash(i, i + 1);
+  }
+  return all;
+}
+
+template <class T>
+void one_hash(std::uint64_t golden) {
+  std::uint64_t small = 0;
+  for (const std::string& set : instruction_sets())
+    for (const int threads : {1, 2, 3, 16}) {
+      const Batch<T> batch = fly<T>(0, kFlappers, threads, set);
+      EXPECT_EQ(batch.hash(), golden) << set << ", " << threads << " threads: 0x" << std::hex << batch.hash();
+      EXPECT_EQ(batch.count_status(kFrozen), 0u);
+      small = 0;
+      for (std::size_t i = 0; i < kSmall; ++i) small = small * 31 + batch.hash(i, i + 1);
+    }
+  for (const std::string& set : instruction_sets())
+    for (const int threads : {1, 2, 3, 16})
+      for (const std::size_t size : {std::size_t{1}, std::size_t{17}})
+        EXPECT_EQ(hash_in_batches_of<T>(size, threads, set), small) << set << ", batches of " << size;
+}
+
+TEST(Determinism, Float) { one_hash<float>(kGoldenFloat); }
+TEST(Determinism, Double) { one_hash<double>(kGoldenDouble); }
+
+TEST(Determinism, HashSeesEveryNumber) {
+  Batch<float> a = fly<float>(0, 2, 1, ""), b = fly<float>(0, 2, 1, "");
+  EXPECT_EQ(a.hash(), b.hash());
+  b.set_input(1, {8, 0, 0, 0.001});
+  EXPECT_NE(a.hash(), b.hash());
+  EXPECT_EQ(a.hash(0, 1), b.hash(0, 1));
+}
+
+}  // namespace
+}  // namespace flappy::sim
