@@ -1,0 +1,46 @@
+#include "io/program.hpp"
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "io/files.hpp"
+#include "io/version.hpp"  // made by the build
+
+namespace flappy::io {
+
+std::string commit() { return FLAPPY_COMMIT; }
+
+Program::Program(const std::string& name, const std::string& description, const std::vector<std::string>& facts)
+    : app_(description, name) {
+  std::string version = name + " " FLAPPY_VERSION "\ncommit " + commit() + "\ncompiler " + __VERSION__;
+  for (const std::string& fact : facts) version += "\n" + fact;
+  version += "\nCLI11 " CLI11_VERSION "\nnlohmann-json " + std::to_string(NLOHMANN_JSON_VERSION_MAJOR) + "." +
+             std::to_string(NLOHMANN_JSON_VERSION_MINOR) + "." + std::to_string(NLOHMANN_JSON_VERSION_PATCH);
+  app_.set_version_flag("--version", version);
+  app_.add_option("--json", json_path_, "write the results as JSON to this file");
+  app_.fallthrough();
+}
+
+int Program::run(int argc, char** argv, const std::function<void()>& job) {
+  try {
+    app_.parse(argc, argv);
+    job();
+    return 0;
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return app_.exit(e);  // --help, --version
+    std::fprintf(stderr, "%s: %s; see %s --help\n", app_.get_name().c_str(), e.what(), app_.get_name().c_str());
+    return 2;
+  } catch (const InputError& e) {
+    std::fprintf(stderr, "%s\n", e.what());
+    return 2;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "%s: internal fault: %s\n", app_.get_name().c_str(), e.what());
+    return 1;
+  }
+}
+
+void Program::write_json(const nlohmann::ordered_json& result) const {
+  if (!json_path_.empty()) write_atomically(json_path_, result.dump(2) + "\n");
+}
+
+}  // namespace flappy::io

@@ -1,0 +1,105 @@
+#include "hover.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "flappy/batch.hpp"
+#include "io/config.hpp"
+#include "model/vehicle_file.hpp"
+#include "sim/randomise.hpp"
+
+namespace flappy::bench {
+namespace {
+
+struct Job {
+  model::Vehicle vehicle;
+  std::string precision;
+  std::size_t count;
+  std::uint64_t seed;
+  double duration_s;
+  sim::Input input;
+  sim::BatchOptions options;
+  sim::Randomisation randomisation;
+};
+
+Job read_job(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  const io::Table root = io::Config::load(path, overrides).root();
+  root.integer("schema", 1, 1);
+  const model::Vehicle vehicle = model::read_vehicle(root.file("vehicle"));
+  Job job{vehicle,
+          root.choice("precision", {"float", "double"}),
+          static_cast<std::size_t>(root.integer("count", 1, 1'000'000)),
+          static_cast<std::uint64_t>(root.integer("seed", 0, INT64_MAX)),
+          root.number("duration_s", io::positive(1000)),
+          {root.number("input.amplitude_V"), root.number_or("input.difference_V", 0), root.number_or("input.bias_V", 0),
+           root.number_or("input.split_cycle", 0)},
+          {},
+          sim::Randomisation(vehicle, root)};
+  job.options.step_s = root.number("step_s", {1e-6, 1e-3});
+  job.options.threads = static_cast<int>(root.integer_or("threads", 0, 0, 1024));
+  job.options.world.gravity_m_s2 = root.number_or("world.gravity_m_s2", 9.81, {0, 100});
+  job.options.world.ground_z_m = root.number_or("world.ground_z_m", -1e3);
+  job.options.world.ceiling_z_m = root.number_or("world.ceiling_z_m", 1e3);
+  root.finish();
+  const double steps = vehicle.driver.hold_s / job.options.step_s;
+  if (std::abs(steps - std::round(steps)) > 1e-6)
+    root.fail("step_s", "does not divide the driver's hold of " + std::to_string(vehicle.driver.hold_s) + " s", "hold_s / n");
+  return job;
+}
+
+template <class T>
+nlohmann::ordered_json fly(const Job& job) {
+  sim::Batch<T> batch(job.count, job.vehicle, job.options);
+  for (std::size_t i = 0; i < job.count; ++i) {
+    batch.set_vehicle(i, job.randomisation.sample({.seed = job.seed, .flapper = static_cast<std::uint32_t>(i)}));
+    batch.set_input(i, job.input);
+  }
+  constexpr int kPeriod = 20;  // plausibility and contact are looked at this often
+  const int steps = static_cast<int>(std::lround(job.duration_s / job.options.step_s));
+  const auto start = std::chrono::steady_clock::now();
+  for (int done = 0; done < steps; done += kPeriod) batch.step(std::min(kPeriod, steps - done));
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  std::vector<double> climb, drift;
+  for (std::size_t i = 0; i < job.count; ++i) {
+    const sim::FlapperState s = batch.state(i);
+    climb.push_back(s.position_m[2]);
+    drift.push_back(std::hypot(s.position_m[0], s.position_m[1]));
+  }
+  const auto quantile = [](std::vector<double> v, double q) {
+    std::ranges::sort(v);
+    return v[static_cast<std::size_t>(q * static_cast<double>(v.size() - 1))];
+  };
+  const double flown = static_cast<double>(job.count) * steps;
+  char hash[17];
+  std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(batch.hash()));
+
+  std::printf("%zu %s flappers, %g s each in steps of %g us, %s\n", job.count, job.precision.c_str(), job.duration_s,
+              job.options.step_s * 1e6, sim::best_instruction_set().c_str());
+  std::printf("  %.1f million steps/s, %.0f times real time\n", flown / wall_s / 1e6, flown * job.options.step_s / wall_s);
+  std::printf("  climb  10 / 50 / 90 %%  %+.3f %+.3f %+.3f m\n", quantile(climb, 0.1), quantile(climb, 0.5), quantile(climb, 0.9));
+  std::printf("  drift  10 / 50 / 90 %%   %.3f  %.3f  %.3f m\n", quantile(drift, 0.1), quantile(drift, 0.5), quantile(drift, 0.9));
+  std::printf("  frozen %zu, touched the ground %zu, the ceiling %zu, a wall %zu\n", batch.count_status(sim::kFrozen),
+              batch.count_status(sim::kTouchedGround), batch.count_status(sim::kTouchedCeiling), batch.count_status(sim::kTouchedWall));
+  std::printf("  state hash %s\n", hash);
+  return {{"flappers", job.count},
+          {"steps", steps},
+          {"wall_s", wall_s},
+          {"steps_per_s", flown / wall_s},
+          {"climb_median_m", quantile(climb, 0.5)},
+          {"drift_median_m", quantile(drift, 0.5)},
+          {"frozen", batch.count_status(sim::kFrozen)},
+          {"hash", hash}};
+}
+
+}  // namespace
+
+nlohmann::ordered_json fly_batch(const std::filesystem::path& config, const std::vector<std::string>& overrides) {
+  const Job job = read_job(config, overrides);
+  return job.precision == "float" ? fly<float>(job) : fly<double>(job);
+}
+
+}  // namespace flappy::bench

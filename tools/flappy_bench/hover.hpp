@@ -1,0 +1,14 @@
+// A batch of flappers at one input for a while: the main job until there is training.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+namespace flappy::bench {
+
+/// Flies the batch that `config` describes, prints a summary, and returns it.
+nlohmann::ordered_json fly_batch(const std::filesystem::path& config, const std::vector<std::string>& overrides);
+
+}  // namespace flappy::bench

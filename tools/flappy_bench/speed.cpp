@@ -1,0 +1,157 @@
+#include "speed.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <numbers>
+
+#include "flappy/batch.hpp"
+#include "sim/randomise.hpp"
+#ifdef FLAPPY_HAVE_PEERS
+#include "dart_peer.hpp"
+#include "mujoco_peer.hpp"
+#endif
+
+namespace flappy::bench {
+namespace {
+
+constexpr double kStep_s = 1e-4;
+constexpr int kPeriod = 20;  // physics steps in a control period of 2 ms
+constexpr std::size_t kDistinctVehicles = 1024;
+
+double processor_seconds() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+double wall_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// Flappers of different vehicles and inputs, in free flight.
+template <class T>
+class Flock {
+ public:
+  Flock(const std::vector<model::Vehicle>& vehicles, std::size_t count, int threads, const std::string& instruction_set = "")
+      : batch_(count, vehicles[0], {kStep_s, threads, {}, instruction_set}) {
+    for (std::size_t i = 0; i < count; ++i) batch_.set_vehicle(i, vehicles[i % vehicles.size()]);
+  }
+
+  /// Steps for about `seconds` from a fresh start; seconds per flapper and step on the given clock.
+  double run(double seconds, double (*clock)(), int least_periods = 2) {
+    for (std::size_t i = 0; i < batch_.size(); ++i) {
+      batch_.reset(i, {});
+      batch_.set_input(i, {9 + 0.002 * static_cast<double>(i % 1000), 0, 0, 0});
+    }
+    batch_.step(kPeriod);
+    int periods = 0;
+    const double start = clock();
+    double end = start;
+    while (end - start < seconds || periods < least_periods) {
+      batch_.step(kPeriod);
+      ++periods;
+      end = clock();
+    }
+    return (end - start) / (static_cast<double>(periods) * kPeriod * static_cast<double>(batch_.size()));
+  }
+  std::size_t frozen() const { return batch_.count_status(sim::kFrozen); }
+
+ private:
+  sim::Batch<T> batch_;
+};
+
+#ifdef FLAPPY_HAVE_PEERS
+/// Steps per second of one peer in free flight at 10 V, voltage held for 1 ms.
+template <class Peer>
+double peer_steps_per_s(Peer& peer, double flapping_Hz, double seconds) {
+  int steps = 0;
+  const double start = processor_seconds();
+  double end = start;
+  while (end - start < seconds) {
+    const double volts = 10 * std::cos(2 * std::numbers::pi * flapping_Hz * peer.time_s());
+    for (int i = 0; i < 10; ++i) peer.step(volts, volts);
+    steps += 10;
+    end = processor_seconds();
+  }
+  return steps / (end - start);
+}
+#endif
+
+}  // namespace
+
+Figure summary(std::vector<double> values) {
+  std::ranges::sort(values);
+  const std::size_t n = values.size();
+  const double middle = n % 2 == 1 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
+  return {middle, values.front(), values.back()};
+}
+
+std::optional<double> SpeedReport::median(const std::string& name) const {
+  for (const Row& row : rows)
+    if (row.name == name) return row.steps_per_s.median;
+  return std::nullopt;
+}
+
+SpeedReport measure_speed(const model::Vehicle& vehicle, const SpeedOptions& options,
+                          const std::function<void(int, int)>& progress) {
+  std::vector<model::Vehicle> vehicles;
+  for (std::uint32_t i = 0; i < kDistinctVehicles; ++i) {
+    vehicles.push_back(vehicle);
+    vehicles.back().torso.mass_kg *= 0.9 + 0.0002 * i;
+  }
+  struct Candidate {
+    std::string name;
+    std::function<double()> steps_per_s;
+    std::vector<double> values;
+  };
+  std::vector<Candidate> candidates;
+  std::vector<std::shared_ptr<Flock<float>>> single;
+  std::vector<std::shared_ptr<Flock<double>>> twice;
+  const std::vector<std::string> sets = sim::instruction_sets();
+  for (auto set = sets.rbegin(); set != sets.rend(); ++set) {
+    const std::string suffix = set == sets.rbegin() ? "" : ", " + *set;
+    single.push_back(std::make_shared<Flock<float>>(vehicles, 4096, 1, *set));
+    twice.push_back(std::make_shared<Flock<double>>(vehicles, 4096, 1, *set));
+    candidates.push_back({"float" + suffix, [f = single.back(), &options] { return 1 / f->run(options.seconds, processor_seconds); }, {}});
+    candidates.push_back({"double" + suffix, [f = twice.back(), &options] { return 1 / f->run(options.seconds, processor_seconds); }, {}});
+  }
+#ifdef FLAPPY_HAVE_PEERS
+  if (options.peers) {
+    const double hz = vehicle.driver.flapping_Hz;
+    candidates.push_back({"MuJoCo", [&vehicle, &options, hz] {
+                            oracle::MujocoPeer peer(vehicle, {.step_s = kStep_s});
+                            return peer_steps_per_s(peer, hz, options.seconds);
+                          }, {}});
+    candidates.push_back({"DART", [&vehicle, &options, hz] {
+                            oracle::DartPeer peer(vehicle, {.step_s = kStep_s});
+                            return peer_steps_per_s(peer, hz, options.seconds);
+                          }, {}});
+  }
+#endif
+  Flock<float> one(vehicles, 4096, 1), two(vehicles, 4096, 2);
+  std::vector<double> scaling;
+  const std::vector<std::size_t> sizes = {1000, 10000, 100000};
+  std::vector<std::unique_ptr<Flock<float>>> flocks;
+  for (const std::size_t n : sizes) flocks.push_back(std::make_unique<Flock<float>>(vehicles, n, 1));
+  std::vector<std::vector<double>> size_values(sizes.size());
+
+  for (int round = 0; round < options.rounds; ++round) {
+    for (Candidate& c : candidates) c.values.push_back(c.steps_per_s());
+    scaling.push_back(one.run(options.seconds, wall_seconds) / two.run(options.seconds, wall_seconds));
+    for (std::size_t i = 0; i < sizes.size(); ++i)
+      size_values[i].push_back(1e9 * flocks[i]->run(options.seconds, processor_seconds));
+    progress(round + 1, options.rounds);
+  }
+
+  SpeedReport report;
+  for (Candidate& c : candidates) report.rows.push_back({c.name, summary(std::move(c.values))});
+  report.two_thread_scaling = summary(std::move(scaling));
+  for (std::size_t i = 0; i < sizes.size(); ++i) report.sizes.push_back({sizes[i], summary(std::move(size_values[i]))});
+  for (const auto& f : single) report.frozen += f->frozen();
+  for (const auto& f : flocks) report.frozen += f->frozen();
+  return report;
+}
+
+}  // namespace flappy::bench
