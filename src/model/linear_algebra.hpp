@@ -71,17 +71,18 @@ struct Sym3 {
   }
 };
 
+/// An inverse as adjugate / determinant, not yet multiplied out: what follows need not wait for the division.
+template <class M, class T>
+struct Inverse {
+  M adjugate;
+  T scale;
+};
+
 template <class T>
-FLAPPY_INLINE Sym3<T> inverse(const Sym3<T>& m) {
-  const T xx = m.yy * m.zz - m.yz * m.yz, xy = m.xz * m.yz - m.xy * m.zz, xz = m.xy * m.yz - m.xz * m.yy;
-  const T determinant = m.xx * xx + (m.xy * xy + m.xz * xz);
-  const T scale = T(1) / determinant;
-  return {scale * xx,
-          scale * T(m.xx * m.zz - m.xz * m.xz),
-          scale * T(m.xx * m.yy - m.xy * m.xy),
-          scale * xy,
-          scale * T(m.xy * m.xz - m.xx * m.yz),
-          scale * xz};
+FLAPPY_INLINE Inverse<Sym3<T>, T> inverse(const Sym3<T>& m) {
+  const Sym3<T> a{m.yy * m.zz - m.yz * m.yz, m.xx * m.zz - m.xz * m.xz, m.xx * m.yy - m.xy * m.xy,
+                  m.xz * m.yz - m.xy * m.zz, m.xy * m.xz - m.xx * m.yz, m.xy * m.yz - m.xz * m.yy};
+  return {a, T(1) / T(m.xx * a.xx + (m.xy * a.xy + m.xz * a.xz))};
 }
 
 /// Inertia tensor of a second-moment tensor (integral of r r^T): tr(P) 1 - P.

@@ -61,15 +61,15 @@ FLAPPY_INLINE Sym3<T> hung_at(const Vec3<T>& s, const Vec3<T>& h) {
   return {xx + xx, yy + yy, zz + zz, s.x * h.y + s.y * h.x, s.y * h.z + s.z * h.y, s.x * h.z + s.z * h.x};
 }
 
-/// Inertia about C in B.
+/// Second moment of the whole vehicle about C in B.
 template <class T>
 FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const HingedWing<T>& l, const HingedWing<T>& r,
                                               const Vec3<T>& com) {
-  const Sym3<T> o = p.fixed_second_kg_m2 + ((l.second + hung_at(p.left.shoulder_m, l.moment)) +
-                                            (r.second + hung_at(p.right.shoulder_m, r.moment)));
+  const Sym3<T> o = p.fixed_second_kg_m2 + (hung_at(p.left.shoulder_m, l.moment) + hung_at(p.right.shoulder_m, r.moment));
   const Vec3<T> m = p.fixed_moment_kg_m + (l.moment + r.moment);
-  return {o.xx - m.x * com.x, o.yy - m.y * com.y, o.zz - m.z * com.z,
-          o.xy - m.x * com.y, o.yz - m.y * com.z, o.xz - m.x * com.z};
+  const Sym3<T> placed{o.xx - m.x * com.x, o.yy - m.y * com.y, o.zz - m.z * com.z,
+                       o.xy - m.x * com.y, o.yz - m.y * com.z, o.xz - m.x * com.z};
+  return placed + (l.second + r.second);
 }
 
 /// Rate, stops and friction of one hinge, about beta or theta. Stops as the turns in one step that just reach them.
@@ -108,28 +108,27 @@ struct Sym2 {
   T ll, rr, lr;
 };
 template <class T>
-FLAPPY_INLINE Sym2<T> inverse(const Sym2<T>& m) {
-  const T scale = T(1) / T(m.ll * m.rr - m.lr * m.lr);
-  return {scale * m.rr, scale * m.ll, -(scale * m.lr)};
+FLAPPY_INLINE Inverse<Sym2<T>, T> inverse(const Sym2<T>& m) {
+  return {{m.rr, m.ll, -m.lr}, T(1) / T(m.ll * m.rr - m.lr * m.lr)};
 }
 
 /// What the body opposes to forces and moments about C. A body that is held opposes everything.
 template <class T>
 struct BodyInertia {
   T inverse_mass;
-  Sym3<T> second_moment, inverse;  // of the whole vehicle about C, wings frozen
+  Sym3<T> second_moment;  // of the whole vehicle about C, wings frozen
+  Inverse<Sym3<T>, T> inverse;  // of its inertia
 };
 
 template <class T>
 FLAPPY_INLINE BodyInertia<T> body_inertia(const Parameters<T>& p, const State<T>& x, const HingedWing<T>& l,
                                           const HingedWing<T>& r, const WholeVehicle<T>& v) {
-  BodyInertia<T> b{p.inverse_mass_1_kg, second_moment_about_com(p, l, r, v.com), {}};
-  b.inverse = inverse(inertia_of(b.second_moment));
+  const Sym3<T> second = second_moment_about_com(p, l, r, v.com);
+  BodyInertia<T> b{p.inverse_mass_1_kg, second, inverse(inertia_of(second))};
   const auto held = x.support > T(0);
   if (any(held)) {
-    const auto drop = [&](T& t) { t = where(held, T(0), t); };
-    drop(b.inverse_mass);
-    drop(b.inverse.xx), drop(b.inverse.yy), drop(b.inverse.zz), drop(b.inverse.xy), drop(b.inverse.yz), drop(b.inverse.xz);
+    b.inverse_mass = where(held, T(0), b.inverse_mass);
+    b.inverse.scale = where(held, T(0), b.inverse.scale);
   }
   return b;
 }
@@ -188,58 +187,63 @@ FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const Hinged
   h.stroke_r = r.stroke_spin + cross(v.arm_right, r.stroke_column);
   h.rotation_l = l.rotation_spin + cross(v.arm_left, l.rotation_column);
   h.rotation_r = r.rotation_spin + cross(v.arm_right, r.rotation_column);
-  const Vec3<T> xsl = body.inverse * h.stroke_l, xsr = body.inverse * h.stroke_r;
-  const Vec3<T> xrl = body.inverse * h.rotation_l, xrr = body.inverse * h.rotation_r;
+  // columns of adj(I) G; the division by the determinant of I comes last
+  const Sym3<T>& adjugate = body.inverse.adjugate;
+  const T& scale = body.inverse.scale;
+  const Vec3<T> xsl = adjugate * h.stroke_l, xsr = adjugate * h.stroke_r;
+  const Vec3<T> xrl = adjugate * h.rotation_l, xrr = adjugate * h.rotation_r;
 
-  const auto taken = [&](const auto& e, const auto& f, const Vec3<T>& g, const Vec3<T>& y) {
-    return T(body.inverse_mass * dot(e, f) + dot(g, y));
-  };
   const auto& esl = l.stroke_column;
   const auto& esr = r.stroke_column;
   const auto& erl = l.rotation_column;
   const auto& err = r.rotation_column;
-  const auto stroke = [](const HingedWing<T>& g, const SideParameters<T>& s) {
-    return T(g.stroke_inertia + (s.rotor_kg_m2 + s.stroke_stiffening_kg_m2));
+  const auto left = [&](const T& own, const auto& e, const auto& f, const Vec3<T>& g, const Vec3<T>& x) {
+    return T((own - body.inverse_mass * dot(e, f)) - scale * dot(g, x));
   };
+  const SideParameters<T>&pl = p.left, &pr = p.right;
+  h.strokes = {left(l.stroke_inertia + (pl.rotor_kg_m2 + pl.stroke_stiffening_kg_m2), esl, esl, h.stroke_l, xsl),
+               left(r.stroke_inertia + (pr.rotor_kg_m2 + pr.stroke_stiffening_kg_m2), esr, esr, h.stroke_r, xsr),
+               left(T(0), esl, esr, h.stroke_l, xsr)};
   const auto rotation = [](const HingedWing<T>& g, const SideParameters<T>& s) {
     return T(g.rotation_inertia + (s.rotation_stiffening_kg_m2 + s.rotation_stiffening_kg_m2_s * abs(g.theta_rate)));
   };
-  h.strokes = {stroke(l, p.left) - taken(esl, esl, h.stroke_l, xsl),
-               stroke(r, p.right) - taken(esr, esr, h.stroke_r, xsr),
-               -taken(esl, esr, h.stroke_l, xsr)};
-  h.rotations = {rotation(l, p.left) - taken(erl, erl, h.rotation_l, xrl),
-                 rotation(r, p.right) - taken(err, err, h.rotation_r, xrr),
-                 -taken(erl, err, h.rotation_l, xrr)};
-  h.ll = l.cross_inertia - taken(esl, erl, h.stroke_l, xrl);
-  h.rr = r.cross_inertia - taken(esr, err, h.stroke_r, xrr);
-  h.lr = -taken(esl, err, h.stroke_l, xrr);
-  h.rl = -taken(esr, erl, h.stroke_r, xrl);
+  h.rotations = {left(rotation(l, pl), erl, erl, h.rotation_l, xrl), left(rotation(r, pr), err, err, h.rotation_r, xrr),
+                 left(T(0), erl, err, h.rotation_l, xrr)};
+  h.ll = left(l.cross_inertia, esl, erl, h.stroke_l, xrl);
+  h.rr = left(r.cross_inertia, esr, err, h.stroke_r, xrr);
+  h.lr = left(T(0), esl, err, h.stroke_l, xrr);
+  h.rl = left(T(0), esr, erl, h.stroke_r, xrl);
 
-  const Vec3<T>& t = drive.moment;
-  h.s_l = (load_l.stroke_torque_Nm - l.stroke_bias) - (dot(esl, drive.shoulder_left) + dot(xsl, t));
-  h.s_r = (load_r.stroke_torque_Nm - r.stroke_bias) - (dot(esr, drive.shoulder_right) + dot(xsr, t));
-  h.r_l = (load_l.rotation_torque_Nm - l.rotation_bias) - (dot(erl, drive.shoulder_left) + dot(xrl, t));
-  h.r_r = (load_r.rotation_torque_Nm - r.rotation_bias) - (dot(err, drive.shoulder_right) + dot(xrr, t));
+  const auto driven = [&](const T& torque, const auto& e, const Vec3<T>& shoulder, const Vec3<T>& x) {
+    return T((torque - dot(e, shoulder)) - scale * dot(x, drive.moment));
+  };
+  h.s_l = driven(load_l.stroke_torque_Nm - l.stroke_bias, esl, drive.shoulder_left, xsl);
+  h.s_r = driven(load_r.stroke_torque_Nm - r.stroke_bias, esr, drive.shoulder_right, xsr);
+  h.r_l = driven(load_l.rotation_torque_Nm - l.rotation_bias, erl, drive.shoulder_left, xrl);
+  h.r_r = driven(load_r.rotation_torque_Nm - r.rotation_bias, err, drive.shoulder_right, xrr);
   return h;
 }
 
-/// The rotations' 2x2 after the strokes are eliminated: beta'' = given + K s - Z theta'', with Z = K C. A stroke that its
-/// stop prescribes has no row in K.
+/// What remains of the rotations after the strokes are eliminated by beta'' = given + K (s - C theta''). K is the inverse
+/// of the strokes' block; a stroke that its stop prescribes has no row in it.
 template <class T>
-struct RotationInertia {
-  T z_ll, z_rr, z_lr, z_rl;
-  Sym2<T> A, inverse_A;
+struct RotationSystem {
+  T z_ll, z_rr, z_lr, z_rl;          // adj(K) C
+  Sym2<T> A;
+  Inverse<Sym2<T>, T> inverse;       // of A
   T left_per_right, right_per_left;  // turn that a stop's turn of the other side gives this one: A_lr / A_own
 };
 
 template <class T>
-FLAPPY_INLINE RotationInertia<T> eliminate_strokes(const HingeSystem<T>& h, const Sym2<T>& K) {
-  RotationInertia<T> e;
-  e.z_ll = K.ll * h.ll + K.lr * h.rl, e.z_lr = K.ll * h.lr + K.lr * h.rr;
-  e.z_rl = K.lr * h.ll + K.rr * h.rl, e.z_rr = K.lr * h.lr + K.rr * h.rr;
-  e.A = {h.rotations.ll - (h.ll * e.z_ll + h.rl * e.z_rl), h.rotations.rr - (h.lr * e.z_lr + h.rr * e.z_rr),
-         h.rotations.lr - (h.ll * e.z_lr + h.rl * e.z_rr)};
-  e.inverse_A = inverse(e.A);
+FLAPPY_INLINE RotationSystem<T> eliminate_strokes(const HingeSystem<T>& h, const Inverse<Sym2<T>, T>& K) {
+  RotationSystem<T> e;
+  const Sym2<T>& k = K.adjugate;
+  e.z_ll = k.ll * h.ll + k.lr * h.rl, e.z_lr = k.ll * h.lr + k.lr * h.rr;
+  e.z_rl = k.lr * h.ll + k.rr * h.rl, e.z_rr = k.lr * h.lr + k.rr * h.rr;
+  e.A = {h.rotations.ll - K.scale * T(h.ll * e.z_ll + h.rl * e.z_rl),
+         h.rotations.rr - K.scale * T(h.lr * e.z_lr + h.rr * e.z_rr),
+         h.rotations.lr - K.scale * T(h.ll * e.z_lr + h.rl * e.z_rr)};
+  e.inverse = inverse(e.A);
   const T ratio = e.A.lr / T(e.A.ll * e.A.rr);
   e.left_per_right = ratio * e.A.rr;
   e.right_per_left = ratio * e.A.ll;
@@ -264,26 +268,28 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
   T a_sl, a_sr, a_rl, a_rr;  // beta'', theta''
   Motion<T> m;
   const T step2 = step * step, per_step2 = per_step * per_step;
-  const auto accelerate = [&](const Sym2<T>& K, const T& given_l, const T& given_r) __attribute__((always_inline)) {
-    const RotationInertia<T> e = eliminate_strokes(h, K);
-    const T y_l = given_l + (K.ll * s_l + K.lr * s_r), y_r = given_r + (K.lr * s_l + K.rr * s_r);
+  const auto accelerate = [&](const Inverse<Sym2<T>, T>& K, const T& given_l, const T& given_r)
+                              __attribute__((always_inline)) {
+    const RotationSystem<T> e = eliminate_strokes(h, K);
+    const Sym2<T>&k = K.adjugate, &a = e.inverse.adjugate;
+    const T y_l = given_l + K.scale * T(k.ll * s_l + k.lr * s_r), y_r = given_r + K.scale * T(k.lr * s_l + k.rr * s_r);
     T b_l = h.r_l - (h.ll * y_l + h.rl * y_r), b_r = h.r_r - (h.lr * y_l + h.rr * y_r);
     b_l += dry_friction(e.A.ll, rotation_l, b_l, per_step);
     b_r += dry_friction(e.A.rr, rotation_r, b_r, per_step);
-    const T coast_l = step * rotation_l.rate, coast_r = step * rotation_r.rate;
-    const T free_l = coast_l + step2 * T(e.inverse_A.ll * b_l + e.inverse_A.lr * b_r);
-    const T free_r = coast_r + step2 * T(e.inverse_A.lr * b_l + e.inverse_A.rr * b_r);
+    const T coast_l = step * rotation_l.rate, coast_r = step * rotation_r.rate, scale = step2 * e.inverse.scale;
+    const T free_l = coast_l + scale * T(a.ll * b_l + a.lr * b_r);
+    const T free_r = coast_r + scale * T(a.lr * b_l + a.rr * b_r);
     const T taken_l = free_l - stopped(rotation_l, free_l), taken_r = free_r - stopped(rotation_r, free_r);
     m.rotation_left = stopped(rotation_l, T(free_l + e.left_per_right * taken_r));
     m.rotation_right = stopped(rotation_r, T(free_r + e.right_per_left * taken_l));
     a_rl = T(m.rotation_left - coast_l) * per_step2;
     a_rr = T(m.rotation_right - coast_r) * per_step2;
-    a_sl = y_l - (e.z_ll * a_rl + e.z_lr * a_rr);
-    a_sr = y_r - (e.z_rl * a_rl + e.z_rr * a_rr);
+    a_sl = y_l - K.scale * T(e.z_ll * a_rl + e.z_lr * a_rr);
+    a_sr = y_r - K.scale * T(e.z_rl * a_rl + e.z_rr * a_rr);
     m.stroke_left = step * stroke_l.rate + step2 * a_sl;
     m.stroke_right = step * stroke_r.rate + step2 * a_sr;
   };
-  const Sym2<T> free = inverse(h.strokes);
+  const Inverse<Sym2<T>, T> free = inverse(h.strokes);
   accelerate(free, T(0), T(0));
   const auto out_l = (m.stroke_left < stroke_l.lowest_turn) | (m.stroke_left > stroke_l.highest_turn);
   const auto out_r = (m.stroke_right < stroke_r.lowest_turn) | (m.stroke_right > stroke_r.highest_turn);
@@ -292,8 +298,12 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
     const Sym2<T>& S = h.strokes;
     const T stop_l = T(stopped(stroke_l, m.stroke_left) - step * stroke_l.rate) * per_step2;
     const T stop_r = T(stopped(stroke_r, m.stroke_right) - step * stroke_r.rate) * per_step2;
-    const Sym2<T> K{where(out_l, zero, where(out_r, T(T(1) / S.ll), free.ll)),
-                    where(out_r, zero, where(out_l, T(T(1) / S.rr), free.rr)), where(out_l | out_r, zero, free.lr)};
+    const auto row = [&](const auto& out, const auto& other_out, const T& own, const T& pair) {
+      return where(out, zero, where(other_out, T(T(1) / own), pair));
+    };
+    const Inverse<Sym2<T>, T> K{{row(out_l, out_r, S.ll, free.adjugate.ll), row(out_r, out_l, S.rr, free.adjugate.rr),
+                                 where(out_l | out_r, zero, free.adjugate.lr)},
+                                where(out_l | out_r, T(1), free.scale)};
     accelerate(K, where(out_l, stop_l, where(out_r, T(-(T(S.lr / S.ll) * stop_r)), zero)),
                where(out_r, stop_r, where(out_l, T(-(T(S.lr / S.rr) * stop_l)), zero)));
     m.stroke_left = stopped(stroke_l, m.stroke_left);
@@ -302,7 +312,7 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
 
   const Vec3<T> hinges =
       add_scaled(add_scaled(add_scaled(a_sl * h.stroke_l, a_sr, h.stroke_r), a_rl, h.rotation_l), a_rr, h.rotation_r);
-  m.body_acceleration = body.inverse * (drive.moment - hinges);
+  m.body_acceleration = body.inverse.scale * (body.inverse.adjugate * (drive.moment - hinges));
   return m;
 }
 
