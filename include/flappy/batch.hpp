@@ -1,5 +1,5 @@
-// Many flappers at once. A flapper's bytes depend on its vehicle, its start, its inputs and the world: not on the
-// number of threads, the size of the batch, its place in it, or the instruction set of the processor.
+// Many flappers at once. A flapper's bytes depend on its vehicle, its start, its inputs and the world: not on
+// the number of threads, the size of the batch, its place in it, or the instruction set of the processor.
 #pragma once
 
 #include <cstdint>
@@ -24,22 +24,23 @@ enum class Start { flying, standing, welded };
 
 /// One flapper as its user sees it. SI units; quaternion w, x, y, z, body to world; left is index 0.
 struct FlapperState {
-  double position_m[3] = {0, 0, 0};          ///< torso origin, in W
+  double position_m[3] = {0, 0, 0};  ///< torso origin, in W
   double attitude[4] = {1, 0, 0, 0};
-  double velocity_m_s[3] = {0, 0, 0};        ///< of the torso origin, in W
-  double body_rate_rad_s[3] = {0, 0, 0};     ///< in B
+  double velocity_m_s[3] = {0, 0, 0};     ///< of the torso origin, in W
+  double body_rate_rad_s[3] = {0, 0, 0};  ///< in B
   double stroke_rad[2] = {0, 0}, rotation_rad[2] = {0, 0};
   double stroke_rate_rad_s[2] = {0, 0}, rotation_rate_rad_s[2] = {0, 0};
 };
 
-/// What the air did to the wings of a standing or welded flapper since its reset, in B about the torso origin.
+/// What the air did to the wings of a standing or welded flapper since its reset, in B about the torso
+/// origin.
 struct HeldImpulse {
   double force_N_s[3], moment_Nm_s[3];
 };
 
 struct BatchOptions {
   double step_s = 1e-4;
-  int threads = 0;              ///< 0: one for each processor
+  int threads = 0;  ///< 0: one for each processor
   World world;
   std::string instruction_set;  ///< "scalar", "x86-64-v2", "-v3", "-v4"; empty: the best this processor has
 };
@@ -53,7 +54,8 @@ template <class T>
 class Batch {
  public:
   /// `count` copies of `vehicle`, flying at the origin with wings at rest and no voltage.
-  /// Throws std::invalid_argument where an option makes no sense or the driver's hold is no whole number of steps.
+  /// Throws std::invalid_argument where an option makes no sense or the driver's hold is no whole number of
+  /// steps.
   Batch(std::size_t count, const model::Vehicle& vehicle, BatchOptions options = {});
   ~Batch();
   Batch(Batch&&) noexcept;
@@ -67,7 +69,8 @@ class Batch {
   void reset(std::size_t i, const FlapperState& state, Start start = Start::flying);
   void set_input(std::size_t i, const Input& input);
 
-  /// Advances every flapper by `steps` physics steps. Plausibility and contact are looked at once, at the end.
+  /// Advances every flapper by `steps` physics steps. Plausibility and contact are looked at once, at the
+  /// end.
   void step(int steps);
 
   FlapperState state(std::size_t i) const;

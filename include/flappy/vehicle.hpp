@@ -14,7 +14,8 @@ struct Triple {
   double x = 0, y = 0, z = 0;
 };
 
-/// Inertia tensor elements as in a URDF: off-diagonal elements are those of the matrix (I_xy = -integral of xy).
+/// Inertia tensor elements as in a URDF: off-diagonal elements are those of the matrix (I_xy = -integral of
+/// xy).
 struct InertiaTensor {
   double xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, xz = 0;
 };

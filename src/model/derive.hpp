@@ -1,8 +1,8 @@
 // From a vehicle's published figures to the constants of the step.
 #pragma once
 
-#include "model/flapper.hpp"
 #include "flappy/vehicle.hpp"
+#include "model/flapper.hpp"
 
 namespace flappy::model {
 

@@ -1,11 +1,12 @@
-// One wing and its leading edge, hinged at a shoulder: their inertia seen from the vehicle, and the inertial forces
-// of their motion relative to it.
+// One wing and its leading edge, hinged at a shoulder: their inertia seen from the vehicle, and the inertial
+// forces of their motion relative to it.
 //
-// All in the leading edge's frame L (B turned by beta about z), about the shoulder. h: first moment of mass, P: second
-// moment (integral of r r^T; inertia J = tr P - P); index w: wing, turned by theta about y; none: wing and edge.
-// With body rate w = (a, b, c), relative rates W_edge = (0, 0, B), W_wing = (0, T, B), B = beta', T = theta':
-//   relative acceleration of a point: 2 w x (W x r) + W x (W x r) + W' x r,  W'_wing = (-B T, 0, 0) at zero beta'', theta''
-//   integral r x (2 w x (W x r)) = 2 (P w) x W      integral r x (W x (W x r)) = (P W) x W
+// All in the leading edge's frame L (B turned by beta about z), about the shoulder. h: first moment of mass,
+// P: second moment (integral of r r^T; inertia J = tr P - P); index w: wing, turned by theta about y; none:
+// wing and edge. With body rate w = (a, b, c), relative rates W_edge = (0, 0, B), W_wing = (0, T, B), B =
+// beta', T = theta':
+//   relative acceleration of a point: 2 w x (W x r) + W x (W x r) + W' x r,  W'_wing = (-B T, 0, 0) at zero
+//   beta'', theta'' integral r x (2 w x (W x r)) = 2 (P w) x W      integral r x (W x (W x r)) = (P W) x W
 // Both are exact; summed over the two bodies they give `relative_force` and `relative_moment`.
 #pragma once
 
@@ -21,12 +22,11 @@ struct HingedWing {
   T beta_rate, theta_rate;
   Vec3<T> body_rate_L;
   // relative to B, in B
-  Vec3<T> moment;                          // h
-  Sym3<T> second;                          // P
-  Vec3<T> momentum;                        // of the relative motion
-  Planar<T> stroke_column;                 // d momentum / d beta'
-  Vec3<T> rotation_column;                 // d momentum / d theta'
-  Vec3<T> stroke_spin, rotation_spin;      // d angular momentum about the shoulder / d beta', d theta'
+  Vec3<T> moment;                      // h
+  Sym3<T> second;                      // P
+  Vec3<T> momentum;                    // of the relative motion
+  Vec3<T> rotation_column;             // d momentum / d theta'; that of beta' is (-h_y, h_x, 0)
+  Vec3<T> stroke_spin, rotation_spin;  // d angular momentum about the shoulder / d beta', d theta'
   T stroke_inertia, rotation_inertia, cross_inertia;
   // bias: what inertia asks of the hinges at zero acceleration
   Vec3<T> relative_force_L, relative_moment_L;  // Coriolis and centripetal, without the frozen part
@@ -38,20 +38,19 @@ template <int side, class T>
 FLAPPY_INLINE Vec3<T> moment_about_shoulder(const SideParameters<T>& p, const SideState<T>& q) {
   const SinCos<T> beta = sin_cos(T(T(side) * q.stroke_rad)), theta = sin_cos(q.rotation_rad);
   const Vec3<T>& h = p.wing_moment_kg_m;
-  const Vec3<T> turned{theta.cos * h.x + theta.sin * h.z, h.y, theta.cos * h.z - theta.sin * h.x};
-  return turn_z(beta.sin, beta.cos, p.edge_moment_kg_m + turned);
+  return turn_z(beta.sin, beta.cos, p.edge_moment_kg_m + turn_y(theta.sin, theta.cos, h));
 }
 
 template <int side, class T>
-FLAPPY_INLINE HingedWing<T> place_wing(const SideParameters<T>& p, const SideState<T>& q, const Vec3<T>& body_rate) {
+FLAPPY_INLINE HingedWing<T> place_wing(const SideParameters<T>& p, const SideState<T>& q,
+                                       const Vec3<T>& body_rate) {
   HingedWing<T> g;
   g.beta = sin_cos(T(T(side) * q.stroke_rad));
   g.theta = sin_cos(q.rotation_rad);
   const T B = g.beta_rate = T(side) * q.stroke_rate_rad_s;
   const T W = g.theta_rate = q.rotation_rate_rad_s;
 
-  const Vec3<T>& h0 = p.wing_moment_kg_m;
-  const Vec3<T> hw{g.theta.cos * h0.x + g.theta.sin * h0.z, h0.y, g.theta.cos * h0.z - g.theta.sin * h0.x};
+  const Vec3<T> hw = turn_y(g.theta.sin, g.theta.cos, p.wing_moment_kg_m);
   const Sym3<T> pw = turn_y(g.theta.sin, g.theta.cos, p.wing_second_kg_m2);
   const Vec3<T> h = p.edge_moment_kg_m + hw;
   const Sym3<T> P = p.edge_second_kg_m2 + pw;
@@ -59,15 +58,12 @@ FLAPPY_INLINE HingedWing<T> place_wing(const SideParameters<T>& p, const SideSta
   const auto to_body = [&](const Vec3<T>& v) { return turn_z(g.beta.sin, g.beta.cos, v); };
   g.moment = to_body(h);
   g.second = turn_z(g.beta.sin, g.beta.cos, P);
-  g.stroke_column = {-g.moment.y, g.moment.x};
   g.rotation_column = turn_z(g.beta.sin, g.beta.cos, hw.z, T(-hw.x));
-  g.stroke_spin = to_body({-P.xz, -P.yz, P.xx + P.yy});
-  g.rotation_spin = to_body({-pw.xy, pw.xx + pw.zz, -pw.yz});
   g.stroke_inertia = P.xx + P.yy;
+  g.stroke_spin = {-g.second.xz, -g.second.yz, g.stroke_inertia};
+  g.rotation_spin = to_body({-pw.xy, pw.xx + pw.zz, -pw.yz});
   g.rotation_inertia = pw.xx + pw.zz;
   g.cross_inertia = -pw.yz;
-  g.momentum = {B * g.stroke_column.x + W * g.rotation_column.x, B * g.stroke_column.y + W * g.rotation_column.y,
-                W * g.rotation_column.z};
 
   const Vec3<T> w = g.body_rate_L = turn_back_z(g.beta.sin, g.beta.cos, body_rate);
   const T Pw_x = P.xx * w.x + (P.xy * w.y + P.xz * w.z), Pw_y = P.xy * w.x + (P.yy * w.y + P.yz * w.z);
@@ -76,10 +72,12 @@ FLAPPY_INLINE HingedWing<T> place_wing(const SideParameters<T>& p, const SideSta
   const T k_x = (pw_x + pw_x) + (B * pw.xz + W * pw.xy), k_z = (pw_z + pw_z) + (B * pw.zz + W * pw.yz);
   const T BW = B * W, W2 = W * W;
   const T wing_y = BW * pw.xy - k_x * B;
-  g.relative_moment_L = {m_y * B - (k_z * W + BW * T(pw.yy + pw.zz)), BW * pw.xy - m_x * B, k_x * W + BW * pw.xz};
+  g.relative_moment_L = {m_y * B - (k_z * W + BW * T(pw.yy + pw.zz)), BW * pw.xy - m_x * B,
+                         k_x * W + BW * pw.xz};
 
   const Vec3<T> twice{w.x + w.x, w.y + w.y, w.z + w.z + B};
   const Vec3<T> momentum_L{W * hw.z - B * h.y, B * h.x, -(W * hw.x)};
+  g.momentum = to_body(momentum_L);
   g.relative_force_L = cross(twice, momentum_L) + Vec3<T>{-(W2 * hw.x), BW * hw.z, -(W2 * hw.z)};
 
   g.stroke_bias = g.relative_moment_L.z + T(Pw_x * w.y - Pw_y * w.x);

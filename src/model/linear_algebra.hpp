@@ -10,17 +10,19 @@ template <class T>
 struct Vec3 {
   T x, y, z;
 
-  friend FLAPPY_INLINE Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-  friend FLAPPY_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend FLAPPY_INLINE Vec3 operator+(const Vec3& a, const Vec3& b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+  }
+  friend FLAPPY_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+  }
   friend FLAPPY_INLINE Vec3 operator*(const T& s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
 };
 
-/// A vector in the xy plane: what is known to be zero is not computed.
+/// The vector (-h_y, h_x, 0): z x h. It is never formed; its products are written out.
 template <class T>
-struct Planar {
-  T x, y;
-
-  friend FLAPPY_INLINE Planar operator*(const T& s, const Planar& a) { return {s * a.x, s * a.y}; }
+struct AcrossZ {
+  const Vec3<T>& h;
 };
 
 template <class T>
@@ -28,12 +30,12 @@ FLAPPY_INLINE T dot(const Vec3<T>& a, const Vec3<T>& b) {
   return a.x * b.x + (a.y * b.y + a.z * b.z);
 }
 template <class T>
-FLAPPY_INLINE T dot(const Planar<T>& a, const Vec3<T>& b) {
-  return a.x * b.x + a.y * b.y;
+FLAPPY_INLINE T dot(const AcrossZ<T>& a, const Vec3<T>& b) {
+  return a.h.x * b.y - a.h.y * b.x;
 }
 template <class T>
-FLAPPY_INLINE T dot(const Planar<T>& a, const Planar<T>& b) {
-  return a.x * b.x + a.y * b.y;
+FLAPPY_INLINE T dot(const AcrossZ<T>& a, const AcrossZ<T>& b) {
+  return a.h.x * b.h.x + a.h.y * b.h.y;
 }
 
 template <class T>
@@ -41,9 +43,10 @@ FLAPPY_INLINE Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
+/// base + a x b.
 template <class T>
-FLAPPY_INLINE Vec3<T> cross(const Vec3<T>& a, const Planar<T>& b) {
-  return {-(a.z * b.y), a.z * b.x, a.x * b.y - a.y * b.x};
+FLAPPY_INLINE Vec3<T> plus_cross(const Vec3<T>& base, const Vec3<T>& a, const AcrossZ<T>& b) {
+  return {base.x - a.z * b.h.x, base.y - a.z * b.h.y, base.z + T(a.x * b.h.x + a.y * b.h.y)};
 }
 
 /// a + s b, fused.
@@ -107,6 +110,24 @@ FLAPPY_INLINE Vec3<T> turn_back_z(const T& s, const T& c, const Vec3<T>& v) {
   return {c * v.x + s * v.y, c * v.y - s * v.x, v.z};
 }
 
+/// The same about x and y.
+template <class T>
+FLAPPY_INLINE Vec3<T> turn_x(const T& s, const T& c, const Vec3<T>& v) {
+  return {v.x, c * v.y - s * v.z, s * v.y + c * v.z};
+}
+template <class T>
+FLAPPY_INLINE Vec3<T> turn_back_x(const T& s, const T& c, const Vec3<T>& v) {
+  return {v.x, c * v.y + s * v.z, c * v.z - s * v.y};
+}
+template <class T>
+FLAPPY_INLINE Vec3<T> turn_y(const T& s, const T& c, const Vec3<T>& v) {
+  return {c * v.x + s * v.z, v.y, c * v.z - s * v.x};
+}
+template <class T>
+FLAPPY_INLINE Vec3<T> turn_back_y(const T& s, const T& c, const Vec3<T>& v) {
+  return {c * v.x - s * v.z, v.y, s * v.x + c * v.z};
+}
+
 /// R P R^T for a turn about z: the xy block turns by the double angle.
 template <class T>
 FLAPPY_INLINE Sym3<T> turn_z(const T& s, const T& c, const Sym3<T>& p) {
@@ -158,13 +179,13 @@ FLAPPY_INLINE Matrix3<T> rotation_matrix(const Quaternion<T>& q) {
           {q.x * z2 - wy, q.y * z2 + wx, T(1) - (xx + yy)}};
 }
 
-/// Attitude after turning by the small rotation vector `turn_rad` given in body axes: q (1, turn/2), brought back
-/// to unit length by one Newton step, exact to (turn/2)^4 and free of drift.
+/// Attitude after turning by the small rotation vector 2 e given in body axes: q (1, e), brought back to unit
+/// length by one Newton step, exact to |e|^4 and free of drift.
 template <class T>
-FLAPPY_INLINE Quaternion<T> turned(const Quaternion<T>& q, const Vec3<T>& turn_rad) {
-  const Vec3<T> e = T(0.5) * turn_rad;
-  const Quaternion<T> r{q.w - (q.x * e.x + (q.y * e.y + q.z * e.z)), q.x + (q.w * e.x + (q.y * e.z - q.z * e.y)),
-                        q.y + (q.w * e.y + (q.z * e.x - q.x * e.z)), q.z + (q.w * e.z + (q.x * e.y - q.y * e.x))};
+FLAPPY_INLINE Quaternion<T> turned(const Quaternion<T>& q, const Vec3<T>& e) {
+  const Quaternion<T> r{
+      q.w - (q.x * e.x + (q.y * e.y + q.z * e.z)), q.x + (q.w * e.x + (q.y * e.z - q.z * e.y)),
+      q.y + (q.w * e.y + (q.z * e.x - q.x * e.z)), q.z + (q.w * e.z + (q.x * e.y - q.y * e.x))};
   const T norm2 = r.w * r.w + (r.x * r.x + (r.y * r.y + r.z * r.z));
   const T scale = T(1.5) - T(0.5) * norm2;
   return {scale * r.w, scale * r.x, scale * r.y, scale * r.z};

@@ -14,8 +14,10 @@ inline namespace FLAPPY_ISA {
 /// Horner's scheme, lowest coefficient first.
 template <class T, class... C>
 FLAPPY_INLINE T polynomial(T x, double c0, C... higher) {
-  if constexpr (sizeof...(C) == 0) return T(c0);
-  else return polynomial(x, higher...) * x + T(c0);
+  if constexpr (sizeof...(C) == 0)
+    return T(c0);
+  else
+    return polynomial(x, higher...) * x + T(c0);
 }
 
 /// Angles that sin_cos accepts: every joint of a vehicle stays within.
@@ -48,13 +50,14 @@ FLAPPY_INLINE SinCos<T> sin_cos(T x) {
   }
 }
 
-/// exp(-x) for x >= 0; 0 where it would be subnormal. Relative error of the polynomials: 4e-9 in float, 4e-18 in double.
+/// exp(-x) for x >= 0; 0 where it would be subnormal. Relative error of the polynomials: 4e-9 in float, 4e-18
+/// in double.
 template <class T>
 FLAPPY_INLINE T exp_negative(T x) {
   constexpr bool kSingle = sizeof(Element<T>) == 4;
   constexpr double kLargest = kSingle ? 87 : 708;
-  constexpr double kRound = kSingle ? 0x1.8p23 : 0x1.8p52;                              // adding it rounds to whole
-  constexpr double kLn2High = kSingle ? 0.693115234375 : 0.69314718036912381649;        // exact times any exponent
+  constexpr double kRound = kSingle ? 0x1.8p23 : 0x1.8p52;                        // adding it rounds to whole
+  constexpr double kLn2High = kSingle ? 0.693115234375 : 0.69314718036912381649;  // exact times any exponent
   constexpr double kLn2Low = kSingle ? 3.1946184945309417e-5 : 1.9082149292705878e-10;
   const T y = min(x, T(kLargest));
   const T k = T(y * T(std::numbers::log2e) + T(kRound)) - T(kRound);
@@ -65,8 +68,8 @@ FLAPPY_INLINE T exp_negative(T x) {
                    0.0013950475325785419);
   else
     e = polynomial(r, 0.50000000000000127, -0.16666666666666699, 0.041666666666515453, -0.0083333333333071757,
-                   0.0013888888947006546, -0.00019841269917470975, 0.000024801489952148856, -2.7557216203949453e-6,
-                   2.7631276775699542e-7, -2.5117896702802308e-8);
+                   0.0013888888947006546, -0.00019841269917470975, 0.000024801489952148856,
+                   -2.7557216203949453e-6, 2.7631276775699542e-7, -2.5117896702802308e-8);
   return where(x > T(kLargest), T(0), T(T(T(r * r) * e + (T(1) - r)) * half_to(k)));
 }
 
@@ -77,7 +80,8 @@ inline double log(double x) {
   double m = std::bit_cast<double>((bits & 0x000fffffffffffffULL) | 0x3ff0000000000000ULL);
   if (m > std::numbers::sqrt2) m *= 0.5, ++exponent;
   const double s = (m - 1) / (m + 1), u = s * s;  // log m = 2 atanh s, |s| < 0.172
-  const double series = polynomial(u, 1.0 / 3, 1.0 / 5, 1.0 / 7, 1.0 / 9, 1.0 / 11, 1.0 / 13, 1.0 / 15, 1.0 / 17, 1.0 / 19);
+  const double series =
+      polynomial(u, 1.0 / 3, 1.0 / 5, 1.0 / 7, 1.0 / 9, 1.0 / 11, 1.0 / 13, 1.0 / 15, 1.0 / 17, 1.0 / 19);
   return exponent * std::numbers::ln2 + 2 * (s + s * u * series);
 }
 

@@ -1,7 +1,8 @@
-// Brushed motor, gear and stroke spring of one wing. Motor-side friction f, damping b, inertia J; gear N, efficiency eta:
+// Brushed motor, gear and stroke spring of one wing. Motor-side friction f, damping b, inertia J; gear N,
+// efficiency eta:
 //   tau = N eta (K i - J N psi'' - b N psi' - f sgn psi'),  i = (V - K N psi')/R, also when driven back
-// so about the stroke axis: torque per volt N eta K/R, damping eta N^2 (K^2/R + b), friction eta N f, inertia eta N^2 J.
-// Spring: -k (psi - psi_0), k for each direction. Winding inductance is neglected.
+// so about the stroke axis: torque per volt N eta K/R, damping eta N^2 (K^2/R + b), friction eta N f, inertia
+// eta N^2 J. Spring: -k (psi - psi_0), k for each direction. Winding inductance is neglected.
 #pragma once
 
 #include "model/flapper.hpp"
@@ -18,7 +19,8 @@ FLAPPY_INLINE T spring_torque(const SideParameters<T>& p, const T& stroke_rad) {
 /// Torque about psi, dry friction and rotor inertia excluded: they belong to the solve.
 template <class T>
 FLAPPY_INLINE T drive_torque(const SideParameters<T>& p, const SideState<T>& q, const T& voltage_V) {
-  return p.stroke_torque_per_V_Nm * voltage_V + (spring_torque(p, q.stroke_rad) - p.stroke_damping_Nm_s * q.stroke_rate_rad_s);
+  return p.stroke_torque_per_V_Nm * voltage_V +
+         (spring_torque(p, q.stroke_rad) - p.stroke_damping_Nm_s * q.stroke_rate_rad_s);
 }
 
 }  // namespace FLAPPY_ISA

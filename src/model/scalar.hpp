@@ -1,6 +1,6 @@
-// The vocabulary that physics is written in, for plain float and double; lanes.hpp has the same words for many
-// flappers at once. FLAPPY_ISA names the instruction set a file is compiled for, so that one program can hold
-// the same templates for several of them without the linker merging their code.
+// The vocabulary that physics is written in, for plain float and double; lanes.hpp has the same words for
+// many flappers at once. FLAPPY_ISA names the instruction set a file is compiled for, so that one program can
+// hold the same templates for several of them without the linker merging their code.
 #pragma once
 
 #include <bit>
@@ -28,7 +28,9 @@ FLAPPY_INLINE float abs(float a) { return __builtin_fabsf(a); }
 FLAPPY_INLINE double abs(double a) { return __builtin_fabs(a); }
 
 /// 2^-k for a whole number k within the normal range.
-FLAPPY_INLINE float half_to(float k) { return std::bit_cast<float>((127 - static_cast<std::int32_t>(k)) << 23); }
+FLAPPY_INLINE float half_to(float k) {
+  return std::bit_cast<float>((127 - static_cast<std::int32_t>(k)) << 23);
+}
 FLAPPY_INLINE double half_to(double k) {
   return std::bit_cast<double>((std::int64_t{1023} - static_cast<std::int64_t>(k)) << 52);
 }

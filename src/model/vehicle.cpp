@@ -13,7 +13,9 @@ class Lister {
  public:
   explicit Lister(std::vector<Parameter>& list) : list_(list) {}
 
-  void add(const std::string& path, double& value, double low, double high) { list_.push_back({path, &value, low, high}); }
+  void add(const std::string& path, double& value, double low, double high) {
+    list_.push_back({path, &value, low, high});
+  }
 
   void add(const std::string& path, Triple& t) {
     add(path + ".x", t.x, -kLongest_m, kLongest_m);
@@ -55,8 +57,13 @@ class Lister {
   void add(const std::string& path, Planform& w) {
     add(path + ".wing_length_m", w.wing_length_m, 1e-4, kLongest_m);
     add(path + ".mean_chord_m", w.mean_chord_m, 1e-5, kLongest_m);
-    for (auto [name, value] : {std::pair<const char*, double*>{"r33", &w.r33}, {"r22", &w.r22}, {"r11", &w.r11},
-                               {"r00", &w.r00}, {"z_cp2", &w.z_cp2}, {"z_cp1", &w.z_cp1}, {"z_cp0", &w.z_cp0},
+    for (auto [name, value] : {std::pair<const char*, double*>{"r33", &w.r33},
+                               {"r22", &w.r22},
+                               {"r11", &w.r11},
+                               {"r00", &w.r00},
+                               {"z_cp2", &w.z_cp2},
+                               {"z_cp1", &w.z_cp1},
+                               {"z_cp0", &w.z_cp0},
                                {"z_rd", &w.z_rd}})
       add(path + "." + name, *value, 1e-6, 10);
     add(path + ".rotational_damping_coefficient", w.rotational_damping_coefficient, 0, 100);
@@ -80,7 +87,8 @@ class Lister {
 bool possible(const InertiaTensor& i) {
   Eigen::Matrix3d m;
   m << i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz;
-  const Eigen::Vector3d e = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector3d e =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
   return e[0] > 0 && e[0] + e[1] >= e[2];
 }
 

@@ -1,19 +1,21 @@
 // Exact dynamics of the five bodies: torso, two leading edges, two wings.
 //
-// Coordinates: momentum through the velocity of the whole vehicle's centre of mass C, body rate w, and the hinge rates
-// q' = (beta_l', beta_r', theta_l', theta_r'). About C the translation decouples exactly:
+// Coordinates: momentum through the velocity of the whole vehicle's centre of mass C, body rate w, and the
+// hinge rates q' = (beta_l', beta_r', theta_l', theta_r'). About C the translation decouples exactly:
 //   M dv_C/dt = F + M g
-//   | I   G | | w' |   | t |     I: inertia about C           t: external minus relative inertial moment, - w x I w
-//   | G^T H | | q''| = | r |     G: angular momentum about C per unit hinge rate
-//                                H: hinge inertias, rotor included, minus what the motion of C takes (e_i . e_j / M)
+//   | I   G | | w' |   | t |     I: inertia about C           t: external minus relative inertial moment, - w
+//   x I w | G^T H | | q''| = | r |     G: angular momentum about C per unit hinge rate
+//                                H: hinge inertias, rotor included, minus what the motion of C takes (e_i .
+//                                e_j / M)
 // A hinge also feels its shoulder's acceleration, A = (F - F_rel)/M + w x (w x d), d from C to the shoulder.
-// Elimination goes body, strokes, rotations; the rotations come last so that a wing landing on its stop is one 2x2 solve.
+// Elimination goes body, strokes, rotations; the rotations come last so that a wing landing on its stop is
+// one 2x2 solve.
 //
-// Time step: velocities first, then positions with the new velocities. Positions so lead velocities by half a step
-// (a leapfrog): forces of position are second order. Linear damping is taken at the mean of old and new rate,
-// M_rd at |old| new (exact for pure quadratic drag). Dry friction is the torque that would stop the hinge within the
-// step, limited to the friction: it sticks. A stop prescribes the rate that lands on it exactly: no penetration, and
-// the impulse only ever takes energy.
+// Time step: velocities first, then positions with the new velocities. Positions so lead velocities by half a
+// step (a leapfrog): forces of position are second order. Linear damping is taken at the mean of old and new
+// rate, M_rd at |old| new (exact for pure quadratic drag). Dry friction is the torque that would stop the
+// hinge within the step, limited to the friction: it sticks. A stop prescribes the rate that lands on it
+// exactly: no penetration, and the impulse only ever takes energy.
 #pragma once
 
 #include "model/hinged_wing.hpp"
@@ -24,9 +26,9 @@ inline namespace FLAPPY_ISA {
 /// What acts on one side during a step.
 template <class T>
 struct SideLoad {
-  T force_x_N, force_z_N;                          // on the wing at the shoulder, in L; none along the span
-  Vec3<T> moment_Nm;                               // the same
-  T stroke_torque_Nm, rotation_torque_Nm;          // about beta and theta, dry friction and inertia excluded
+  T force_x_N, force_z_N;                  // on the wing at the shoulder, in L; none along the span
+  Vec3<T> moment_Nm;                       // the same
+  T stroke_torque_Nm, rotation_torque_Nm;  // about beta and theta, dry friction and inertia excluded
 };
 
 template <class T>
@@ -42,9 +44,11 @@ struct WholeVehicle {
 };
 
 template <class T>
-FLAPPY_INLINE WholeVehicle<T> whole_vehicle(const Parameters<T>& p, const HingedWing<T>& l, const HingedWing<T>& r) {
+FLAPPY_INLINE WholeVehicle<T> whole_vehicle(const Parameters<T>& p, const HingedWing<T>& l,
+                                            const HingedWing<T>& r) {
   const Vec3<T> com = p.inverse_mass_1_kg * (p.fixed_moment_kg_m + (l.moment + r.moment));
-  return {com, p.inverse_mass_1_kg * (l.momentum + r.momentum), p.left.shoulder_m - com, p.right.shoulder_m - com};
+  return {com, p.inverse_mass_1_kg * (l.momentum + r.momentum), p.left.shoulder_m - com,
+          p.right.shoulder_m - com};
 }
 
 /// The vehicle's centre of mass from the torso origin, in B.
@@ -54,7 +58,8 @@ FLAPPY_INLINE Vec3<T> centre_of_mass(const Parameters<T>& p, const State<T>& x) 
                                                        moment_about_shoulder<-1>(p.right, x.right)));
 }
 
-/// Second moment that an assembly of first moment h, hung at s, adds about the origin besides its own: s h^T + h s^T.
+/// Second moment that an assembly of first moment h, hung at s, adds about the origin besides its own: s h^T
+/// + h s^T.
 template <class T>
 FLAPPY_INLINE Sym3<T> hung_at(const Vec3<T>& s, const Vec3<T>& h) {
   const T xx = s.x * h.x, yy = s.y * h.y, zz = s.z * h.z;
@@ -63,16 +68,18 @@ FLAPPY_INLINE Sym3<T> hung_at(const Vec3<T>& s, const Vec3<T>& h) {
 
 /// Second moment of the whole vehicle about C in B.
 template <class T>
-FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const HingedWing<T>& l, const HingedWing<T>& r,
-                                              const Vec3<T>& com) {
-  const Sym3<T> o = p.fixed_second_kg_m2 + (hung_at(p.left.shoulder_m, l.moment) + hung_at(p.right.shoulder_m, r.moment));
+FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const HingedWing<T>& l,
+                                              const HingedWing<T>& r, const Vec3<T>& com) {
+  const Sym3<T> o =
+      p.fixed_second_kg_m2 + (hung_at(p.left.shoulder_m, l.moment) + hung_at(p.right.shoulder_m, r.moment));
   const Vec3<T> m = p.fixed_moment_kg_m + (l.moment + r.moment);
   const Sym3<T> placed{o.xx - m.x * com.x, o.yy - m.y * com.y, o.zz - m.z * com.z,
                        o.xy - m.x * com.y, o.yz - m.y * com.z, o.xz - m.x * com.z};
   return placed + (l.second + r.second);
 }
 
-/// Rate, stops and friction of one hinge, about beta or theta. Stops as the turns in one step that just reach them.
+/// Rate, stops and friction of one hinge, about beta or theta. Stops as the turns in one step that just reach
+/// them.
 template <class T>
 struct Hinge {
   T rate, lowest_turn, highest_turn, friction;
@@ -81,8 +88,10 @@ struct Hinge {
 template <int side, class T>
 FLAPPY_INLINE Hinge<T> stroke_hinge(const SideParameters<T>& p, const SideState<T>& q) {
   const T lowest = p.stroke_lower_rad - q.stroke_rad, highest = p.stroke_upper_rad - q.stroke_rad;
-  if constexpr (side > 0) return {q.stroke_rate_rad_s, lowest, highest, p.stroke_friction_Nm};
-  else return {-q.stroke_rate_rad_s, -highest, -lowest, p.stroke_friction_Nm};
+  if constexpr (side > 0)
+    return {q.stroke_rate_rad_s, lowest, highest, p.stroke_friction_Nm};
+  else
+    return {-q.stroke_rate_rad_s, -highest, -lowest, p.stroke_friction_Nm};
 }
 
 template <class T>
@@ -116,7 +125,7 @@ FLAPPY_INLINE Inverse<Sym2<T>, T> inverse(const Sym2<T>& m) {
 template <class T>
 struct BodyInertia {
   T inverse_mass;
-  Sym3<T> second_moment;  // of the whole vehicle about C, wings frozen
+  Sym3<T> second_moment;        // of the whole vehicle about C, wings frozen
   Inverse<Sym3<T>, T> inverse;  // of its inertia
 };
 
@@ -136,21 +145,25 @@ FLAPPY_INLINE BodyInertia<T> body_inertia(const Parameters<T>& p, const State<T>
 /// What drives the body and the shoulders while the hinges do not accelerate.
 template <class T>
 struct BodyDrive {
-  Vec3<T> force, moment;                // F, and t about C
+  Vec3<T> force, moment;                  // F, and t about C
   Vec3<T> shoulder_left, shoulder_right;  // A
 };
 
 /// `up_B`: the vertical in B; `gravity`: m/s^2.
 template <class T>
 FLAPPY_INLINE BodyDrive<T> drive_body(const Parameters<T>& p, const State<T>& x, const HingedWing<T>& l,
-                                      const HingedWing<T>& r, const WholeVehicle<T>& v, const BodyInertia<T>& inertia,
-                                      const SideLoad<T>& load_l, const SideLoad<T>& load_r, const BodyLoad<T>& body,
-                                      const Vec3<T>& up_B, const T& gravity) {
+                                      const HingedWing<T>& r, const WholeVehicle<T>& v,
+                                      const BodyInertia<T>& inertia, const SideLoad<T>& load_l,
+                                      const SideLoad<T>& load_r, const BodyLoad<T>& body, const Vec3<T>& up_B,
+                                      const T& gravity) {
   const Vec3<T>& w = x.body_rate_rad_s;
-  const auto in_body = [](const HingedWing<T>& g, const Vec3<T>& a) { return turn_z(g.beta.sin, g.beta.cos, a); };
+  const auto in_body = [](const HingedWing<T>& g, const Vec3<T>& a) {
+    return turn_z(g.beta.sin, g.beta.cos, a);
+  };
   const Vec3<T> air_l = turn_z(l.beta.sin, l.beta.cos, load_l.force_x_N, load_l.force_z_N);
   const Vec3<T> air_r = turn_z(r.beta.sin, r.beta.cos, load_r.force_x_N, load_r.force_z_N);
-  const Vec3<T> net_l = air_l - in_body(l, l.relative_force_L), net_r = air_r - in_body(r, r.relative_force_L);
+  const Vec3<T> net_l = air_l - in_body(l, l.relative_force_L),
+                net_r = air_r - in_body(r, r.relative_force_L);
   const Vec3<T> moment_l = in_body(l, load_l.moment_Nm - l.relative_moment_L);
   const Vec3<T> moment_r = in_body(r, load_r.moment_Nm - r.relative_moment_L);
   const Vec3<T> t = ((moment_l + moment_r) + (cross(v.arm_left, net_l) + cross(v.arm_right, net_r))) +
@@ -175,16 +188,18 @@ struct HingeSystem {
   Vec3<T> stroke_l, stroke_r, rotation_l, rotation_r;  // columns of G
   Sym2<T> strokes, rotations;                          // blocks of H - G^T I^-1 G
   T ll, rr, lr, rl;                                    // and between them: (stroke, rotation)
-  T s_l, s_r, r_l, r_r;                                // what drives strokes and rotations, dry friction excluded
+  T s_l, s_r, r_l, r_r;  // what drives strokes and rotations, dry friction excluded
 };
 
 template <class T>
-FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const HingedWing<T>& l, const HingedWing<T>& r,
-                                            const WholeVehicle<T>& v, const BodyInertia<T>& body,
-                                            const BodyDrive<T>& drive, const SideLoad<T>& load_l, const SideLoad<T>& load_r) {
+FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const HingedWing<T>& l,
+                                            const HingedWing<T>& r, const WholeVehicle<T>& v,
+                                            const BodyInertia<T>& body, const BodyDrive<T>& drive,
+                                            const SideLoad<T>& load_l, const SideLoad<T>& load_r) {
   HingeSystem<T> h;
-  h.stroke_l = l.stroke_spin + cross(v.arm_left, l.stroke_column);
-  h.stroke_r = r.stroke_spin + cross(v.arm_right, r.stroke_column);
+  const AcrossZ<T> esl{l.moment}, esr{r.moment};
+  h.stroke_l = plus_cross(l.stroke_spin, v.arm_left, esl);
+  h.stroke_r = plus_cross(r.stroke_spin, v.arm_right, esr);
   h.rotation_l = l.rotation_spin + cross(v.arm_left, l.rotation_column);
   h.rotation_r = r.rotation_spin + cross(v.arm_right, r.rotation_column);
   // columns of adj(I) G; the division by the determinant of I comes last
@@ -193,22 +208,22 @@ FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const Hinged
   const Vec3<T> xsl = adjugate * h.stroke_l, xsr = adjugate * h.stroke_r;
   const Vec3<T> xrl = adjugate * h.rotation_l, xrr = adjugate * h.rotation_r;
 
-  const auto& esl = l.stroke_column;
-  const auto& esr = r.stroke_column;
   const auto& erl = l.rotation_column;
   const auto& err = r.rotation_column;
   const auto left = [&](const T& own, const auto& e, const auto& f, const Vec3<T>& g, const Vec3<T>& x) {
     return T((own - body.inverse_mass * dot(e, f)) - scale * dot(g, x));
   };
   const SideParameters<T>&pl = p.left, &pr = p.right;
-  h.strokes = {left(l.stroke_inertia + (pl.rotor_kg_m2 + pl.stroke_stiffening_kg_m2), esl, esl, h.stroke_l, xsl),
-               left(r.stroke_inertia + (pr.rotor_kg_m2 + pr.stroke_stiffening_kg_m2), esr, esr, h.stroke_r, xsr),
-               left(T(0), esl, esr, h.stroke_l, xsr)};
+  h.strokes = {
+      left(l.stroke_inertia + (pl.rotor_kg_m2 + pl.stroke_stiffening_kg_m2), esl, esl, h.stroke_l, xsl),
+      left(r.stroke_inertia + (pr.rotor_kg_m2 + pr.stroke_stiffening_kg_m2), esr, esr, h.stroke_r, xsr),
+      left(T(0), esl, esr, h.stroke_l, xsr)};
   const auto rotation = [](const HingedWing<T>& g, const SideParameters<T>& s) {
-    return T(g.rotation_inertia + (s.rotation_stiffening_kg_m2 + s.rotation_stiffening_kg_m2_s * abs(g.theta_rate)));
+    return T(g.rotation_inertia +
+             (s.rotation_stiffening_kg_m2 + s.rotation_stiffening_kg_m2_s * abs(g.theta_rate)));
   };
-  h.rotations = {left(rotation(l, pl), erl, erl, h.rotation_l, xrl), left(rotation(r, pr), err, err, h.rotation_r, xrr),
-                 left(T(0), erl, err, h.rotation_l, xrr)};
+  h.rotations = {left(rotation(l, pl), erl, erl, h.rotation_l, xrl),
+                 left(rotation(r, pr), err, err, h.rotation_r, xrr), left(T(0), erl, err, h.rotation_l, xrr)};
   h.ll = left(l.cross_inertia, esl, erl, h.stroke_l, xrl);
   h.rr = left(r.cross_inertia, esr, err, h.stroke_r, xrr);
   h.lr = left(T(0), esl, err, h.stroke_l, xrr);
@@ -224,11 +239,11 @@ FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const Hinged
   return h;
 }
 
-/// What remains of the rotations after the strokes are eliminated by beta'' = given + K (s - C theta''). K is the inverse
-/// of the strokes' block; a stroke that its stop prescribes has no row in it.
+/// What remains of the rotations after the strokes are eliminated by beta'' = given + K (s - C theta''). K is
+/// the inverse of the strokes' block; a stroke that its stop prescribes has no row in it.
 template <class T>
 struct RotationSystem {
-  T z_ll, z_rr, z_lr, z_rl;          // adj(K) C
+  T z_ll, z_rr, z_lr, z_rl;  // adj(K) C
   Sym2<T> A;
   Inverse<Sym2<T>, T> inverse;       // of A
   T left_per_right, right_per_left;  // turn that a stop's turn of the other side gives this one: A_lr / A_own
@@ -259,7 +274,8 @@ struct Motion {
 
 template <class T>
 FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const BodyInertia<T>& body,
-                             const BodyDrive<T>& drive, const HingeSystem<T>& h, const T& step, const T& per_step) {
+                             const BodyDrive<T>& drive, const HingeSystem<T>& h, const T& step,
+                             const T& per_step) {
   const Hinge<T> stroke_l = stroke_hinge<+1>(p.left, x.left), stroke_r = stroke_hinge<-1>(p.right, x.right);
   const Hinge<T> rotation_l = rotation_hinge(p.left, x.left), rotation_r = rotation_hinge(p.right, x.right);
   const T s_l = h.s_l + dry_friction(h.strokes.ll, stroke_l, h.s_l, per_step);
@@ -269,14 +285,16 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
   Motion<T> m;
   const T step2 = step * step, per_step2 = per_step * per_step;
   const auto accelerate = [&](const Inverse<Sym2<T>, T>& K, const T& given_l, const T& given_r)
-                              __attribute__((always_inline)) {
+      __attribute__((always_inline)) {
     const RotationSystem<T> e = eliminate_strokes(h, K);
     const Sym2<T>&k = K.adjugate, &a = e.inverse.adjugate;
-    const T y_l = given_l + K.scale * T(k.ll * s_l + k.lr * s_r), y_r = given_r + K.scale * T(k.lr * s_l + k.rr * s_r);
+    const T y_l = given_l + K.scale * T(k.ll * s_l + k.lr * s_r),
+            y_r = given_r + K.scale * T(k.lr * s_l + k.rr * s_r);
     T b_l = h.r_l - (h.ll * y_l + h.rl * y_r), b_r = h.r_r - (h.lr * y_l + h.rr * y_r);
     b_l += dry_friction(e.A.ll, rotation_l, b_l, per_step);
     b_r += dry_friction(e.A.rr, rotation_r, b_r, per_step);
-    const T coast_l = step * rotation_l.rate, coast_r = step * rotation_r.rate, scale = step2 * e.inverse.scale;
+    const T coast_l = step * rotation_l.rate, coast_r = step * rotation_r.rate,
+            scale = step2 * e.inverse.scale;
     const T free_l = coast_l + scale * T(a.ll * b_l + a.lr * b_r);
     const T free_r = coast_r + scale * T(a.lr * b_l + a.rr * b_r);
     const T taken_l = free_l - stopped(rotation_l, free_l), taken_r = free_r - stopped(rotation_r, free_r);
@@ -291,27 +309,46 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
   };
   const Inverse<Sym2<T>, T> free = inverse(h.strokes);
   accelerate(free, T(0), T(0));
-  const auto out_l = (m.stroke_left < stroke_l.lowest_turn) | (m.stroke_left > stroke_l.highest_turn);
-  const auto out_r = (m.stroke_right < stroke_r.lowest_turn) | (m.stroke_right > stroke_r.highest_turn);
-  if (any(out_l | out_r)) {  // a stroke reaches its stop: once more, with its turn given and its row of K gone
+  const auto beyond = [](const Hinge<T>& q, const T& turn) {
+    return (turn < q.lowest_turn) | (turn > q.highest_turn);
+  };
+  auto out_l = beyond(stroke_l, m.stroke_left), out_r = beyond(stroke_r, m.stroke_right);
+  if (any(out_l |
+          out_r)) {  // a stroke reaches its stop: once more, with its turn given and its row of K gone
     const T zero(0);
     const Sym2<T>& S = h.strokes;
-    const T stop_l = T(stopped(stroke_l, m.stroke_left) - step * stroke_l.rate) * per_step2;
-    const T stop_r = T(stopped(stroke_r, m.stroke_right) - step * stroke_r.rate) * per_step2;
-    const auto row = [&](const auto& out, const auto& other_out, const T& own, const T& pair) {
-      return where(out, zero, where(other_out, T(T(1) / own), pair));
+    const auto prescribe = [&](const T& stop_l, const T& stop_r) __attribute__((always_inline)) {
+      const auto row = [&](const auto& out, const auto& other_out, const T& own, const T& pair) {
+        return where(out, zero, where(other_out, T(T(1) / own), pair));
+      };
+      const Inverse<Sym2<T>, T> K{
+          {row(out_l, out_r, S.ll, free.adjugate.ll), row(out_r, out_l, S.rr, free.adjugate.rr),
+           where(out_l | out_r, zero, free.adjugate.lr)},
+          where(out_l | out_r, T(1), free.scale)};
+      accelerate(K, where(out_l, stop_l, where(out_r, T(-(T(S.lr / S.ll) * stop_r)), zero)),
+                 where(out_r, stop_r, where(out_l, T(-(T(S.lr / S.rr) * stop_l)), zero)));
     };
-    const Inverse<Sym2<T>, T> K{{row(out_l, out_r, S.ll, free.adjugate.ll), row(out_r, out_l, S.rr, free.adjugate.rr),
-                                 where(out_l | out_r, zero, free.adjugate.lr)},
-                                where(out_l | out_r, T(1), free.scale)};
-    accelerate(K, where(out_l, stop_l, where(out_r, T(-(T(S.lr / S.ll) * stop_r)), zero)),
-               where(out_r, stop_r, where(out_l, T(-(T(S.lr / S.rr) * stop_l)), zero)));
-    m.stroke_left = stopped(stroke_l, m.stroke_left);
+    const auto landing = [&](const Hinge<T>& q, const T& turn) {
+      return T(T(stopped(q, turn) - step * q.rate) * per_step2);
+    };
+    T stop_l = landing(stroke_l, m.stroke_left), stop_r = landing(stroke_r, m.stroke_right);
+    prescribe(stop_l, stop_r);
+    // the landing of one may throw the other out; lanes where it does not get the same numbers again
+    const auto also_l = beyond(stroke_l, m.stroke_left) & !out_l,
+               also_r = beyond(stroke_r, m.stroke_right) & !out_r;
+    if (any(also_l | also_r)) {
+      stop_l = where(also_l, landing(stroke_l, m.stroke_left), stop_l);
+      stop_r = where(also_r, landing(stroke_r, m.stroke_right), stop_r);
+      out_l = out_l | also_l;
+      out_r = out_r | also_r;
+      prescribe(stop_l, stop_r);
+    }
+    m.stroke_left = stopped(stroke_l, m.stroke_left);  // what is left is rounding
     m.stroke_right = stopped(stroke_r, m.stroke_right);
   }
 
-  const Vec3<T> hinges =
-      add_scaled(add_scaled(add_scaled(a_sl * h.stroke_l, a_sr, h.stroke_r), a_rl, h.rotation_l), a_rr, h.rotation_r);
+  const Vec3<T> hinges = add_scaled(
+      add_scaled(add_scaled(a_sl * h.stroke_l, a_sr, h.stroke_r), a_rl, h.rotation_l), a_rr, h.rotation_r);
   m.body_acceleration = body.inverse.scale * (body.inverse.adjugate * (drive.moment - hinges));
   return m;
 }

@@ -52,7 +52,8 @@ std::string vehicle_text(const Vehicle& vehicle) {
   Vehicle copy = vehicle;
   for (const Parameter& p : parameters(copy)) text += p.path + " = " + number_text(*p.value) + "\n";
   for (const auto& [id, values] : vehicle.effects)
-    for (const auto& [name, value] : values) text += "effects." + id + "." + name + " = " + number_text(value) + "\n";
+    for (const auto& [name, value] : values)
+      text += "effects." + id + "." + name + " = " + number_text(value) + "\n";
   return text;
 }
 

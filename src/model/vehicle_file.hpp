@@ -1,4 +1,5 @@
-// Vehicle files: TOML with `schema = 1`, one number for every entry of parameters(), and `[effects.<id>]` tables.
+// Vehicle files: TOML with `schema = 1`, one number for every entry of parameters(), and `[effects.<id>]`
+// tables.
 #pragma once
 
 #include <filesystem>

@@ -16,7 +16,8 @@ struct WingBeat {
   T amplitude_V, difference_V, bias_V, split_cycle;
 };
 
-/// Voltage of one motor. `fraction` of the beat in [-1/2, 1/2), where -x stands for 1 - x; inputs already clipped.
+/// Voltage of one motor. `fraction` of the beat in [-1/2, 1/2), where -x stands for 1 - x; inputs already
+/// clipped.
 template <int side, class T>
 FLAPPY_INLINE T wing_beat_voltage(const WingBeat<T>& u, const T& fraction, const T& limit_V) {
   const T s = T(0.5) - T(T(side) * u.split_cycle);

@@ -50,8 +50,10 @@ std::uint64_t mixed(std::uint64_t h, std::uint64_t word) {  // splitmix64's fina
 
 template <class T>
 std::uint64_t bits(T value) {
-  if constexpr (sizeof(T) == 4) return std::bit_cast<std::uint32_t>(value);
-  else return std::bit_cast<std::uint64_t>(value);
+  if constexpr (sizeof(T) == 4)
+    return std::bit_cast<std::uint32_t>(value);
+  else
+    return std::bit_cast<std::uint64_t>(value);
 }
 
 }  // namespace
@@ -74,16 +76,19 @@ struct Batch<T>::Storage {
     int lane;
   };
   Place at(std::size_t i) {
-    if (i >= count) throw std::out_of_range("no flapper " + std::to_string(i) + " in a batch of " + std::to_string(count));
+    if (i >= count)
+      throw std::out_of_range("no flapper " + std::to_string(i) + " in a batch of " + std::to_string(count));
     return {blocks[i / kLanes<T>], static_cast<int>(i % kLanes<T>)};
   }
 
   void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v) {
     put(model::derive(v, plan.step_s), block.parameters, lane);
     auto drive = get<Drive<double>>(block.drive, lane);
-    drive.limit = {v.driver.amplitude_limit_V, v.driver.difference_limit_V, v.driver.bias_limit_V, v.driver.split_cycle_limit};
+    drive.limit = {v.driver.amplitude_limit_V, v.driver.difference_limit_V, v.driver.bias_limit_V,
+                   v.driver.split_cycle_limit};
     put(drive, block.drive, lane);
-    block.phase_per_update[lane] = static_cast<std::uint32_t>(std::llround(v.driver.flapping_Hz * v.driver.hold_s * 0x1p32));
+    block.phase_per_update[lane] =
+        static_cast<std::uint32_t>(std::llround(v.driver.flapping_Hz * v.driver.hold_s * 0x1p32));
   }
 
   /// A lane without an effect that its block has gets the value at which the effect vanishes.
@@ -98,7 +103,8 @@ struct Batch<T>::Storage {
     put_effect_rows(i, v);
     const std::size_t b = i / kLanes<T>;
     block_effects[b] = 0;
-    for (int lane = 0; lane < kLanes<T>; ++lane) block_effects[b] |= lane_effects[b * kLanes<T> + static_cast<std::size_t>(lane)];
+    for (int lane = 0; lane < kLanes<T>; ++lane)
+      block_effects[b] |= lane_effects[b * kLanes<T> + static_cast<std::size_t>(lane)];
   }
   void put_effect_rows(std::size_t i, const model::Vehicle& v) {
     T* rows = &effect_rows[i / kLanes<T> * model::kEffectRows * kLanes<T> + i % kLanes<T>];
@@ -109,7 +115,8 @@ struct Batch<T>::Storage {
       if (own != v.effects.end()) lane_effects[i] |= std::uint64_t{1} << e;
       for (std::size_t k = 0; k < entry.parameters.size(); ++k) {
         const model::EffectParameter& parameter = entry.parameters[k];
-        double value = static_cast<int>(k) == entry.info.vanishing ? entry.info.vanishing_value : parameter.typical;
+        double value =
+            static_cast<int>(k) == entry.info.vanishing ? entry.info.vanishing_value : parameter.typical;
         if (own != v.effects.end()) {
           const auto given = own->second.find(parameter.name);
           value = given != own->second.end() ? given->second : parameter.typical;
@@ -160,7 +167,8 @@ std::size_t Batch<T>::size() const {
 
 template <class T>
 void Batch<T>::set_vehicle(std::size_t i, const model::Vehicle& vehicle) {
-  if (vehicle.driver.hold_s != storage_->hold_s) throw std::invalid_argument("all flappers of a batch share the driver's hold");
+  if (vehicle.driver.hold_s != storage_->hold_s)
+    throw std::invalid_argument("all flappers of a batch share the driver's hold");
   const auto [block, lane] = storage_->at(i);
   storage_->put_vehicle(block, lane, vehicle);
   storage_->put_effects(i, vehicle);
@@ -176,7 +184,8 @@ void Batch<T>::reset(std::size_t i, const FlapperState& f, Start start) {
   x.left = {f.stroke_rad[0], f.rotation_rad[0], f.stroke_rate_rad_s[0], f.rotation_rate_rad_s[0]};
   x.right = {f.stroke_rad[1], f.rotation_rad[1], f.stroke_rate_rad_s[1], f.rotation_rate_rad_s[1]};
   const Vec3<double> velocity{f.velocity_m_s[0], f.velocity_m_s[1], f.velocity_m_s[2]};
-  x.com_velocity_m_s = velocity + com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
+  x.com_velocity_m_s =
+      velocity + com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
   if (start == Start::standing) x.support = static_cast<double>(model::Support::standing);
   if (start == Start::welded) x.support = static_cast<double>(model::Support::welded);
   put(x, block.state, lane);
@@ -204,8 +213,10 @@ void Batch<T>::step(int steps) {
   for (std::ptrdiff_t b = 0; b < blocks; ++b) {
     BlockEffects<T> effects;
     const auto i = static_cast<std::size_t>(b);
-    if (!s.block_effects.empty()) effects = {s.block_effects[i], &s.effect_rows[i * model::kEffectRows * kLanes<T>]};
-    s.kernel(s.blocks[i], effects, s.plan, s.steps, steps);
+    if (!s.block_effects.empty())
+      effects = {s.block_effects[i], &s.effect_rows[i * model::kEffectRows * kLanes<T>]};
+    const Block<T>* next = i + 1 < s.blocks.size() ? &s.blocks[i + 1] : nullptr;
+    s.kernel(s.blocks[i], effects, s.plan, s.steps, steps, next);
   }
   s.steps += steps;
 }
@@ -214,7 +225,8 @@ template <class T>
 FlapperState Batch<T>::state(std::size_t i) const {
   const auto [block, lane] = storage_->at(i);
   const auto x = get<State<double>>(block.state, lane);
-  const Vec3<double> v = x.com_velocity_m_s - com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
+  const Vec3<double> v =
+      x.com_velocity_m_s - com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
   return {{x.position_m.x, x.position_m.y, x.position_m.z},
           {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z},
           {v.x, v.y, v.z},

@@ -1,6 +1,6 @@
-// A block: kLanes flappers side by side, one row for each number of a flapper. It is the unit of work: one block
-// steps a whole control period with its state in registers and L1 before the next block starts, and nothing in a
-// block depends on another.
+// A block: kLanes flappers side by side, one row for each number of a flapper. It is the unit of work: one
+// block steps a whole control period with its state in registers and L1 before the next block starts, and
+// nothing in a block depends on another.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +15,9 @@ inline namespace FLAPPY_ISA {
 /// What drives a flapper between its control updates, as rows.
 template <class T>
 struct Drive {
-  model::WingBeat<T> input;   // as commanded
-  model::WingBeat<T> limit;   // |input| is clipped to it
-  T left_V, right_V;          // held between driver updates
+  model::WingBeat<T> input;  // as commanded
+  model::WingBeat<T> limit;  // |input| is clipped to it
+  T left_V, right_V;         // held between driver updates
 };
 
 }  // namespace FLAPPY_ISA
@@ -35,7 +35,7 @@ struct alignas(64) Block {
   T parameters[kParameterRows][kLanes<T>];
   T state[kStateRows][kLanes<T>];
   T drive[kDriveRows][kLanes<T>];
-  std::uint32_t phase[kLanes<T>];             // of the wing beat: fraction x 2^32
+  std::uint32_t phase[kLanes<T>];  // of the wing beat: fraction x 2^32
   std::uint32_t phase_per_update[kLanes<T>];
   std::uint32_t status[kLanes<T>];
 };

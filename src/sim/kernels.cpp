@@ -6,10 +6,10 @@
 
 namespace flappy::sim {
 
-#define FLAPPY_DECLARE_KERNELS(isa)              \
-  inline namespace isa {                         \
-  extern const Kernel<float> kernel_float;       \
-  extern const Kernel<double> kernel_double;     \
+#define FLAPPY_DECLARE_KERNELS(isa)          \
+  inline namespace isa {                     \
+  extern const Kernel<float> kernel_float;   \
+  extern const Kernel<double> kernel_double; \
   }
 FLAPPY_DECLARE_KERNELS(scalar)
 FLAPPY_DECLARE_KERNELS(v2)
@@ -32,7 +32,8 @@ const KernelSet& kernel_named(std::string_view instruction_set) {
   if (instruction_set.empty()) return kernels().back();
   for (const KernelSet& k : kernels())
     if (instruction_set == k.single.instruction_set) return k;
-  throw std::invalid_argument("no instruction set \"" + std::string(instruction_set) + "\" on this processor");
+  throw std::invalid_argument("no instruction set \"" + std::string(instruction_set) +
+                              "\" on this processor");
 }
 
 std::string best_instruction_set() { return kernels().back().single.instruction_set; }

@@ -1,6 +1,7 @@
-// Lanes<T, N>: N flappers in one register. Arithmetic is elementwise and the same to the bit on every instruction
-// set: a product that meets a sum is one fused multiply-add *because the source says so* (operator* returns an
-// unevaluated Product), never because a compiler chose to contract. v2 has no fma instruction and emulates it.
+// Lanes<T, N>: N flappers in one register. Arithmetic is elementwise and the same to the bit on every
+// instruction set: a product that meets a sum is one fused multiply-add *because the source says so*
+// (operator* returns an unevaluated Product), never because a compiler chose to contract. v2 has no fma
+// instruction and emulates it.
 #pragma once
 
 #include <immintrin.h>
@@ -124,29 +125,39 @@ struct Lanes {
   friend FLAPPY_INLINE Lanes sqrt(Lanes a) {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
-      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm512_sqrt_ps((__m512)a.raw));
-      else return Lanes((Raw)_mm512_sqrt_pd((__m512d)a.raw));
+      if constexpr (sizeof(T) == 4)
+        return Lanes((Raw)_mm512_sqrt_ps((__m512)a.raw));
+      else
+        return Lanes((Raw)_mm512_sqrt_pd((__m512d)a.raw));
     }
 #endif
 #if defined(__AVX__)
     if constexpr (N * sizeof(T) == 32) {
-      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm256_sqrt_ps((__m256)a.raw));
-      else return Lanes((Raw)_mm256_sqrt_pd((__m256d)a.raw));
+      if constexpr (sizeof(T) == 4)
+        return Lanes((Raw)_mm256_sqrt_ps((__m256)a.raw));
+      else
+        return Lanes((Raw)_mm256_sqrt_pd((__m256d)a.raw));
     }
 #endif
     if constexpr (N * sizeof(T) == 16) {
-      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm_sqrt_ps((__m128)a.raw));
-      else return Lanes((Raw)_mm_sqrt_pd((__m128d)a.raw));
+      if constexpr (sizeof(T) == 4)
+        return Lanes((Raw)_mm_sqrt_ps((__m128)a.raw));
+      else
+        return Lanes((Raw)_mm_sqrt_pd((__m128d)a.raw));
     }
-    if constexpr (sizeof(T) == 4) return each([&](int i) { return __builtin_sqrtf(a.raw[i]); });
-    else return each([&](int i) { return __builtin_sqrt(a.raw[i]); });
+    if constexpr (sizeof(T) == 4)
+      return each([&](int i) { return __builtin_sqrtf(a.raw[i]); });
+    else
+      return each([&](int i) { return __builtin_sqrt(a.raw[i]); });
   }
   // min and max as the x86 instructions define them: the second operand where they compare unordered.
   friend FLAPPY_INLINE Lanes min(Lanes a, Lanes b) {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
-      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm512_min_ps((__m512)a.raw, (__m512)b.raw));
-      else return Lanes((Raw)_mm512_min_pd((__m512d)a.raw, (__m512d)b.raw));
+      if constexpr (sizeof(T) == 4)
+        return Lanes((Raw)_mm512_min_ps((__m512)a.raw, (__m512)b.raw));
+      else
+        return Lanes((Raw)_mm512_min_pd((__m512d)a.raw, (__m512d)b.raw));
     }
 #endif
     return select(Mask{a.raw < b.raw}, a, b);
@@ -154,15 +165,15 @@ struct Lanes {
   friend FLAPPY_INLINE Lanes max(Lanes a, Lanes b) {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
-      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm512_max_ps((__m512)a.raw, (__m512)b.raw));
-      else return Lanes((Raw)_mm512_max_pd((__m512d)a.raw, (__m512d)b.raw));
+      if constexpr (sizeof(T) == 4)
+        return Lanes((Raw)_mm512_max_ps((__m512)a.raw, (__m512)b.raw));
+      else
+        return Lanes((Raw)_mm512_max_pd((__m512d)a.raw, (__m512d)b.raw));
     }
 #endif
     return select(Mask{a.raw > b.raw}, a, b);
   }
-  friend FLAPPY_INLINE Lanes select(Mask m, Lanes yes, Lanes no) {
-    return Lanes(m.raw ? yes.raw : no.raw);
-  }
+  friend FLAPPY_INLINE Lanes select(Mask m, Lanes yes, Lanes no) { return Lanes(m.raw ? yes.raw : no.raw); }
   friend FLAPPY_INLINE Lanes half_to(Lanes k) {
     using Bits = typename Mask::Raw;
     constexpr int kBias = sizeof(T) == 4 ? 127 : 1023, kMantissa = sizeof(T) == 4 ? 23 : 52;

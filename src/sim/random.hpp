@@ -1,5 +1,5 @@
-// Counter-based random numbers (Philox 4x32-10, Random123): a draw depends on its key alone, so it is the same for any
-// number of threads and any order of asking.
+// Counter-based random numbers (Philox 4x32-10, Random123): a draw depends on its key alone, so it is the
+// same for any number of threads and any order of asking.
 #pragma once
 
 #include <Random123/philox.h>
@@ -27,7 +27,8 @@ struct UniformPair {
 inline UniformPair uniform_pair(const RandomKey& key, std::uint32_t index) {
   using Philox = r123::Philox4x32;
   const Philox::ctr_type counter{{index, static_cast<std::uint32_t>(key.stream), key.flapper, key.episode}};
-  const Philox::key_type k{{static_cast<std::uint32_t>(key.seed), static_cast<std::uint32_t>(key.seed >> 32)}};
+  const Philox::key_type k{
+      {static_cast<std::uint32_t>(key.seed), static_cast<std::uint32_t>(key.seed >> 32)}};
   const Philox::ctr_type r = Philox()(counter, k);
   const auto unit = [](std::uint32_t high, std::uint32_t low) {
     const std::uint64_t bits = (std::uint64_t{high} << 21) ^ (low >> 11);

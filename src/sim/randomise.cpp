@@ -16,7 +16,8 @@ Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : 
   for (const io::Table& table : config.tables("randomise")) draws_.push_back(read_draw(table, parameters));
 }
 
-Randomisation::Draw Randomisation::read_draw(const io::Table& table, const std::vector<model::Parameter>& parameters) {
+Randomisation::Draw Randomisation::read_draw(const io::Table& table,
+                                             const std::vector<model::Parameter>& parameters) {
   static const std::vector<std::string> kLaws = {"scale_normal", "scale_half_normal", "replace_normal",
                                                  "add_normal",   "scale_uniform",     "replace_uniform"};
   Draw draw{};
@@ -57,12 +58,18 @@ Randomisation::Draw Randomisation::read_draw(const io::Table& table, const std::
 double Randomisation::apply(const Draw& draw, double nominal, double variate) {
   const double uniform = draw.a + (draw.b - draw.a) * std::clamp((variate + 1) / 2, 0.0, 1.0);
   switch (draw.law) {
-    case Law::scale_normal: return nominal * (1 + draw.b * variate);
-    case Law::scale_half_normal: return nominal * (1 + std::abs(draw.b * variate));
-    case Law::replace_normal: return draw.a + draw.b * variate;
-    case Law::add_normal: return nominal + draw.b * variate;
-    case Law::scale_uniform: return nominal * uniform;
-    case Law::replace_uniform: return uniform;
+    case Law::scale_normal:
+      return nominal * (1 + draw.b * variate);
+    case Law::scale_half_normal:
+      return nominal * (1 + std::abs(draw.b * variate));
+    case Law::replace_normal:
+      return draw.a + draw.b * variate;
+    case Law::add_normal:
+      return nominal + draw.b * variate;
+    case Law::scale_uniform:
+      return nominal * uniform;
+    case Law::replace_uniform:
+      return uniform;
   }
   return nominal;
 }
@@ -83,7 +90,8 @@ model::Vehicle Randomisation::sample(RandomKey key) const {
         if (std::abs(variate) <= draw.cut_sd) break;
       }
     }
-    for (const std::size_t i : draw.parameters) *parameters[i].value = apply(draw, *parameters[i].value, variate);
+    for (const std::size_t i : draw.parameters)
+      *parameters[i].value = apply(draw, *parameters[i].value, variate);
     base += kIndicesPerDraw;
   }
   return vehicle;

@@ -1,10 +1,9 @@
 // Randomised vehicles: a table of distributions over the parameters of a nominal vehicle.
 //
 //   [[randomise]]
-//   parameters = ["torso.mass_kg", "torso.inertia_kg_m2"]   # one draw for all; a table stands for all below it
-//   law = "scale_normal"
-//   sd = 0.10
-//   cut_sd = 3.0                                            # draws farther out are drawn again
+//   parameters = ["torso.mass_kg", "torso.inertia_kg_m2"]   # one draw for all; a table stands for all below
+//   it law = "scale_normal" sd = 0.10 cut_sd = 3.0                                            # draws farther
+//   out are drawn again
 //
 // With n a normal draw and u a uniform one:  scale_normal x (1 + sd n), scale_half_normal x (1 + |sd n|),
 // replace_normal mean + sd n, add_normal + sd n, scale_uniform x u, replace_uniform u in [low, high].
@@ -23,8 +22,8 @@ class Randomisation {
   /// No randomisation: every vehicle is the nominal one.
   explicit Randomisation(model::Vehicle nominal) : nominal_(std::move(nominal)) {}
 
-  /// Reads the array `randomise` of a configuration. io::InputError where a parameter is unknown or a draw could
-  /// leave its accepted range.
+  /// Reads the array `randomise` of a configuration. io::InputError where a parameter is unknown or a draw
+  /// could leave its accepted range.
   Randomisation(model::Vehicle nominal, const io::Table& config);
 
   const model::Vehicle& nominal() const { return nominal_; }
@@ -32,11 +31,18 @@ class Randomisation {
   model::Vehicle sample(RandomKey key) const;
 
  private:
-  enum class Law { scale_normal, scale_half_normal, replace_normal, add_normal, scale_uniform, replace_uniform };
+  enum class Law {
+    scale_normal,
+    scale_half_normal,
+    replace_normal,
+    add_normal,
+    scale_uniform,
+    replace_uniform
+  };
   struct Draw {
     std::vector<std::size_t> parameters;  // index in model::parameters()
     Law law;
-    double a, b;                          // mean and sd, or low and high
+    double a, b;  // mean and sd, or low and high
     double cut_sd;
   };
   static Draw read_draw(const io::Table& table, const std::vector<model::Parameter>& parameters);

@@ -73,7 +73,7 @@ FLAPPY_INLINE void update_driver(Drive<L>& d, const Parameters<L>& p, Block<T>& 
 /// What is the same for all steps of a block.
 template <class T>
 struct Constants {
-  T step, per_step, gravity, ground_z, ceiling_z;
+  T step, half_step, per_step, gravity, ground_z, ceiling_z;
 };
 
 /// Effects in force, with their parameters in lanes. Every lane of a block has the same set.
@@ -97,8 +97,8 @@ struct ActiveEffects {
 
 /// What air and motor do to one side.
 template <int side, class T>
-FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<T>& q, const WingWrench<T>& air,
-                                    const T& voltage_V) {
+FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<T>& q,
+                                    const WingWrench<T>& air, const T& voltage_V) {
   SideLoad<T> load;
   load.force_x_N = air.force_x_N;
   load.force_z_N = air.force_z_N;
@@ -110,21 +110,24 @@ FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<
 
 /// Air on one wing, from the velocity of its shoulder in B.
 template <int side, class T>
-FLAPPY_INLINE WingWrench<T> air_on_wing(const SideParameters<T>& p, const HingedWing<T>& g, const Vec3<T>& velocity_B) {
+FLAPPY_INLINE WingWrench<T> air_on_wing(const SideParameters<T>& p, const HingedWing<T>& g,
+                                        const Vec3<T>& velocity_B) {
   return blade_element<side>(p, g.theta, g.theta_rate, turn_back_z(g.beta.sin, g.beta.cos, velocity_B),
                              {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate});
 }
 
 /// Turns the hinges of one side. The last clamp takes the rounding of a landing on a stop.
 template <int side, class T>
-FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& beta, const T& theta, const T& per_step) {
+FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& beta, const T& theta,
+                        const T& per_step) {
   q.stroke_rate_rad_s = T(side) * T(beta * per_step);
   q.rotation_rate_rad_s = theta * per_step;
   q.stroke_rad = clamp(T(q.stroke_rad + T(T(side) * beta)), p.stroke_lower_rad, p.stroke_upper_rad);
   q.rotation_rad = clamp(T(q.rotation_rad + theta), p.rotation_lower_rad, p.rotation_upper_rad);
 }
 
-/// One physics step. `com_m`: the vehicle's centre of mass in W, carried along because it is what inertia moves.
+/// One physics step. `com_m`: the vehicle's centre of mass in W, carried along because it is what inertia
+/// moves.
 template <bool with_effects, class T>
 FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Drive<T>& drive, Vec3<T>& com_m,
                                 const ActiveEffects<T>& effects, const Constants<T>& k) {
@@ -133,10 +136,13 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Drive
   const HingedWing<T> left = place_wing<+1>(p.left, x.left, x.body_rate_rad_s);
   const HingedWing<T> right = place_wing<-1>(p.right, x.right, x.body_rate_rad_s);
   const WholeVehicle<T> whole = whole_vehicle(p, left, right);
-  const auto held = x.support > T(0);
+  auto held = x.support > T(0);
   if (any(held)) {
     com_m = where(held, x.position_m + R * whole.com, com_m);
     x.com_velocity_m_s = where(held, R * whole.com_rate, x.com_velocity_m_s);
+    const auto carried = (x.support == T(1)) & (x.lift_N * p.inverse_mass_1_kg > k.gravity);
+    x.support = where(carried, T(-1), x.support);  // a standing vehicle leaves when its wings carry it
+    held = x.support > T(0);
   }
 
   // what the air does
@@ -171,7 +177,8 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Drive
   const BodyInertia<T> inertia = body_inertia(p, x, left, right, whole);
   const BodyDrive<T> body_drive =
       drive_body(p, x, left, right, whole, inertia, load_left, load_right, body, R.row_z, k.gravity);
-  const HingeSystem<T> hinges = eliminate_body(p, left, right, whole, inertia, body_drive, load_left, load_right);
+  const HingeSystem<T> hinges =
+      eliminate_body(p, left, right, whole, inertia, body_drive, load_left, load_right);
   const Motion<T> m = move(p, x, inertia, body_drive, hinges, k.step, k.per_step);
   const Vec3<T> force = R * body_drive.force;
   x.body_rate_rad_s = add_scaled(x.body_rate_rad_s, k.step, m.body_acceleration);
@@ -182,27 +189,29 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Drive
   turn<+1>(p.left, x.left, m.stroke_left, m.rotation_left, k.per_step);
   turn<-1>(p.right, x.right, m.stroke_right, m.rotation_right, k.per_step);
   com_m = add_scaled(com_m, k.step, x.com_velocity_m_s);
-  x.attitude = turned(x.attitude, k.step * x.body_rate_rad_s);
+  x.attitude = turned(x.attitude, k.half_step * x.body_rate_rad_s);
 
-  // what holds the body feels the air, and lets go when the wings carry a standing vehicle
+  // what holds the body feels the air
   if (any(held)) {
-    const auto to_body = [](const HingedWing<T>& g, const Vec3<T>& v) { return turn_z(g.beta.sin, g.beta.cos, v); };
+    const auto to_body = [](const HingedWing<T>& g, const Vec3<T>& v) {
+      return turn_z(g.beta.sin, g.beta.cos, v);
+    };
     const T none(0);
     const Vec3<T> force_l = to_body(left, {air_left.force_x_N, none, air_left.force_z_N});
     const Vec3<T> force_r = to_body(right, {air_right.force_x_N, none, air_right.force_z_N});
     const Vec3<T> moment = (to_body(left, air_left.moment_Nm) + to_body(right, air_right.moment_Nm)) +
                            (cross(p.left.shoulder_m, force_l) + cross(p.right.shoulder_m, force_r));
     x.impulse_N_s = where(held, add_scaled(x.impulse_N_s, k.step, force_l + force_r), x.impulse_N_s);
-    x.angular_impulse_Nm_s = where(held, add_scaled(x.angular_impulse_Nm_s, k.step, moment), x.angular_impulse_Nm_s);
+    x.angular_impulse_Nm_s =
+        where(held, add_scaled(x.angular_impulse_Nm_s, k.step, moment), x.angular_impulse_Nm_s);
     x.lift_N = where(held, T(x.lift_N + T(force.z - x.lift_N) / p.beat_steps), x.lift_N);
-    const auto carried = (x.support == T(1)) & (x.lift_N * p.inverse_mass_1_kg > k.gravity);
-    x.support = where(carried, T(-1), x.support);
   }
 }
 
 /// Marks flappers that have come apart or touched something, and stands those that never took off back up.
 template <class T, class L>
-FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const World& world, Block<T>& block, int first) {
+FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const World& world, Block<T>& block,
+                               int first) {
   const auto mark = [&](typename L::Mask mask, std::uint32_t bit) {
     if (!any(mask)) return;
     for (int i = 0; i < kWidth<T>; ++i)
@@ -221,7 +230,8 @@ FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const World&
   mark(flying & !lifting & (height < L(0)), kTouchedGround);
   mark(flying & (x.position_m.z + p.above_m > L(world.ceiling_z_m)), kTouchedCeiling);
   for (const Wall& w : world.walls) {
-    const L clearance = L(w.normal_x) * L(x.position_m.x - L(w.x_m)) + L(w.normal_y) * L(x.position_m.y - L(w.y_m));
+    const L clearance =
+        L(w.normal_x) * L(x.position_m.x - L(w.x_m)) + L(w.normal_y) * L(x.position_m.y - L(w.y_m));
     mark(flying & (clearance < p.around_m), kTouchedWall);
   }
 }
@@ -229,13 +239,17 @@ FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const World&
 template <class L>
 FLAPPY_INLINE typename L::Mask plausible(const State<L>& x) {
   const auto within = [](const L& v, double limit) { return abs(v) <= L(limit); };  // false for NaN
-  const auto all = [&](const Vec3<L>& v, double limit) { return within(v.x, limit) & within(v.y, limit) & within(v.z, limit); };
+  const auto all = [&](const Vec3<L>& v, double limit) {
+    return within(v.x, limit) & within(v.y, limit) & within(v.z, limit);
+  };
   const auto side = [&](const SideState<L>& q) {
     return within(q.stroke_rad, kLargestAngle_rad) & within(q.rotation_rad, kLargestAngle_rad) &
-           within(q.stroke_rate_rad_s, kPlausibleHingeRate_rad_s) & within(q.rotation_rate_rad_s, kPlausibleHingeRate_rad_s);
+           within(q.stroke_rate_rad_s, kPlausibleHingeRate_rad_s) &
+           within(q.rotation_rate_rad_s, kPlausibleHingeRate_rad_s);
   };
   return all(x.position_m, kPlausiblePosition_m) & all(x.com_velocity_m_s, kPlausibleSpeed_m_s) &
-         all(x.body_rate_rad_s, kPlausibleBodyRate_rad_s) & within(x.attitude.w, 2) & side(x.left) & side(x.right);
+         all(x.body_rate_rad_s, kPlausibleBodyRate_rad_s) & within(x.attitude.w, 2) & side(x.left) &
+         side(x.right);
 }
 
 /// Freezes what is no longer plausible; true for lanes that may move on.
@@ -258,11 +272,31 @@ FLAPPY_INLINE State<L> where(typename L::Mask m, State<L> yes, const State<L>& n
   return yes;
 }
 
+/// Fetches a block from memory, a share with every step.
+class Prefetch {
+ public:
+  Prefetch(const void* from, std::size_t bytes, int steps)
+      : at_(static_cast<const char*>(from)),
+        end_(at_ + (from != nullptr ? bytes : 0)),
+        share_((bytes / kLine + steps - 1) / steps * kLine) {}
+  void step() {
+    for (const char* until = at_ + share_; at_ < until && at_ < end_; at_ += kLine)
+      __builtin_prefetch(at_, 1);
+  }
+
+ private:
+  static constexpr std::size_t kLine = 64;
+  const char *at_, *end_;
+  std::size_t share_;
+};
+
 template <bool with_effects, class T>
-void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first_step, int steps) {
+void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first_step,
+                int steps, const Block<T>* next) {
   using L = Lanes<T, kWidth<T>>;
-  const Constants<L> k{plan.step_s, 1 / plan.step_s, plan.world.gravity_m_s2, plan.world.ground_z_m,
-                       plan.world.ceiling_z_m};
+  const Constants<L> k{plan.step_s,           plan.step_s / 2,       1 / plan.step_s, plan.world.gravity_m_s2,
+                       plan.world.ground_z_m, plan.world.ceiling_z_m};
+  Prefetch prefetch(next, sizeof *next, steps);
   for (int first = 0; first < kLanes<T>; first += kWidth<T>) {
     const auto p = load_rows<Parameters<L>>(block.parameters, first);
     auto drive = load_rows<Drive<L>>(block.drive, first);
@@ -270,20 +304,24 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     ActiveEffects<L> effects;
     if constexpr (with_effects) {
       effects.set = in_force.set;
-      for (int i = 0; i < kEffectRows; ++i) effects.parameters[i] = L::load(in_force.rows + i * kLanes<T> + first);
+      for (int i = 0; i < kEffectRows; ++i)
+        effects.parameters[i] = L::load(in_force.rows + i * kLanes<T> + first);
     }
 
     State<L> x = before;
     Vec3<L> com_m = x.position_m + rotation_matrix(x.attitude) * centre_of_mass(p, x);
-    int until_update = static_cast<int>((plan.steps_per_update - first_step % plan.steps_per_update) % plan.steps_per_update);
+    int until_update = static_cast<int>((plan.steps_per_update - first_step % plan.steps_per_update) %
+                                        plan.steps_per_update);
     for (int i = 0; i < steps; ++i, --until_update) {
       if (until_update == 0) {
         update_driver(drive, p, block, first);
         until_update = plan.steps_per_update;
       }
+      prefetch.step();
       physics_step<with_effects>(p, x, drive, com_m, effects, k);
     }
-    x.position_m = where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
+    x.position_m =
+        where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
 
     look_around(x, p, plan.world, block, first);
     const typename L::Mask moves = freeze_implausible(x, block, first);
@@ -293,9 +331,12 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
 }
 
 template <class T>
-void step_any_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first, int steps) {
-  if (in_force.set == 0) step_block<false>(block, in_force, plan, first, steps);
-  else step_block<true>(block, in_force, plan, first, steps);
+void step_any_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first,
+                    int steps, const Block<T>* next) {
+  if (in_force.set == 0)
+    step_block<false>(block, in_force, plan, first, steps, next);
+  else
+    step_block<true>(block, in_force, plan, first, steps, next);
 }
 
 }  // namespace

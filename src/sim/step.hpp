@@ -21,8 +21,10 @@ struct BlockEffects {
 };
 
 /// Advances all lanes of a block by `steps` physics steps, of which the first is number `first` of the batch.
+/// `next`: the block to be fetched from memory meanwhile, if any.
 template <class T>
-using StepBlock = void (*)(Block<T>&, BlockEffects<T>, const StepPlan&, std::int64_t first, int steps);
+using StepBlock = void (*)(Block<T>&, BlockEffects<T>, const StepPlan&, std::int64_t first, int steps,
+                           const Block<T>* next);
 
 template <class T>
 struct Kernel {

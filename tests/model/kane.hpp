@@ -1,5 +1,6 @@
-// An independent formulation of the five bodies, after Kane: ten generalised speeds (velocity of the torso origin and
-// body rate in B, then beta_l, beta_r, theta_l, theta_r), a Jacobian for each body, no elimination, no hinge algebra.
+// An independent formulation of the five bodies, after Kane: ten generalised speeds (velocity of the torso
+// origin and body rate in B, then beta_l, beta_r, theta_l, theta_r), a Jacobian for each body, no
+// elimination, no hinge algebra.
 #pragma once
 
 #include <Eigen/Dense>
@@ -30,7 +31,7 @@ struct KaneSystem {
   Speeds right_side = Speeds::Zero();
   Vector3d com = Vector3d::Zero(), momentum = Vector3d::Zero();  // momentum in B
   double total_mass = 0, kinetic_energy = 0;
-  Vector3d angular_momentum_origin = Vector3d::Zero();           // about the torso origin, in B
+  Vector3d angular_momentum_origin = Vector3d::Zero();  // about the torso origin, in B
 };
 
 inline Vector3d vec(const model::Triple& t) { return {t.x, t.y, t.z}; }
@@ -50,13 +51,16 @@ inline KaneSystem kane(const model::Vehicle& vehicle, const KaneState& x, const 
     m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
     return m;
   };
-  // angular velocity w = Jw u, its rate at zero u' alpha0; velocity of a point Jv u, its acceleration at zero u' a0
-  const auto add_body = [&](const model::RigidBody& body, const Matrix3d& R, const Vector3d& com, const Jacobian& Jw,
-                            const Jacobian& Jv, const Vector3d& alpha0, const Vector3d& a0) {
+  // angular velocity w = Jw u, its rate at zero u' alpha0; velocity of a point Jv u, its acceleration at zero
+  // u' a0
+  const auto add_body = [&](const model::RigidBody& body, const Matrix3d& R, const Vector3d& com,
+                            const Jacobian& Jw, const Jacobian& Jv, const Vector3d& alpha0,
+                            const Vector3d& a0) {
     const Matrix3d I = R * tensor(body.inertia_kg_m2) * R.transpose();
     const Vector3d w = Jw * u, v = Jv * u;
     s.mass += body.mass_kg * Jv.transpose() * Jv + Jw.transpose() * I * Jw;
-    s.right_side -= Jv.transpose() * (body.mass_kg * (a0 - loads.gravity_B)) + Jw.transpose() * (I * alpha0 + w.cross(I * w));
+    s.right_side -= Jv.transpose() * (body.mass_kg * (a0 - loads.gravity_B)) +
+                    Jw.transpose() * (I * alpha0 + w.cross(I * w));
     s.total_mass += body.mass_kg;
     s.com += body.mass_kg * com;
     s.momentum += body.mass_kg * v;
@@ -69,14 +73,17 @@ inline KaneSystem kane(const model::Vehicle& vehicle, const KaneState& x, const 
   Jacobian Jw0 = Jacobian::Zero(), Jv0 = Jacobian::Zero();
   Jw0.block<3, 3>(0, 3).setIdentity();
   Jv0.block<3, 3>(0, 0).setIdentity();
-  const auto point = [&](const Jacobian& Jv, const Jacobian& Jw, const Vector3d& r) -> Jacobian { return Jv - skew(r) * Jw; };
+  const auto point = [&](const Jacobian& Jv, const Jacobian& Jw, const Vector3d& r) -> Jacobian {
+    return Jv - skew(r) * Jw;
+  };
 
   const Vector3d torso_com = vec(vehicle.torso.com_m);
   add_body(vehicle.torso, Matrix3d::Identity(), torso_com, Jw0, point(Jv0, Jw0, torso_com), Vector3d::Zero(),
            origin_acceleration + w0.cross(w0.cross(torso_com)));
   s.right_side += Jv0.transpose() * loads.torso_force + Jw0.transpose() * loads.torso_moment;
 
-  for (int i = 0; i < 2; ++i) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
     const model::Side& side = i == 0 ? vehicle.left : vehicle.right;
     const Vector3d shoulder = vec(side.shoulder_m);
     const Matrix3d Rz = Eigen::AngleAxisd(x.beta[i], Vector3d::UnitZ()).toRotationMatrix();
@@ -86,15 +93,16 @@ inline KaneSystem kane(const model::Vehicle& vehicle, const KaneState& x, const 
     const Vector3d shoulder_acceleration = origin_acceleration + w0.cross(w0.cross(shoulder));
 
     Jacobian Jw_edge = Jw0;
-    Jw_edge.col(6 + i) = Vector3d::UnitZ();
+    Jw_edge.col(6 + column) = Vector3d::UnitZ();
     const Vector3d alpha_edge = w0.cross(Vector3d(0, 0, x.beta_rate[i]));
     const Vector3d w_edge = Jw_edge * u;
     Jacobian Jw_wing = Jw_edge;
-    Jw_wing.col(8 + i) = axis_y;
+    Jw_wing.col(8 + column) = axis_y;
     const Vector3d alpha_wing = alpha_edge + w_edge.cross(x.theta_rate[i] * axis_y);
     const Vector3d w_wing = Jw_wing * u;
 
-    const auto hung = [&](const model::RigidBody& body, const Matrix3d& R, const Jacobian& Jw, const Vector3d& w, const Vector3d& alpha) {
+    const auto hung = [&](const model::RigidBody& body, const Matrix3d& R, const Jacobian& Jw,
+                          const Vector3d& w, const Vector3d& alpha) {
       const Vector3d r = R * vec(body.com_m);
       add_body(body, R, shoulder + r, Jw, point(Jshoulder, Jw, r), alpha,
                shoulder_acceleration + alpha.cross(r) + w.cross(w.cross(r)));
@@ -102,10 +110,10 @@ inline KaneSystem kane(const model::Vehicle& vehicle, const KaneState& x, const 
     hung(side.leading_edge, Rz, Jw_edge, w_edge, alpha_edge);
     hung(side.wing, Ry, Jw_wing, w_wing, alpha_wing);
     const model::Motor& m = side.motor;
-    s.mass(6 + i, 6 + i) += m.efficiency * m.gear_ratio * m.gear_ratio * m.rotor_inertia_kg_m2;
+    s.mass(6 + column, 6 + column) += m.efficiency * m.gear_ratio * m.gear_ratio * m.rotor_inertia_kg_m2;
     s.right_side += Jshoulder.transpose() * loads.force[i] + Jw_wing.transpose() * loads.moment[i];
-    s.right_side[6 + i] += loads.stroke_torque[i];
-    s.right_side[8 + i] += loads.rotation_torque[i];
+    s.right_side[6 + column] += loads.stroke_torque[i];
+    s.right_side[8 + column] += loads.rotation_torque[i];
   }
   s.com /= s.total_mass;
   return s;

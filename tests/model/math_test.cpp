@@ -10,8 +10,8 @@
 namespace flappy::model {
 namespace {
 
-// Rounding of u = x^2 <= 3.1 (half an ulp, 1.2e-7, times df/du < 0.5), of the polynomial times u (3.1 x 3e-8) and of the
-// last sum (3e-8); the same in double.
+// Rounding of u = x^2 <= 3.1 (half an ulp, 1.2e-7, times df/du < 0.5), of the polynomial times u (3.1 x 3e-8)
+// and of the last sum (3e-8); the same in double.
 constexpr double kFloat = 2.2e-7, kDouble = kFloat * 0x1p-29;
 
 TEST(Math, SineAndCosineWithinTheJoints) {
@@ -26,7 +26,8 @@ TEST(Math, SineAndCosineWithinTheJoints) {
 }
 
 TEST(Math, CosineOfHalfTurns) {
-  for (int i = -1000; i <= 1000; ++i) EXPECT_NEAR(cos_pi(i / 1000.0), std::cos(M_PI * i / 1000.0), 2 * kDouble);
+  for (int i = -1000; i <= 1000; ++i)
+    EXPECT_NEAR(cos_pi(i / 1000.0), std::cos(M_PI * i / 1000.0), 2 * kDouble);
   EXPECT_EQ(cos_pi(0.5), 0);
 }
 
@@ -47,7 +48,8 @@ TEST(Math, ExponentialDecays) {
 TEST(Math, Logarithm) {
   std::mt19937_64 engine(1);
   for (int i = 0; i < 20000; ++i) {
-    const double x = std::ldexp(std::uniform_real_distribution<double>(0.5, 1)(engine), static_cast<int>(engine() % 100) - 60);
+    const double x = std::ldexp(std::uniform_real_distribution<double>(0.5, 1)(engine),
+                                static_cast<int>(engine() % 100) - 60);
     EXPECT_NEAR(log(x), std::log(x), 4.5e-16 * std::max(1.0, std::abs(std::log(x)))) << x;
   }
   EXPECT_EQ(log(1.0), 0);
@@ -66,8 +68,8 @@ TEST(Lanes, AreScalarsInEverySlot) {
 TEST(Lanes, FuseWhatIsWritten) {
   using L = Lanes<double, 2>;
   const double a = 1 + 0x1p-30, b = 1 - 0x1p-30;
-  EXPECT_EQ(L(L(a) * L(b) - L(1)).raw[1], -0x1p-60);     // fused: the product is not rounded
-  EXPECT_EQ(L(L(L(a) * L(b)) - L(1)).raw[1], 0);         // taken as a value first: it is
+  EXPECT_EQ(L(L(a) * L(b) - L(1)).raw[1], -0x1p-60);  // fused: the product is not rounded
+  EXPECT_EQ(L(L(L(a) * L(b)) - L(1)).raw[1], 0);      // taken as a value first: it is
 }
 
 }  // namespace

@@ -161,8 +161,8 @@ TEST(Freeze, KeepsTheLastPlausibleState) {
 }
 
 TEST(WingBeat, FollowsItsInputsAndLimits) {
-  // held by huge friction, the wings stay; the current voltage shows in nothing but itself, so compare two vehicles:
-  // an input beyond its limit is the limit
+  // held by huge friction, the wings stay; the current voltage shows in nothing but itself, so compare two
+  // vehicles: an input beyond its limit is the limit
   Batch<double> b(2, test::nominal(), one_thread());
   b.set_input(0, {25, 9, -9, 0.4});
   b.set_input(1, {18, 3, -3.5, 0.15});
@@ -193,7 +193,8 @@ TEST(Effects, VanishExactlyAtTheirVanishingValue) {
   for (const model::EffectEntry& e : model::effects()) {
     model::Vehicle v = test::nominal();
     for (const model::EffectParameter& p : e.parameters) v.effects[e.info.id][p.name] = p.typical;
-    v.effects[e.info.id][e.parameters[static_cast<std::size_t>(e.info.vanishing)].name] = e.info.vanishing_value;
+    v.effects[e.info.id][e.parameters[static_cast<std::size_t>(e.info.vanishing)].name] =
+        e.info.vanishing_value;
     EXPECT_EQ(height_after(v, 0.2, 0.1), height_after(test::nominal(), 0.2, 0.1)) << e.info.id;
     v.effects[e.info.id].clear();  // typical size
     EXPECT_NE(height_after(v, 0.2, 0.1), height_after(test::nominal(), 0.2, 0.1)) << e.info.id;
@@ -210,8 +211,10 @@ TEST(Effects, OfOneFlapperLeaveItsBlockAlone) {
   plain.step(3000);
   mixed.step(3000);
   for (std::size_t i = 0; i < 8; ++i) {
-    if (i == 3) EXPECT_NE(plain.hash(i, i + 1), mixed.hash(i, i + 1));
-    else EXPECT_EQ(plain.hash(i, i + 1), mixed.hash(i, i + 1)) << i;
+    if (i == 3)
+      EXPECT_NE(plain.hash(i, i + 1), mixed.hash(i, i + 1));
+    else
+      EXPECT_EQ(plain.hash(i, i + 1), mixed.hash(i, i + 1)) << i;
   }
 }
 
@@ -222,7 +225,8 @@ TEST(Effects, GroundEffectLiftsNearTheGroundOnly) {
 }
 
 TEST(Effects, BodyDragBrakesAsAnIsolatedBodyWould) {
-  // no air on the wings (density acts on drag alone through the parameter), no gravity: dv/dt = -rho A v^2 / 2m
+  // no air on the wings (density acts on drag alone through the parameter), no gravity: dv/dt = -rho A v^2 /
+  // 2m
   model::Vehicle v = with("body_drag", {{"drag_area_m2", 0.002}, {"centre_z_m", 0}});
   for (model::Side* s : {&v.left, &v.right}) s->planform.mean_chord_m = 1e-5;
   double mass = v.torso.mass_kg;

@@ -2,8 +2,9 @@
 //   explicit   the same leapfrog, but all damping taken at the old rate
 //   midpoint   Runge-Kutta of order 2, two evaluations a step
 //   RK4        the classical one, four evaluations a step
-// Runge-Kutta steps know no stops: a hinge beyond its stop is put back on it and its rate taken away with the impulse
-// that the coupled bodies feel. Dry friction and a hinge at rest on its stop are those of an infinitesimal step.
+// Runge-Kutta steps know no stops: a hinge beyond its stop is put back on it and its rate taken away with the
+// impulse that the coupled bodies feel. Dry friction and a hinge at rest on its stop are those of an
+// infinitesimal step.
 #include <cmath>
 #include <functional>
 
@@ -53,10 +54,11 @@ struct Result {
 };
 
 template <int side>
-SideLoad<double> load(const SideParameters<double>& p, const SideState<double>& q, const HingedWing<double>& g, const V& velocity_B,
-                      double volts) {
-  const auto air = blade_element<side>(p, g.theta, g.theta_rate, turn_back_z(g.beta.sin, g.beta.cos, velocity_B),
-                                       {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate});
+SideLoad<double> load(const SideParameters<double>& p, const SideState<double>& q,
+                      const HingedWing<double>& g, const V& velocity_B, double volts) {
+  const auto air =
+      blade_element<side>(p, g.theta, g.theta_rate, turn_back_z(g.beta.sin, g.beta.cos, velocity_B),
+                          {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate});
   return {air.force_x_N, air.force_z_N, air.moment_Nm, air.moment_Nm.z + side * drive_torque(p, q, volts),
           air.moment_Nm.y - p.rotation_damping_Nm_s * q.rotation_rate_rad_s};
 }
@@ -71,8 +73,8 @@ Result evaluate(const Parameters<double>& p, const Flapper& f, double volts, dou
   const auto load_l = load<+1>(p.left, x.left, l, v + cross(f.body_rate, whole.arm_left), volts);
   const auto load_r = load<-1>(p.right, x.right, r, v + cross(f.body_rate, whole.arm_right), volts);
   const auto inertia = body_inertia(p, x, l, r, whole);
-  const auto drive = drive_body(p, x, l, r, whole, inertia, load_l, load_r, BodyLoad<double>{{0, 0, 0}, {0, 0, 0}}, R.row_z,
-                                kGravity_m_s2);
+  const auto drive = drive_body(p, x, l, r, whole, inertia, load_l, load_r,
+                                BodyLoad<double>{{0, 0, 0}, {0, 0, 0}}, R.row_z, kGravity_m_s2);
   const auto hinges = eliminate_body(p, l, r, whole, inertia, drive, load_l, load_r);
   return {move(p, x, inertia, drive, hinges, step_s, 1 / step_s),
           p.inverse_mass_1_kg * (R * drive.force) - V{0, 0, kGravity_m_s2}};
@@ -91,16 +93,19 @@ void leapfrog(const Parameters<double>& p, Flapper& f, double volts, double step
   hinge_rates(e.motion, step, f.rate);
   for (int i = 0; i < 4; ++i) f.angle[i] += step * f.rate[i];
   f.com_m = f.com_m + step * f.com_velocity;
-  f.q = turned(f.q, step * f.body_rate);
+  f.q = turned(f.q, step / 2 * f.body_rate);
 }
 
 Rates rates(const Parameters<double>& p, const Flapper& f, double volts) {
   const Result e = evaluate(p, f, volts, kInstant_s);
   const V& w = f.body_rate;
-  Rates d{f.com_velocity, e.com_acceleration, e.motion.body_acceleration,
+  Rates d{f.com_velocity,
+          e.com_acceleration,
+          e.motion.body_acceleration,
           {-0.5 * (f.q.x * w.x + f.q.y * w.y + f.q.z * w.z), 0.5 * (f.q.w * w.x + f.q.y * w.z - f.q.z * w.y),
            0.5 * (f.q.w * w.y + f.q.z * w.x - f.q.x * w.z), 0.5 * (f.q.w * w.z + f.q.x * w.y - f.q.y * w.x)},
-          {}, {}};
+          {},
+          {}};
   double next[4];
   hinge_rates(e.motion, kInstant_s, next);
   for (int i = 0; i < 4; ++i) d.angle[i] = f.rate[i], d.rate[i] = (next[i] - f.rate[i]) / kInstant_s;
@@ -118,8 +123,10 @@ Flapper plus(Flapper f, double step, const Rates& d) {
 
 /// Puts hinges back on their stops, with the impulse that takes their rate.
 void stop_hinges(const Parameters<double>& p, Flapper& f, double volts) {
-  const double low[4] = {p.left.stroke_lower_rad, p.right.stroke_lower_rad, p.left.rotation_lower_rad, p.right.rotation_lower_rad};
-  const double high[4] = {p.left.stroke_upper_rad, p.right.stroke_upper_rad, p.left.rotation_upper_rad, p.right.rotation_upper_rad};
+  const double low[4] = {p.left.stroke_lower_rad, p.right.stroke_lower_rad, p.left.rotation_lower_rad,
+                         p.right.rotation_lower_rad};
+  const double high[4] = {p.left.stroke_upper_rad, p.right.stroke_upper_rad, p.left.rotation_upper_rad,
+                          p.right.rotation_upper_rad};
   bool hit = false;
   for (int i = 0; i < 4; ++i) {
     hit = hit || f.angle[i] < low[i] || f.angle[i] > high[i];
@@ -147,7 +154,8 @@ void runge_kutta_4(const Parameters<double>& p, Flapper& f, double volts, double
 
 using Integrator = std::function<void(const Parameters<double>&, Flapper&, double, double)>;
 
-Flight fly(const model::Vehicle& vehicle, const Integrator& integrate, const Parameters<double>& p, double step_s) {
+Flight fly(const model::Vehicle& vehicle, const Integrator& integrate, const Parameters<double>& p,
+           double step_s) {
   Flapper f{};
   f.q.w = 1;
   f.com_m = centre_of_mass(p, state_of(f));
@@ -156,14 +164,16 @@ Flight fly(const model::Vehicle& vehicle, const Integrator& integrate, const Par
   for (int i = 0; i < static_cast<int>(std::lround(0.3 / step_s)); ++i) {
     if (i % per_hold == 0) {
       const double beats = vehicle.driver.flapping_Hz * vehicle.driver.hold_s * (i / per_hold);
-      volts = wing_beat_voltage<+1>(WingBeat<double>{10, 0, 0, 0}, beats - std::floor(beats + 0.5), p.left.voltage_limit_V);
+      volts = wing_beat_voltage<+1>(WingBeat<double>{10, 0, 0, 0}, beats - std::floor(beats + 0.5),
+                                    p.left.voltage_limit_V);
     }
     integrate(p, f, volts, step_s);
     const double norm = std::sqrt(f.q.w * f.q.w + f.q.x * f.q.x + f.q.y * f.q.y + f.q.z * f.q.z);
     f.q = {f.q.w / norm, f.q.x / norm, f.q.y / norm, f.q.z / norm};
   }
-  const V torso = f.com_m + rotation_matrix(f.q) * (V{vehicle.torso.com_m.x, vehicle.torso.com_m.y, vehicle.torso.com_m.z} -
-                                                    centre_of_mass(p, state_of(f)));
+  const V torso = f.com_m + rotation_matrix(f.q) *
+                                (V{vehicle.torso.com_m.x, vehicle.torso.com_m.y, vehicle.torso.com_m.z} -
+                                 centre_of_mass(p, state_of(f)));
   return {torso.x, torso.y, torso.z};
 }
 
@@ -185,8 +195,10 @@ std::vector<IntegratorRow> integrator_study(const model::Vehicle& vehicle) {
   for (const Candidate& c : candidates)
     for (const double us : {500, 200, 100, 50, 20, 10}) {
       const double step_s = us * 1e-6;
-      const Flight flight = fly(vehicle, c.integrate, derive(vehicle, c.implicit_damping ? step_s : 0), step_s);
-      rows.push_back({c.name, step_s, static_cast<int>(std::lround(0.3 / step_s)) * c.evaluations, distance_m(flight, exact)});
+      const Flight flight =
+          fly(vehicle, c.integrate, derive(vehicle, c.implicit_damping ? step_s : 0), step_s);
+      rows.push_back({c.name, step_s, static_cast<int>(std::lround(0.3 / step_s)) * c.evaluations,
+                      distance_m(flight, exact)});
     }
   return rows;
 }

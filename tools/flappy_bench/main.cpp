@@ -1,7 +1,8 @@
 // flappy-bench: speed beside DART and MuJoCo, accuracy against step size, and a batch to look at.
+#include <unistd.h>
+
 #include <cstdio>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "accuracy.hpp"
 #include "flappy/batch.hpp"
@@ -10,8 +11,9 @@
 #include "model/vehicle_file.hpp"
 #include "speed.hpp"
 #ifdef FLAPPY_HAVE_PEERS
-#include <dart/config.hpp>
 #include <mujoco/mujoco.h>
+
+#include <dart/config.hpp>
 #endif
 
 namespace flappy::bench {
@@ -36,26 +38,30 @@ void show_progress(int done, int total) {
 Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
   const SpeedReport report = measure_speed(vehicle, options, show_progress);
   const double best = *report.median("float");
-  std::printf("one core, median of %d [range], whole step, %s\n", options.rounds, sim::best_instruction_set().c_str());
+  std::printf("one core, median of %d [range], whole step, %s\n", options.rounds,
+              sim::best_instruction_set().c_str());
   std::printf("  %-20s %12s %20s %14s\n", "", "M steps/s", "", "float is x");
   for (const auto& row : report.rows)
     std::printf("  %-20s %12.3f  [%7.3f .. %7.3f] %12.2f\n", row.name.c_str(), row.steps_per_s.median / 1e6,
                 row.steps_per_s.low / 1e6, row.steps_per_s.high / 1e6, best / row.steps_per_s.median);
-  std::printf("two threads are %.2f [%.2f .. %.2f] x one\n", report.two_thread_scaling.median, report.two_thread_scaling.low,
-              report.two_thread_scaling.high);
+  std::printf("two threads are %.2f [%.2f .. %.2f] x one\n", report.two_thread_scaling.median,
+              report.two_thread_scaling.low, report.two_thread_scaling.high);
   for (const auto& size : report.sizes)
-    std::printf("  %6zu flappers: %.2f ns per flapper and step [%.2f .. %.2f]\n", size.flappers, size.ns_per_step.median,
-                size.ns_per_step.low, size.ns_per_step.high);
+    std::printf("  %6zu flappers: %.2f ns per flapper and step [%.2f .. %.2f]\n", size.flappers,
+                size.ns_per_step.median, size.ns_per_step.low, size.ns_per_step.high);
   if (report.frozen > 0) std::printf("  %zu flappers froze: figures are not to be trusted\n", report.frozen);
 
   const double thrust_error = mean_thrust_N(vehicle, 1e-4) / kConvergedThrust_N - 1;
   const double position_error = distance_m(free_flight(vehicle, 1e-4), free_flight(vehicle, 5e-6));
   const std::size_t bytes = sim::Batch<float>::bytes_per_flapper();
-  std::printf("at 100 us: mean thrust at 10 V %+.3f %% from converged, %.2f mm from the 5 us run after 0.3 s\n", 100 * thrust_error,
-              1e3 * position_error);
+  std::printf(
+      "at 100 us: mean thrust at 10 V %+.3f %% from converged, %.2f mm from the 5 us run after 0.3 s\n",
+      100 * thrust_error, 1e3 * position_error);
   std::printf("%zu bytes per float flapper\n", bytes);
 
-  const auto or_null = [&](const char* name) { return report.median(name) ? Json(*report.median(name)) : Json(nullptr); };
+  const auto or_null = [&](const char* name) {
+    return report.median(name) ? Json(*report.median(name)) : Json(nullptr);
+  };
   return {{"float_steps_per_s", best},
           {"double_steps_per_s", *report.median("double")},
           {"two_thread_scaling", report.two_thread_scaling.median},
@@ -75,14 +81,20 @@ Json convergence(const model::Vehicle& vehicle) {
   std::printf("  %8s %14s %12s %18s\n", "step us", "error mm", "thrust N", "from converged");
   for (const StepRow& r : step_study(vehicle)) {
     const double error = r.thrust_N / kConvergedThrust_N - 1;
-    std::printf("  %8.0f %14.3f %12.6f %+16.3f %%\n", r.step_s * 1e6, r.position_error_m * 1e3, r.thrust_N, 100 * error);
-    steps.push_back({{"step_s", r.step_s}, {"position_error_m", r.position_error_m}, {"thrust_N", r.thrust_N}});
+    std::printf("  %8.0f %14.3f %12.6f %+16.3f %%\n", r.step_s * 1e6, r.position_error_m * 1e3, r.thrust_N,
+                100 * error);
+    steps.push_back(
+        {{"step_s", r.step_s}, {"position_error_m", r.position_error_m}, {"thrust_N", r.thrust_N}});
   }
   std::printf("integrators on the same equations, free flight against our 1 us run\n");
   std::printf("  %-10s %8s %14s %14s\n", "", "step us", "evaluations", "error mm");
   for (const IntegratorRow& r : integrator_study(vehicle)) {
-    std::printf("  %-10s %8.0f %14d %14.3f\n", r.integrator.c_str(), r.step_s * 1e6, r.evaluations, r.position_error_m * 1e3);
-    integrators.push_back({{"integrator", r.integrator}, {"step_s", r.step_s}, {"evaluations", r.evaluations}, {"position_error_m", r.position_error_m}});
+    std::printf("  %-10s %8.0f %14d %14.3f\n", r.integrator.c_str(), r.step_s * 1e6, r.evaluations,
+                r.position_error_m * 1e3);
+    integrators.push_back({{"integrator", r.integrator},
+                           {"step_s", r.step_s},
+                           {"evaluations", r.evaluations},
+                           {"position_error_m", r.position_error_m}});
   }
   return {{"steps", steps}, {"integrators", integrators}};
 }
@@ -92,15 +104,22 @@ Json convergence(const model::Vehicle& vehicle) {
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  io::Program program("flappy-bench", "Speed and accuracy of the simulator, side by side with DART and MuJoCo.", bench::facts());
+  io::Program program("flappy-bench",
+                      "Speed and accuracy of the simulator, side by side with DART and MuJoCo.",
+                      bench::facts());
   CLI::App& app = program.app();
   std::string vehicle = FLAPPY_CONFIGS "/vehicles/hummingbird_nominal.toml";
   bench::SpeedOptions options;
   app.add_option("--vehicle", vehicle, "vehicle file")->capture_default_str();
-  app.add_option("--rounds", options.rounds, "rounds to take the median of")->check(CLI::Range(1, 1000))->capture_default_str();
-  app.add_option("--seconds", options.seconds, "of each measurement")->check(CLI::Range(0.01, 60.0))->capture_default_str();
+  app.add_option("--rounds", options.rounds, "rounds to take the median of")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  app.add_option("--seconds", options.seconds, "of each measurement")
+      ->check(CLI::Range(0.01, 60.0))
+      ->capture_default_str();
   app.add_flag("!--no-peers", options.peers, "leave DART and MuJoCo out");
-  CLI::App* convergence = app.add_subcommand("convergence", "error against step size, and against work for other integrators");
+  CLI::App* convergence =
+      app.add_subcommand("convergence", "error against step size, and against work for other integrators");
   CLI::App* batch = app.add_subcommand("batch", "fly a batch at one input and summarise it");
   std::string config;
   std::vector<std::string> overrides;

@@ -34,7 +34,8 @@ double wall_seconds() {
 template <class T>
 class Flock {
  public:
-  Flock(const std::vector<model::Vehicle>& vehicles, std::size_t count, int threads, const std::string& instruction_set = "")
+  Flock(const std::vector<model::Vehicle>& vehicles, std::size_t count, int threads,
+        const std::string& instruction_set = "")
       : batch_(count, vehicles[0], {kStep_s, threads, {}, instruction_set}) {
     for (std::size_t i = 0; i < count; ++i) batch_.set_vehicle(i, vehicles[i % vehicles.size()]);
   }
@@ -114,20 +115,30 @@ SpeedReport measure_speed(const model::Vehicle& vehicle, const SpeedOptions& opt
     const std::string suffix = set == sets.rbegin() ? "" : ", " + *set;
     single.push_back(std::make_shared<Flock<float>>(vehicles, 4096, 1, *set));
     twice.push_back(std::make_shared<Flock<double>>(vehicles, 4096, 1, *set));
-    candidates.push_back({"float" + suffix, [f = single.back(), &options] { return 1 / f->run(options.seconds, processor_seconds); }, {}});
-    candidates.push_back({"double" + suffix, [f = twice.back(), &options] { return 1 / f->run(options.seconds, processor_seconds); }, {}});
+    candidates.push_back(
+        {"float" + suffix,
+         [f = single.back(), &options] { return 1 / f->run(options.seconds, processor_seconds); },
+         {}});
+    candidates.push_back(
+        {"double" + suffix,
+         [f = twice.back(), &options] { return 1 / f->run(options.seconds, processor_seconds); },
+         {}});
   }
 #ifdef FLAPPY_HAVE_PEERS
   if (options.peers) {
     const double hz = vehicle.driver.flapping_Hz;
-    candidates.push_back({"MuJoCo", [&vehicle, &options, hz] {
+    candidates.push_back({"MuJoCo",
+                          [&vehicle, &options, hz] {
                             oracle::MujocoPeer peer(vehicle, {.step_s = kStep_s});
                             return peer_steps_per_s(peer, hz, options.seconds);
-                          }, {}});
-    candidates.push_back({"DART", [&vehicle, &options, hz] {
+                          },
+                          {}});
+    candidates.push_back({"DART",
+                          [&vehicle, &options, hz] {
                             oracle::DartPeer peer(vehicle, {.step_s = kStep_s});
                             return peer_steps_per_s(peer, hz, options.seconds);
-                          }, {}});
+                          },
+                          {}});
   }
 #endif
   Flock<float> one(vehicles, 4096, 1), two(vehicles, 4096, 2);
@@ -148,7 +159,8 @@ SpeedReport measure_speed(const model::Vehicle& vehicle, const SpeedOptions& opt
   SpeedReport report;
   for (Candidate& c : candidates) report.rows.push_back({c.name, summary(std::move(c.values))});
   report.two_thread_scaling = summary(std::move(scaling));
-  for (std::size_t i = 0; i < sizes.size(); ++i) report.sizes.push_back({sizes[i], summary(std::move(size_values[i]))});
+  for (std::size_t i = 0; i < sizes.size(); ++i)
+    report.sizes.push_back({sizes[i], summary(std::move(size_values[i]))});
   for (const auto& f : single) report.frozen += f->frozen();
   for (const auto& f : flocks) report.frozen += f->frozen();
   return report;

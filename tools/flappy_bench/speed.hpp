@@ -22,14 +22,14 @@ struct SpeedReport {
     std::string name;
     Figure steps_per_s;
   };
-  std::vector<Row> rows;            // one core
-  Figure two_thread_scaling;        // wall time, pair by pair
+  std::vector<Row> rows;      // one core
+  Figure two_thread_scaling;  // wall time, pair by pair
   struct Size {
     std::size_t flappers;
-    Figure ns_per_step;             // per flapper and step, one core
+    Figure ns_per_step;  // per flapper and step, one core
   };
   std::vector<Size> sizes;
-  std::size_t frozen = 0;           // must stay 0: a frozen flapper would still be counted as work
+  std::size_t frozen = 0;  // must stay 0: a frozen flapper would still be counted as work
 
   std::optional<double> median(const std::string& name) const;
 };

@@ -11,8 +11,8 @@ inline namespace FLAPPY_ISA {
 
 struct BodyDrag {
   static constexpr EffectInfo kInfo{"body_drag", Stage::world, 0, 0.0, "Hoerner 1965"};
-  static constexpr std::array<EffectParameter, 2> kParameters{{{"drag_area_m2", 0, 0.01, 0.0015},
-                                                               {"centre_z_m", -0.1, 0.1, 0}}};
+  static constexpr std::array<EffectParameter, 2> kParameters{
+      {{"drag_area_m2", 0, 0.01, 0.0015}, {"centre_z_m", -0.1, 0.1, 0}}};
 
   template <class T>
   static FLAPPY_INLINE void world(const T (&parameter)[2], const Surroundings<T>& s, BodyLoad<T>& load) {

@@ -2,8 +2,8 @@
 //   kInfo                what it is called, where it acts, its parameters, its source
 //   kParameters          their number
 //   one or more stages   static templates over the scalar type that change what the stage hands on
-// and one line in registry.hpp. Simulation, randomisation, the vehicle file and diagnosis read that one description.
-// A stage is found by its name; an effect without it costs nothing there:
+// and one line in registry.hpp. Simulation, randomisation, the vehicle file and diagnosis read that one
+// description. A stage is found by its name; an effect without it costs nothing there:
 //   air(parameters, surroundings, AirFactor&)     scales what the air does to the wings
 //   world(parameters, surroundings, BodyLoad&)    loads the body besides its wings
 #pragma once
@@ -18,16 +18,16 @@ namespace flappy::model {
 enum class Stage { air, wing, drive, world, sensor };
 
 struct EffectParameter {
-  const char* name;   ///< with its unit as suffix
-  double low, high;   ///< accepted in a vehicle file
-  double typical;     ///< when switched on without a figure of its own
+  const char* name;  ///< with its unit as suffix
+  double low, high;  ///< accepted in a vehicle file
+  double typical;    ///< when switched on without a figure of its own
 };
 
 struct EffectInfo {
   const char* id;
   Stage stage;
-  int vanishing;            ///< index of the parameter that switches the effect off,
-  double vanishing_value;   ///< exactly, at this value
+  int vanishing;           ///< index of the parameter that switches the effect off,
+  double vanishing_value;  ///< exactly, at this value
   const char* source;
 };
 
@@ -36,12 +36,12 @@ inline namespace FLAPPY_ISA {
 /// What effects may look at.
 template <class T>
 struct Surroundings {
-  Matrix3<T> attitude;              // R_WB
-  Vec3<T> position_m;               // torso origin, in W
-  Vec3<T> velocity_B_m_s;           // of the torso origin, in B
-  Vec3<T> body_rate_rad_s;          // in B
-  Vec3<T> com_m;                    // vehicle's centre of mass from the torso origin, in B
-  T stroke_plane_m;                 // height of the shoulders above the torso origin along z of B
+  Matrix3<T> attitude;      // R_WB
+  Vec3<T> position_m;       // torso origin, in W
+  Vec3<T> velocity_B_m_s;   // of the torso origin, in B
+  Vec3<T> body_rate_rad_s;  // in B
+  Vec3<T> com_m;            // vehicle's centre of mass from the torso origin, in B
+  T stroke_plane_m;         // height of the shoulders above the torso origin along z of B
   T air_density_kg_m3;
   T ground_z_m, ceiling_z_m;
 };

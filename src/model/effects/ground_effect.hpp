@@ -1,9 +1,11 @@
 // Thrust gained near the ground, as a factor on what the air does to the wings:
 //   k = 1 + gain exp(-h / length),  h the height of the stroke plane over the ground
-// [1] He, Leang et al., In-ground-effect modeling and nonlinear-disturbance observer for multirotor UAV control,
+// [1] He, Leang et al., In-ground-effect modeling and nonlinear-disturbance observer for multirotor UAV
+// control,
 //     J. Dyn. Syst. Meas. Control 141(7), 071013, 2019: k = 1 + C_a exp(-C_b h / R), fitted to small rotors.
-// Finite when standing, unlike 1 / (1 - (R / 4h)^2) (Cheeseman and Bennett 1955), which it meets within 0.4 % for
-// h > R with gain 0.27, length 0.7 R. Level attitude and a flat ground are assumed; below the ground h counts as 0.
+// Finite when standing, unlike 1 / (1 - (R / 4h)^2) (Cheeseman and Bennett 1955), which it meets within 0.4 %
+// for h > R with gain 0.27, length 0.7 R. Level attitude and a flat ground are assumed; below the ground h
+// counts as 0.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -14,7 +16,8 @@ inline namespace FLAPPY_ISA {
 
 struct GroundEffect {
   static constexpr EffectInfo kInfo{"ground_effect", Stage::air, 0, 0.0, "He, Leang et al. 2019"};
-  static constexpr std::array<EffectParameter, 2> kParameters{{{"gain", 0, 1, 0.15}, {"length_m", 0.005, 0.5, 0.06}}};
+  static constexpr std::array<EffectParameter, 2> kParameters{
+      {{"gain", 0, 1, 0.15}, {"length_m", 0.005, 0.5, 0.06}}};
 
   template <class T>
   static FLAPPY_INLINE void air(const T (&parameter)[2], const Surroundings<T>& s, AirFactor<T>& factor) {
