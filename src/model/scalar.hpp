@@ -18,6 +18,11 @@ inline namespace FLAPPY_ISA {
 FLAPPY_INLINE float where(bool condition, float yes, float no) { return condition ? yes : no; }
 FLAPPY_INLINE double where(bool condition, double yes, double no) { return condition ? yes : no; }
 FLAPPY_INLINE bool any(bool condition) { return condition; }
+/// any(), where the compiler is to favour the other way.
+template <class M>
+FLAPPY_INLINE bool rarely(const M& mask) {
+  return __builtin_expect(any(mask), 0);
+}
 FLAPPY_INLINE float min(float a, float b) { return a < b ? a : b; }
 FLAPPY_INLINE double min(double a, double b) { return a < b ? a : b; }
 FLAPPY_INLINE float max(float a, float b) { return a > b ? a : b; }

@@ -135,7 +135,7 @@ FLAPPY_INLINE BodyInertia<T> body_inertia(const Parameters<T>& p, const State<T>
   const Sym3<T> second = second_moment_about_com(p, l, r, v.com);
   BodyInertia<T> b{p.inverse_mass_1_kg, second, inverse(inertia_of(second))};
   const auto held = x.support > T(0);
-  if (any(held)) {
+  if (rarely(held)) {
     b.inverse_mass = where(held, T(0), b.inverse_mass);
     b.inverse.scale = where(held, T(0), b.inverse.scale);
   }
@@ -174,7 +174,7 @@ FLAPPY_INLINE BodyDrive<T> drive_body(const Parameters<T>& p, const State<T>& x,
   const auto shoulder = [&](const Vec3<T>& d) { return common + (dot(w, d) * w - w2 * d); };
   BodyDrive<T> drive{(air_l + air_r) + body.force_B, t, shoulder(v.arm_left), shoulder(v.arm_right)};
   const auto held = x.support > T(0);
-  if (any(held)) {
+  if (rarely(held)) {
     const Vec3<T> rest = gravity * up_B;
     drive.shoulder_left = where(held, rest, drive.shoulder_left);
     drive.shoulder_right = where(held, rest, drive.shoulder_right);
@@ -313,7 +313,7 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
     return (turn < q.lowest_turn) | (turn > q.highest_turn);
   };
   auto out_l = beyond(stroke_l, m.stroke_left), out_r = beyond(stroke_r, m.stroke_right);
-  if (any(out_l |
+  if (rarely(out_l |
           out_r)) {  // a stroke reaches its stop: once more, with its turn given and its row of K gone
     const T zero(0);
     const Sym2<T>& S = h.strokes;
@@ -336,7 +336,7 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
     // the landing of one may throw the other out; lanes where it does not get the same numbers again
     const auto also_l = beyond(stroke_l, m.stroke_left) & !out_l,
                also_r = beyond(stroke_r, m.stroke_right) & !out_r;
-    if (any(also_l | also_r)) {
+    if (rarely(also_l | also_r)) {
       stop_l = where(also_l, landing(stroke_l, m.stroke_left), stop_l);
       stop_r = where(also_r, landing(stroke_r, m.stroke_right), stop_r);
       out_l = out_l | also_l;

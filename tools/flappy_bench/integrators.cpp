@@ -10,10 +10,7 @@
 
 #include "accuracy.hpp"
 #include "model/derive.hpp"
-#include "model/motor.hpp"
-#include "model/vehicle_dynamics.hpp"
-#include "model/wing_aerodynamics.hpp"
-#include "model/wing_beat.hpp"
+#include "sim/physics_step.hpp"
 
 namespace flappy::bench {
 namespace {
@@ -53,16 +50,6 @@ struct Result {
   V com_acceleration;
 };
 
-template <int side>
-SideLoad<double> load(const SideParameters<double>& p, const SideState<double>& q,
-                      const HingedWing<double>& g, const V& velocity_B, double volts) {
-  const auto air =
-      blade_element<side>(p, g.theta, g.theta_rate, turn_back_z(g.beta.sin, g.beta.cos, velocity_B),
-                          {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate});
-  return {air.force_x_N, air.force_z_N, air.moment_Nm, air.moment_Nm.z + side * drive_torque(p, q, volts),
-          air.moment_Nm.y - p.rotation_damping_Nm_s * q.rotation_rate_rad_s};
-}
-
 Result evaluate(const Parameters<double>& p, const Flapper& f, double volts, double step_s) {
   const State<double> x = state_of(f);
   const Matrix3<double> R = rotation_matrix(f.q);
@@ -70,8 +57,10 @@ Result evaluate(const Parameters<double>& p, const Flapper& f, double volts, dou
   const auto r = place_wing<-1>(p.right, x.right, f.body_rate);
   const auto whole = whole_vehicle(p, l, r);
   const V v = transpose_times(R, f.com_velocity) - whole.com_rate;
-  const auto load_l = load<+1>(p.left, x.left, l, v + cross(f.body_rate, whole.arm_left), volts);
-  const auto load_r = load<-1>(p.right, x.right, r, v + cross(f.body_rate, whole.arm_right), volts);
+  const auto air_l = sim::air_on_wing<+1>(p.left, l, v + cross(f.body_rate, whole.arm_left));
+  const auto air_r = sim::air_on_wing<-1>(p.right, r, v + cross(f.body_rate, whole.arm_right));
+  const auto load_l = sim::load_side<+1>(p.left, x.left, air_l, volts);
+  const auto load_r = sim::load_side<-1>(p.right, x.right, air_r, volts);
   const auto inertia = body_inertia(p, x, l, r, whole);
   const auto drive = drive_body(p, x, l, r, whole, inertia, load_l, load_r,
                                 BodyLoad<double>{{0, 0, 0}, {0, 0, 0}}, R.row_z, kGravity_m_s2);

@@ -9,6 +9,7 @@
 #include "hover.hpp"
 #include "io/program.hpp"
 #include "model/vehicle_file.hpp"
+#include "roof.hpp"
 #include "speed.hpp"
 #ifdef FLAPPY_HAVE_PEERS
 #include <mujoco/mujoco.h>
@@ -51,6 +52,15 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
                 size.ns_per_step.median, size.ns_per_step.low, size.ns_per_step.high);
   if (report.frozen > 0) std::printf("  %zu flappers froze: figures are not to be trusted\n", report.frozen);
 
+  const Operations ops = count_operations();
+  const double peak = peak_multiply_adds_per_s(), roof = peak / static_cast<double>(ops.on_multiply_pipes());
+  std::printf(
+      "a step is %ld flops: %ld multiplies, %ld fused multiply-adds, %ld adds, %ld divisions and roots, %ld "
+      "others\n",
+      ops.flops(), ops.multiply, ops.fused, ops.add, ops.divide + ops.root, ops.other);
+  std::printf("this core does %.0f G multiply-adds/s: roof %.0f M steps/s in float, reached %.0f %%\n",
+              peak / 1e9, roof / 1e6, 100 * best / roof);
+
   const double thrust_error = mean_thrust_N(vehicle, 1e-4) / kConvergedThrust_N - 1;
   const double position_error = distance_m(free_flight(vehicle, 1e-4), free_flight(vehicle, 5e-6));
   const std::size_t bytes = sim::Batch<float>::bytes_per_flapper();
@@ -72,6 +82,8 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
           {"bytes_per_flapper", bytes},
           {"ns_per_step_1000", report.sizes.front().ns_per_step.median},
           {"ns_per_step_100000", report.sizes.back().ns_per_step.median},
+          {"flops_per_step", ops.flops()},
+          {"roof_steps_per_s", roof},
           {"instruction_set", sim::best_instruction_set()}};
 }
 
