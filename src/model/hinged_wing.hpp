@@ -3,9 +3,9 @@
 //
 // All in the leading edge's frame L (B turned by beta about z), about the shoulder. h: first moment of mass,
 // P: second moment (integral of r r^T; inertia J = tr P - P); index w: wing, turned by theta about y; none:
-// wing and edge. With body rate w = (a, b, c), relative rates W_edge = (0, 0, B), W_wing = (0, T, B), B =
+// wing and edge. With body rate w, relative rates W_edge = (0, 0, B), W_wing = (0, T, B), B =
 // beta', T = theta':
-//   relative acceleration of a point: 2 w x (W x r) + W x (W x r) + W' x r,  W'_wing = (-B T, 0, 0) at zero
+//   relative acceleration of a point: 2 w x (W x r) + W x (W x r) + W' x r,  W'_wing = (-b t, 0, 0) at zero
 //   beta'', theta'' integral r x (2 w x (W x r)) = 2 (P w) x W      integral r x (W x (W x r)) = (P W) x W
 // Both are exact; summed over the two bodies they give `relative_force` and `relative_moment`.
 #pragma once
@@ -16,19 +16,23 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
+/// Where a wing is and how it moves relative to B.
 template <class T>
-struct HingedWing {
+struct WingPose {
   SinCos<T> beta, theta;
   T beta_rate, theta_rate;
   Vec3<T> body_rate_L;
-  // relative to B, in B
-  Vec3<T> moment;                      // h
-  Sym3<T> second;                      // P
-  Vec3<T> momentum;                    // of the relative motion
-  Vec3<T> rotation_column;             // d momentum / d theta'; that of beta' is (-h_y, h_x, 0)
-  Vec3<T> stroke_spin, rotation_spin;  // d angular momentum about the shoulder / d beta', d theta'
+  Vec3<T> wing_moment_L, moment_L;  // h_w, h
+  Vec3<T> moment, momentum;         // h and the momentum of the relative motion, in B
+};
+
+/// What it opposes to acceleration, and what its motion asks for at none.
+template <class T>
+struct WingInertia {
+  Sym3<T> second;                      // P, in B
+  Vec3<T> rotation_column;             // d momentum / d theta', in B; that of beta' is (-h_y, h_x, 0)
+  Vec3<T> stroke_spin, rotation_spin;  // d angular momentum about the shoulder / d beta', d theta', in B
   T stroke_inertia, rotation_inertia, cross_inertia;
-  // bias: what inertia asks of the hinges at zero acceleration
   Vec3<T> relative_force_L, relative_moment_L;  // Coriolis and centripetal, without the frozen part
   T stroke_bias, rotation_bias;                 // hinge torques, with the frozen part about the shoulder
 };
@@ -42,47 +46,50 @@ FLAPPY_INLINE Vec3<T> moment_about_shoulder(const SideParameters<T>& p, const Si
 }
 
 template <int side, class T>
-FLAPPY_INLINE HingedWing<T> place_wing(const SideParameters<T>& p, const SideState<T>& q,
-                                       const Vec3<T>& body_rate) {
-  HingedWing<T> g;
+FLAPPY_INLINE WingPose<T> place_wing(const SideParameters<T>& p, const SideState<T>& q,
+                                     const Vec3<T>& body_rate) {
+  WingPose<T> g;
   g.beta = sin_cos(T(T(side) * q.stroke_rad));
   g.theta = sin_cos(q.rotation_rad);
-  const T B = g.beta_rate = T(side) * q.stroke_rate_rad_s;
-  const T W = g.theta_rate = q.rotation_rate_rad_s;
+  const T b = g.beta_rate = T(side) * q.stroke_rate_rad_s;
+  const T t = g.theta_rate = q.rotation_rate_rad_s;
+  const Vec3<T> hw = g.wing_moment_L = turn_y(g.theta.sin, g.theta.cos, p.wing_moment_kg_m);
+  const Vec3<T> h = g.moment_L = p.edge_moment_kg_m + hw;
+  g.moment = turn_z(g.beta.sin, g.beta.cos, h);
+  g.momentum = turn_z(g.beta.sin, g.beta.cos, Vec3<T>{t * hw.z - b * h.y, b * h.x, -(t * hw.x)});
+  g.body_rate_L = turn_back_z(g.beta.sin, g.beta.cos, body_rate);
+  return g;
+}
 
-  const Vec3<T> hw = turn_y(g.theta.sin, g.theta.cos, p.wing_moment_kg_m);
+template <class T>
+FLAPPY_INLINE WingInertia<T> wing_inertia(const SideParameters<T>& p, const WingPose<T>& g) {
+  WingInertia<T> i;
+  const Vec3<T>&w = g.body_rate_L, &h = g.moment_L, &hw = g.wing_moment_L;
+  const T &b = g.beta_rate, &t = g.theta_rate;
   const Sym3<T> pw = turn_y(g.theta.sin, g.theta.cos, p.wing_second_kg_m2);
-  const Vec3<T> h = p.edge_moment_kg_m + hw;
   const Sym3<T> P = p.edge_second_kg_m2 + pw;
+  i.second = turn_z(g.beta.sin, g.beta.cos, P);
+  i.stroke_inertia = P.xx + P.yy;
+  i.rotation_inertia = pw.xx + pw.zz;
+  i.cross_inertia = -pw.yz;
+  i.rotation_column = turn_z(g.beta.sin, g.beta.cos, hw.z, T(-hw.x));
+  i.stroke_spin = {-i.second.xz, -i.second.yz, i.stroke_inertia};
+  i.rotation_spin = turn_z(g.beta.sin, g.beta.cos, Vec3<T>{-pw.xy, i.rotation_inertia, -pw.yz});
 
-  const auto to_body = [&](const Vec3<T>& v) { return turn_z(g.beta.sin, g.beta.cos, v); };
-  g.moment = to_body(h);
-  g.second = turn_z(g.beta.sin, g.beta.cos, P);
-  g.rotation_column = turn_z(g.beta.sin, g.beta.cos, hw.z, T(-hw.x));
-  g.stroke_inertia = P.xx + P.yy;
-  g.stroke_spin = {-g.second.xz, -g.second.yz, g.stroke_inertia};
-  g.rotation_spin = to_body({-pw.xy, pw.xx + pw.zz, -pw.yz});
-  g.rotation_inertia = pw.xx + pw.zz;
-  g.cross_inertia = -pw.yz;
-
-  const Vec3<T> w = g.body_rate_L = turn_back_z(g.beta.sin, g.beta.cos, body_rate);
   const T Pw_x = P.xx * w.x + (P.xy * w.y + P.xz * w.z), Pw_y = P.xy * w.x + (P.yy * w.y + P.yz * w.z);
   const T pw_x = pw.xx * w.x + (pw.xy * w.y + pw.xz * w.z), pw_z = pw.xz * w.x + (pw.yz * w.y + pw.zz * w.z);
-  const T m_x = (Pw_x + Pw_x) + (B * P.xz + W * pw.xy), m_y = (Pw_y + Pw_y) + (B * P.yz + W * pw.yy);
-  const T k_x = (pw_x + pw_x) + (B * pw.xz + W * pw.xy), k_z = (pw_z + pw_z) + (B * pw.zz + W * pw.yz);
-  const T BW = B * W, W2 = W * W;
-  const T wing_y = BW * pw.xy - k_x * B;
-  g.relative_moment_L = {m_y * B - (k_z * W + BW * T(pw.yy + pw.zz)), BW * pw.xy - m_x * B,
-                         k_x * W + BW * pw.xz};
-
-  const Vec3<T> twice{w.x + w.x, w.y + w.y, w.z + w.z + B};
-  const Vec3<T> momentum_L{W * hw.z - B * h.y, B * h.x, -(W * hw.x)};
-  g.momentum = to_body(momentum_L);
-  g.relative_force_L = cross(twice, momentum_L) + Vec3<T>{-(W2 * hw.x), BW * hw.z, -(W2 * hw.z)};
-
-  g.stroke_bias = g.relative_moment_L.z + T(Pw_x * w.y - Pw_y * w.x);
-  g.rotation_bias = wing_y + T(pw_z * w.x - pw_x * w.z);
-  return g;
+  const T m_x = (Pw_x + Pw_x) + (b * P.xz + t * pw.xy), m_y = (Pw_y + Pw_y) + (b * P.yz + t * pw.yy);
+  const T k_x = (pw_x + pw_x) + (b * pw.xz + t * pw.xy), k_z = (pw_z + pw_z) + (b * pw.zz + t * pw.yz);
+  const T bt = b * t, t2 = t * t;
+  const T wing_y = bt * pw.xy - k_x * b;
+  i.relative_moment_L = {m_y * b - (k_z * t + bt * T(pw.yy + pw.zz)), bt * pw.xy - m_x * b,
+                         k_x * t + bt * pw.xz};
+  const Vec3<T> twice{w.x + w.x, w.y + w.y, w.z + w.z + b};
+  const Vec3<T> momentum_L{t * hw.z - b * h.y, b * h.x, -(t * hw.x)};
+  i.relative_force_L = cross(twice, momentum_L) + Vec3<T>{-(t2 * hw.x), bt * hw.z, -(t2 * hw.z)};
+  i.stroke_bias = i.relative_moment_L.z + T(Pw_x * w.y - Pw_y * w.x);
+  i.rotation_bias = wing_y + T(pw_z * w.x - pw_x * w.z);
+  return i;
 }
 
 }  // namespace FLAPPY_ISA

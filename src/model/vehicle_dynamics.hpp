@@ -23,6 +23,12 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
+/// The same thing of both sides.
+template <class S>
+struct Sides {
+  S left, right;
+};
+
 /// What acts on one side during a step.
 template <class T>
 struct SideLoad {
@@ -44,10 +50,9 @@ struct WholeVehicle {
 };
 
 template <class T>
-FLAPPY_INLINE WholeVehicle<T> whole_vehicle(const Parameters<T>& p, const HingedWing<T>& l,
-                                            const HingedWing<T>& r) {
-  const Vec3<T> com = p.inverse_mass_1_kg * (p.fixed_moment_kg_m + (l.moment + r.moment));
-  return {com, p.inverse_mass_1_kg * (l.momentum + r.momentum), p.left.shoulder_m - com,
+FLAPPY_INLINE WholeVehicle<T> whole_vehicle(const Parameters<T>& p, const Sides<WingPose<T>>& pose) {
+  const Vec3<T> com = p.inverse_mass_1_kg * (p.fixed_moment_kg_m + (pose.left.moment + pose.right.moment));
+  return {com, p.inverse_mass_1_kg * (pose.left.momentum + pose.right.momentum), p.left.shoulder_m - com,
           p.right.shoulder_m - com};
 }
 
@@ -68,14 +73,14 @@ FLAPPY_INLINE Sym3<T> hung_at(const Vec3<T>& s, const Vec3<T>& h) {
 
 /// Second moment of the whole vehicle about C in B.
 template <class T>
-FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const HingedWing<T>& l,
-                                              const HingedWing<T>& r, const Vec3<T>& com) {
-  const Sym3<T> o =
-      p.fixed_second_kg_m2 + (hung_at(p.left.shoulder_m, l.moment) + hung_at(p.right.shoulder_m, r.moment));
-  const Vec3<T> m = p.fixed_moment_kg_m + (l.moment + r.moment);
+FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const Sides<WingPose<T>>& pose,
+                                              const Sides<WingInertia<T>>& wing, const Vec3<T>& com) {
+  const Sym3<T> o = p.fixed_second_kg_m2 + (hung_at(p.left.shoulder_m, pose.left.moment) +
+                                            hung_at(p.right.shoulder_m, pose.right.moment));
+  const Vec3<T> m = p.fixed_moment_kg_m + (pose.left.moment + pose.right.moment);
   const Sym3<T> placed{o.xx - m.x * com.x, o.yy - m.y * com.y, o.zz - m.z * com.z,
                        o.xy - m.x * com.y, o.yz - m.y * com.z, o.xz - m.x * com.z};
-  return placed + (l.second + r.second);
+  return placed + (wing.left.second + wing.right.second);
 }
 
 /// Rate, stops and friction of one hinge, about beta or theta. Stops as the turns in one step that just reach
@@ -130,9 +135,10 @@ struct BodyInertia {
 };
 
 template <class T>
-FLAPPY_INLINE BodyInertia<T> body_inertia(const Parameters<T>& p, const State<T>& x, const HingedWing<T>& l,
-                                          const HingedWing<T>& r, const WholeVehicle<T>& v) {
-  const Sym3<T> second = second_moment_about_com(p, l, r, v.com);
+FLAPPY_INLINE BodyInertia<T> body_inertia(const Parameters<T>& p, const State<T>& x,
+                                          const Sides<WingPose<T>>& pose, const Sides<WingInertia<T>>& wing,
+                                          const WholeVehicle<T>& v) {
+  const Sym3<T> second = second_moment_about_com(p, pose, wing, v.com);
   BodyInertia<T> b{p.inverse_mass_1_kg, second, inverse(inertia_of(second))};
   const auto held = x.support > T(0);
   if (rarely(held)) {
@@ -151,21 +157,21 @@ struct BodyDrive {
 
 /// `up_B`: the vertical in B; `gravity`: m/s^2.
 template <class T>
-FLAPPY_INLINE BodyDrive<T> drive_body(const Parameters<T>& p, const State<T>& x, const HingedWing<T>& l,
-                                      const HingedWing<T>& r, const WholeVehicle<T>& v,
-                                      const BodyInertia<T>& inertia, const SideLoad<T>& load_l,
-                                      const SideLoad<T>& load_r, const BodyLoad<T>& body, const Vec3<T>& up_B,
-                                      const T& gravity) {
+FLAPPY_INLINE BodyDrive<T> drive_body(const Parameters<T>& p, const State<T>& x,
+                                      const Sides<WingPose<T>>& pose, const Sides<WingInertia<T>>& wing,
+                                      const WholeVehicle<T>& v, const BodyInertia<T>& inertia,
+                                      const Sides<SideLoad<T>>& load, const BodyLoad<T>& body,
+                                      const Vec3<T>& up_B, const T& gravity) {
   const Vec3<T>& w = x.body_rate_rad_s;
-  const auto in_body = [](const HingedWing<T>& g, const Vec3<T>& a) {
-    return turn_z(g.beta.sin, g.beta.cos, a);
+  const auto to_B = [](const WingPose<T>& g, const Vec3<T>& a) { return turn_z(g.beta.sin, g.beta.cos, a); };
+  const auto air = [](const WingPose<T>& g, const SideLoad<T>& a) {
+    return turn_z(g.beta.sin, g.beta.cos, a.force_x_N, a.force_z_N);
   };
-  const Vec3<T> air_l = turn_z(l.beta.sin, l.beta.cos, load_l.force_x_N, load_l.force_z_N);
-  const Vec3<T> air_r = turn_z(r.beta.sin, r.beta.cos, load_r.force_x_N, load_r.force_z_N);
-  const Vec3<T> net_l = air_l - in_body(l, l.relative_force_L),
-                net_r = air_r - in_body(r, r.relative_force_L);
-  const Vec3<T> moment_l = in_body(l, load_l.moment_Nm - l.relative_moment_L);
-  const Vec3<T> moment_r = in_body(r, load_r.moment_Nm - r.relative_moment_L);
+  const Vec3<T> air_l = air(pose.left, load.left), air_r = air(pose.right, load.right);
+  const Vec3<T> net_l = air_l - to_B(pose.left, wing.left.relative_force_L);
+  const Vec3<T> net_r = air_r - to_B(pose.right, wing.right.relative_force_L);
+  const Vec3<T> moment_l = to_B(pose.left, load.left.moment_Nm - wing.left.relative_moment_L);
+  const Vec3<T> moment_r = to_B(pose.right, load.right.moment_Nm - wing.right.relative_moment_L);
   const Vec3<T> t = ((moment_l + moment_r) + (cross(v.arm_left, net_l) + cross(v.arm_right, net_r))) +
                     (body.moment_B - cross(inertia.second_moment * w, w));
 
@@ -192,12 +198,13 @@ struct HingeSystem {
 };
 
 template <class T>
-FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const HingedWing<T>& l,
-                                            const HingedWing<T>& r, const WholeVehicle<T>& v,
+FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const Sides<WingPose<T>>& pose,
+                                            const Sides<WingInertia<T>>& wing, const WholeVehicle<T>& v,
                                             const BodyInertia<T>& body, const BodyDrive<T>& drive,
-                                            const SideLoad<T>& load_l, const SideLoad<T>& load_r) {
+                                            const Sides<SideLoad<T>>& load) {
+  const WingInertia<T>&l = wing.left, &r = wing.right;
   HingeSystem<T> h;
-  const AcrossZ<T> esl{l.moment}, esr{r.moment};
+  const AcrossZ<T> esl{pose.left.moment}, esr{pose.right.moment};
   h.stroke_l = plus_cross(l.stroke_spin, v.arm_left, esl);
   h.stroke_r = plus_cross(r.stroke_spin, v.arm_right, esr);
   h.rotation_l = l.rotation_spin + cross(v.arm_left, l.rotation_column);
@@ -218,12 +225,12 @@ FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const Hinged
       left(l.stroke_inertia + (pl.rotor_kg_m2 + pl.stroke_stiffening_kg_m2), esl, esl, h.stroke_l, xsl),
       left(r.stroke_inertia + (pr.rotor_kg_m2 + pr.stroke_stiffening_kg_m2), esr, esr, h.stroke_r, xsr),
       left(T(0), esl, esr, h.stroke_l, xsr)};
-  const auto rotation = [](const HingedWing<T>& g, const SideParameters<T>& s) {
-    return T(g.rotation_inertia +
-             (s.rotation_stiffening_kg_m2 + s.rotation_stiffening_kg_m2_s * abs(g.theta_rate)));
+  const auto rotation = [](const WingInertia<T>& g, const T& rate, const SideParameters<T>& s) {
+    return T(g.rotation_inertia + (s.rotation_stiffening_kg_m2 + s.rotation_stiffening_kg_m2_s * abs(rate)));
   };
-  h.rotations = {left(rotation(l, pl), erl, erl, h.rotation_l, xrl),
-                 left(rotation(r, pr), err, err, h.rotation_r, xrr), left(T(0), erl, err, h.rotation_l, xrr)};
+  h.rotations = {left(rotation(l, pose.left.theta_rate, pl), erl, erl, h.rotation_l, xrl),
+                 left(rotation(r, pose.right.theta_rate, pr), err, err, h.rotation_r, xrr),
+                 left(T(0), erl, err, h.rotation_l, xrr)};
   h.ll = left(l.cross_inertia, esl, erl, h.stroke_l, xrl);
   h.rr = left(r.cross_inertia, esr, err, h.stroke_r, xrr);
   h.lr = left(T(0), esl, err, h.stroke_l, xrr);
@@ -232,10 +239,10 @@ FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const Hinged
   const auto driven = [&](const T& torque, const auto& e, const Vec3<T>& shoulder, const Vec3<T>& x) {
     return T((torque - dot(e, shoulder)) - scale * dot(x, drive.moment));
   };
-  h.s_l = driven(load_l.stroke_torque_Nm - l.stroke_bias, esl, drive.shoulder_left, xsl);
-  h.s_r = driven(load_r.stroke_torque_Nm - r.stroke_bias, esr, drive.shoulder_right, xsr);
-  h.r_l = driven(load_l.rotation_torque_Nm - l.rotation_bias, erl, drive.shoulder_left, xrl);
-  h.r_r = driven(load_r.rotation_torque_Nm - r.rotation_bias, err, drive.shoulder_right, xrr);
+  h.s_l = driven(load.left.stroke_torque_Nm - l.stroke_bias, esl, drive.shoulder_left, xsl);
+  h.s_r = driven(load.right.stroke_torque_Nm - r.stroke_bias, esr, drive.shoulder_right, xsr);
+  h.r_l = driven(load.left.rotation_torque_Nm - l.rotation_bias, erl, drive.shoulder_left, xrl);
+  h.r_r = driven(load.right.rotation_torque_Nm - r.rotation_bias, err, drive.shoulder_right, xrr);
   return h;
 }
 
@@ -314,7 +321,7 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
   };
   auto out_l = beyond(stroke_l, m.stroke_left), out_r = beyond(stroke_r, m.stroke_right);
   if (rarely(out_l |
-          out_r)) {  // a stroke reaches its stop: once more, with its turn given and its row of K gone
+             out_r)) {  // a stroke reaches its stop: once more, with its turn given and its row of K gone
     const T zero(0);
     const Sym2<T>& S = h.strokes;
     const auto prescribe = [&](const T& stop_l, const T& stop_r) __attribute__((always_inline)) {

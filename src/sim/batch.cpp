@@ -35,9 +35,9 @@ S get(const T (*rows)[lanes], int lane) {
 
 /// How the centre of mass moves relative to the torso origin, in W.
 Vec3<double> com_minus_origin_velocity(const Parameters<double>& p, const State<double>& x) {
-  const auto left = model::place_wing<+1>(p.left, x.left, x.body_rate_rad_s);
-  const auto right = model::place_wing<-1>(p.right, x.right, x.body_rate_rad_s);
-  const auto whole = model::whole_vehicle(p, left, right);
+  const auto whole =
+      model::whole_vehicle<double>(p, {model::place_wing<+1>(p.left, x.left, x.body_rate_rad_s),
+                                       model::place_wing<-1>(p.right, x.right, x.body_rate_rad_s)});
   return model::rotation_matrix(x.attitude) * (model::cross(x.body_rate_rad_s, whole.com) + whole.com_rate);
 }
 

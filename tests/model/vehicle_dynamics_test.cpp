@@ -49,7 +49,7 @@ struct Case {
   test::KaneLoads loads;
   model::State<double> state{};
   model::Parameters<double> parameters;
-  model::SideLoad<double> left, right;
+  model::Sides<model::SideLoad<double>> load;
   model::BodyLoad<double> body;
 };
 
@@ -89,7 +89,7 @@ Case random_case(Random& random) {
     l.moment[i] = to_B * moment_L;
     l.stroke_torque[i] = random(1e-2);
     l.rotation_torque[i] = random(1e-3);
-    model::SideLoad<double>& load = i == 0 ? c.left : c.right;
+    model::SideLoad<double>& load = i == 0 ? c.load.left : c.load.right;
     load = {force_L.x(), force_L.z(), to_vec(moment_L), moment_L.z() + l.stroke_torque[i],
             moment_L.y() + l.rotation_torque[i]};
   }
@@ -101,16 +101,21 @@ struct Solution {
   Vec3<double> force;
 };
 
+model::Sides<model::WingPose<double>> pose_of(const Case& c) {
+  return {model::place_wing<+1>(c.parameters.left, c.state.left, c.state.body_rate_rad_s),
+          model::place_wing<-1>(c.parameters.right, c.state.right, c.state.body_rate_rad_s)};
+}
+
 Solution solve(Case& c, const test::KaneSystem& k, double step) {
-  const auto left = model::place_wing<+1>(c.parameters.left, c.state.left, c.state.body_rate_rad_s);
-  const auto right = model::place_wing<-1>(c.parameters.right, c.state.right, c.state.body_rate_rad_s);
-  const auto whole = model::whole_vehicle(c.parameters, left, right);
+  const auto pose = pose_of(c);
+  const model::Sides<model::WingInertia<double>> wing{model::wing_inertia(c.parameters.left, pose.left),
+                                                      model::wing_inertia(c.parameters.right, pose.right)};
+  const auto whole = model::whole_vehicle(c.parameters, pose);
   c.body = {to_vec(c.loads.torso_force), to_vec(c.loads.torso_moment - k.com.cross(c.loads.torso_force))};
-  const auto inertia = model::body_inertia(c.parameters, c.state, left, right, whole);
-  const auto drive = model::drive_body(c.parameters, c.state, left, right, whole, inertia, c.left, c.right,
-                                       c.body, to_vec(-c.loads.gravity_B), 1.0);
-  const auto hinges =
-      model::eliminate_body(c.parameters, left, right, whole, inertia, drive, c.left, c.right);
+  const auto inertia = model::body_inertia(c.parameters, c.state, pose, wing, whole);
+  const auto drive = model::drive_body(c.parameters, c.state, pose, wing, whole, inertia, c.load, c.body,
+                                       to_vec(-c.loads.gravity_B), 1.0);
+  const auto hinges = model::eliminate_body(c.parameters, pose, wing, whole, inertia, drive, c.load);
   return {model::move(c.parameters, c.state, inertia, drive, hinges, step, 1 / step), drive.force};
 }
 
@@ -168,9 +173,7 @@ TEST(VehicleDynamics, CentreOfMassAndItsVelocity) {
   for (int trial = 0; trial < 50; ++trial) {
     Case c = random_case(random);
     const test::KaneSystem k = test::kane(c.vehicle, c.kane, c.loads);
-    const auto left = model::place_wing<+1>(c.parameters.left, c.state.left, c.state.body_rate_rad_s);
-    const auto right = model::place_wing<-1>(c.parameters.right, c.state.right, c.state.body_rate_rad_s);
-    const auto whole = model::whole_vehicle(c.parameters, left, right);
+    const auto whole = model::whole_vehicle(c.parameters, pose_of(c));
     const Vector3d rate = k.momentum / k.total_mass - c.kane.velocity_B - c.kane.body_rate.cross(k.com);
     EXPECT_NEAR(whole.com.x, k.com.x(), 1e-15);
     EXPECT_NEAR(whole.com.y, k.com.y(), 1e-15);

@@ -53,18 +53,19 @@ struct Result {
 Result evaluate(const Parameters<double>& p, const Flapper& f, double volts, double step_s) {
   const State<double> x = state_of(f);
   const Matrix3<double> R = rotation_matrix(f.q);
-  const auto l = place_wing<+1>(p.left, x.left, f.body_rate);
-  const auto r = place_wing<-1>(p.right, x.right, f.body_rate);
-  const auto whole = whole_vehicle(p, l, r);
+  const Sides<WingPose<double>> pose{place_wing<+1>(p.left, x.left, f.body_rate),
+                                     place_wing<-1>(p.right, x.right, f.body_rate)};
+  const auto whole = whole_vehicle(p, pose);
   const V v = transpose_times(R, f.com_velocity) - whole.com_rate;
-  const auto air_l = sim::air_on_wing<+1>(p.left, l, v + cross(f.body_rate, whole.arm_left));
-  const auto air_r = sim::air_on_wing<-1>(p.right, r, v + cross(f.body_rate, whole.arm_right));
-  const auto load_l = sim::load_side<+1>(p.left, x.left, air_l, volts);
-  const auto load_r = sim::load_side<-1>(p.right, x.right, air_r, volts);
-  const auto inertia = body_inertia(p, x, l, r, whole);
-  const auto drive = drive_body(p, x, l, r, whole, inertia, load_l, load_r,
+  const auto air_l = sim::air_on_wing<+1>(p.left, pose.left, v + cross(f.body_rate, whole.arm_left));
+  const auto air_r = sim::air_on_wing<-1>(p.right, pose.right, v + cross(f.body_rate, whole.arm_right));
+  const Sides<SideLoad<double>> load{sim::load_side<+1>(p.left, x.left, air_l, volts),
+                                     sim::load_side<-1>(p.right, x.right, air_r, volts)};
+  const Sides<WingInertia<double>> wing{wing_inertia(p.left, pose.left), wing_inertia(p.right, pose.right)};
+  const auto inertia = body_inertia(p, x, pose, wing, whole);
+  const auto drive = drive_body(p, x, pose, wing, whole, inertia, load,
                                 BodyLoad<double>{{0, 0, 0}, {0, 0, 0}}, R.row_z, kGravity_m_s2);
-  const auto hinges = eliminate_body(p, l, r, whole, inertia, drive, load_l, load_r);
+  const auto hinges = eliminate_body(p, pose, wing, whole, inertia, drive, load);
   return {move(p, x, inertia, drive, hinges, step_s, 1 / step_s),
           p.inverse_mass_1_kg * (R * drive.force) - V{0, 0, kGravity_m_s2}};
 }

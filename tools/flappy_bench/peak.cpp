@@ -11,9 +11,11 @@ typedef float Wide __attribute__((vector_size(64)));
 constexpr int kLanes = 16, kChains = 12;  // enough independent chains to fill two pipes of latency 4
 
 __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"), noinline)) float multiply_add(
-    int times) {
+    float seed, int times) {
   const Wide a = Wide{} + 0.999999f, b = Wide{} + 1e-6f;
-  Wide c0 = b, c1 = b, c2 = b, c3 = b, c4 = b, c5 = b, c6 = b, c7 = b, c8 = b, c9 = b, c10 = b, c11 = b;
+  Wide c0 = b * seed, c1 = c0 + 1, c2 = c0 + 2, c3 = c0 + 3, c4 = c0 + 4, c5 = c0 + 5, c6 = c0 + 6,
+       c7 = c0 + 7, c8 = c0 + 8, c9 = c0 + 9, c10 = c0 + 10,
+       c11 = c0 + 11;  // all different, or the compiler would make one chain of them
   for (int i = 0; i < times; ++i) {
     c0 = c0 * a + b, c1 = c1 * a + b, c2 = c2 * a + b, c3 = c3 * a + b;
     c4 = c4 * a + b, c5 = c5 * a + b, c6 = c6 * a + b, c7 = c7 * a + b;
@@ -36,7 +38,7 @@ double peak_multiply_adds_per_s() {
   double best = 0;
   for (int i = 0; i < 10; ++i) {
     const double start = processor_seconds();
-    volatile float keep = multiply_add(kTimes);
+    volatile float keep = multiply_add(static_cast<float>(i), kTimes);
     (void)keep;
     best = std::max(best, double{kTimes} * kChains * kLanes / (processor_seconds() - start));
   }
