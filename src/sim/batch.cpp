@@ -62,7 +62,9 @@ template <class T>
 struct Batch<T>::Storage {
   std::size_t count = 0;
   int threads = 1;
-  StepPlan plan;
+  double step_s = 0;
+  int steps_per_update = 1;
+  World world;
   double hold_s = 0;
   std::int64_t steps = 0;
   StepBlock<T> kernel = nullptr;
@@ -82,7 +84,7 @@ struct Batch<T>::Storage {
   }
 
   void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v) {
-    put(model::derive(v, plan.step_s), block.parameters, lane);
+    put(model::derive(v, step_s), block.parameters, lane);
     auto drive = get<Drive<double>>(block.drive, lane);
     drive.limit = {v.driver.amplitude_limit_V, v.driver.difference_limit_V, v.driver.bias_limit_V,
                    v.driver.split_cycle_limit};
@@ -137,7 +139,9 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, BatchOptions o
                                 " s) is no whole number of physics steps");
   s.count = count;
   s.threads = options.threads > 0 ? options.threads : omp_get_num_procs();
-  s.plan = {options.step_s, static_cast<int>(std::llround(steps)), std::move(options.world)};
+  s.step_s = options.step_s;
+  s.steps_per_update = static_cast<int>(std::llround(steps));
+  s.world = std::move(options.world);
   s.hold_s = vehicle.driver.hold_s;
   s.kernel = kernel_named(options.instruction_set).template of<T>().step;
   s.blocks.resize((count + kLanes<T> - 1) / kLanes<T>);
@@ -191,7 +195,7 @@ void Batch<T>::reset(std::size_t i, const FlapperState& f, Start start) {
   put(x, block.state, lane);
   auto drive = get<Drive<double>>(block.drive, lane);
   drive.input = {0, 0, 0, 0};
-  drive.left_V = drive.right_V = 0;
+  drive.voltages = {0, 0};
   put(drive, block.drive, lane);
   block.phase[lane] = 0;
   block.status[lane] = 0;
@@ -208,6 +212,13 @@ void Batch<T>::set_input(std::size_t i, const Input& u) {
 template <class T>
 void Batch<T>::step(int steps) {
   Storage& s = *storage_;
+  const StepPlan plan{s.step_s,
+                      s.steps_per_update,
+                      s.world.gravity_m_s2,
+                      s.world.ground_z_m,
+                      s.world.ceiling_z_m,
+                      s.world.walls.data(),
+                      s.world.walls.size()};
   const auto blocks = static_cast<std::ptrdiff_t>(s.blocks.size());
 #pragma omp parallel for schedule(static) num_threads(s.threads)
   for (std::ptrdiff_t b = 0; b < blocks; ++b) {
@@ -216,7 +227,7 @@ void Batch<T>::step(int steps) {
     if (!s.block_effects.empty())
       effects = {s.block_effects[i], &s.effect_rows[i * model::kEffectRows * kLanes<T>]};
     const Block<T>* next = i + 1 < s.blocks.size() ? &s.blocks[i + 1] : nullptr;
-    s.kernel(s.blocks[i], effects, s.plan, s.steps, steps, next);
+    s.kernel(s.blocks[i], effects, plan, s.steps, steps, next);
   }
   s.steps += steps;
 }

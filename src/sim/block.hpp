@@ -12,12 +12,18 @@ namespace flappy::sim {
 
 inline namespace FLAPPY_ISA {
 
+/// At the motors, held between driver updates.
+template <class T>
+struct Voltages {
+  T left_V, right_V;
+};
+
 /// What drives a flapper between its control updates, as rows.
 template <class T>
 struct Drive {
   model::WingBeat<T> input;  // as commanded
   model::WingBeat<T> limit;  // |input| is clipped to it
-  T left_V, right_V;         // held between driver updates
+  Voltages<T> voltages;
 };
 
 }  // namespace FLAPPY_ISA

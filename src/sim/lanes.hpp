@@ -46,7 +46,8 @@ struct LaneMask {
 
 template <class T, int N>
 struct Lanes {
-  using Raw __attribute__((vector_size(N * sizeof(T)))) = T;
+  using Raw __attribute__((vector_size(N * sizeof(T)), may_alias)) =
+      T;  // a row of numbers may be seen as lanes
   using Mask = LaneMask<T, N>;
   using P = Product<Lanes>;
   Raw raw;
@@ -126,9 +127,9 @@ struct Lanes {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
       if constexpr (sizeof(T) == 4)
-        return Lanes((Raw)_mm512_sqrt_ps((__m512)a.raw));
+        return Lanes((Raw)_mm512_maskz_sqrt_ps(__mmask16(-1), (__m512)a.raw));
       else
-        return Lanes((Raw)_mm512_sqrt_pd((__m512d)a.raw));
+        return Lanes((Raw)_mm512_maskz_sqrt_pd(__mmask8(-1), (__m512d)a.raw));
     }
 #endif
 #if defined(__AVX__)
@@ -155,9 +156,9 @@ struct Lanes {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
       if constexpr (sizeof(T) == 4)
-        return Lanes((Raw)_mm512_min_ps((__m512)a.raw, (__m512)b.raw));
+        return Lanes((Raw)_mm512_maskz_min_ps(__mmask16(-1), (__m512)a.raw, (__m512)b.raw));
       else
-        return Lanes((Raw)_mm512_min_pd((__m512d)a.raw, (__m512d)b.raw));
+        return Lanes((Raw)_mm512_maskz_min_pd(__mmask8(-1), (__m512d)a.raw, (__m512d)b.raw));
     }
 #endif
     return select(Mask{a.raw < b.raw}, a, b);
@@ -166,9 +167,9 @@ struct Lanes {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
       if constexpr (sizeof(T) == 4)
-        return Lanes((Raw)_mm512_max_ps((__m512)a.raw, (__m512)b.raw));
+        return Lanes((Raw)_mm512_maskz_max_ps(__mmask16(-1), (__m512)a.raw, (__m512)b.raw));
       else
-        return Lanes((Raw)_mm512_max_pd((__m512d)a.raw, (__m512d)b.raw));
+        return Lanes((Raw)_mm512_maskz_max_pd(__mmask8(-1), (__m512d)a.raw, (__m512d)b.raw));
     }
 #endif
     return select(Mask{a.raw > b.raw}, a, b);

@@ -116,8 +116,8 @@ FLAPPY_INLINE void feel(const Parameters<T>& p, State<T>& x, const Sides<WingPos
 
 /// One physics step. `com_m`: the vehicle's centre of mass in W, carried along because it is what inertia moves.
 template <bool with_effects, class T>
-FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Drive<T>& drive, Vec3<T>& com_m,
-                                const ActiveEffects<T>& effects, const Constants<T>& k) {
+FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Voltages<T>& voltages,
+                                Vec3<T>& com_m, const ActiveEffects<T>& effects, const Constants<T>& k) {
   // where everything is and how it moves
   const Matrix3<T> R = rotation_matrix(x.attitude);
   const Vec3<T>& w = x.body_rate_rad_s;
@@ -137,8 +137,8 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Drive
                    p.air_density_kg_m3, k.ground_z, k.ceiling_z},
                   air, body);
   }
-  const Sides<SideLoad<T>> load{load_side<+1>(p.left, x.left, air.left, drive.left_V),
-                                load_side<-1>(p.right, x.right, air.right, drive.right_V)};
+  const Sides<SideLoad<T>> load{load_side<+1>(p.left, x.left, air.left, voltages.left_V),
+                                load_side<-1>(p.right, x.right, air.right, voltages.right_V)};
 
   // new rates
   const Sides<WingInertia<T>> wing{wing_inertia(p.left, pose.left), wing_inertia(p.right, pose.right)};

@@ -43,6 +43,16 @@ FLAPPY_INLINE S load_rows(const T (*rows)[lanes], int first) {
   return s;
 }
 
+/// Rows to read from again and again: in place where lanes fill a row, a copy where they are part of one. In place they
+/// leave the stack, whose spills would otherwise collide with them in the cache: 4 % of the step.
+template <class S, class T, int lanes>
+FLAPPY_INLINE decltype(auto) view_rows(const T (*rows)[lanes], int first) {
+  if constexpr (kWidth<T> == lanes)
+    return (*reinterpret_cast<const S*>(rows));
+  else
+    return load_rows<S>(rows, first);
+}
+
 template <class S, class T, int lanes>
 FLAPPY_INLINE void store_rows(const S& s, T (*rows)[lanes], int first) {
   using L = Lanes<T, kWidth<T>>;
@@ -52,24 +62,26 @@ FLAPPY_INLINE void store_rows(const S& s, T (*rows)[lanes], int first) {
 
 /// Driver: new voltages from the wing-beat signal, held until the next update.
 template <class T, class L>
-FLAPPY_INLINE void update_driver(Drive<L>& d, const Parameters<L>& p, Block<T>& block, int first) {
+FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>& left,
+                                        const SideParameters<L>& right, int first) {
   T fraction[kWidth<T>];
   for (int i = 0; i < kWidth<T>; ++i) {
     std::uint32_t& phase = block.phase[first + i];
     fraction[i] = static_cast<T>(static_cast<std::int32_t>(phase)) * static_cast<T>(0x1p-32);
     phase += block.phase_per_update[first + i];
   }
+  const auto d = load_rows<Drive<L>>(block.drive, first);
   const auto clip = [](const L& value, const L& limit) { return clamp(value, L(-limit), limit); };
   const WingBeat<L> u{clamp(d.input.amplitude_V, L(0), d.limit.amplitude_V),
                       clip(d.input.difference_V, d.limit.difference_V), clip(d.input.bias_V, d.limit.bias_V),
                       clip(d.input.split_cycle, d.limit.split_cycle)};
-  d.left_V = wing_beat_voltage<+1>(u, L::load(fraction), p.left.voltage_limit_V);
-  d.right_V = wing_beat_voltage<-1>(u, L::load(fraction), p.right.voltage_limit_V);
+  return {wing_beat_voltage<+1>(u, L::load(fraction), left.voltage_limit_V),
+          wing_beat_voltage<-1>(u, L::load(fraction), right.voltage_limit_V)};
 }
 
 /// Marks flappers that have come apart or touched something, and stands those that never took off back up.
 template <class T, class L>
-FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const World& world, Block<T>& block,
+FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const StepPlan& plan, Block<T>& block,
                                int first) {
   const auto mark = [&](typename L::Mask mask, std::uint32_t bit) {
     if (!any(mask)) return;
@@ -77,7 +89,7 @@ FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const World&
       if (mask.raw[i]) block.status[first + i] |= bit;
   };
   const auto flying = x.support <= L(0);
-  const L height = x.position_m.z - (L(world.ground_z_m) + p.below_m);
+  const L height = x.position_m.z - (L(plan.ground_z_m) + p.below_m);
   const auto lifting = x.support < L(0);
   if (rarely(lifting)) {
     const auto fell_back = lifting & (height < L(0));
@@ -87,8 +99,9 @@ FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const World&
     x.support = where(fell_back, L(1), where(lifting & (height > L(kTakeOffClearance_m)), zero, x.support));
   }
   mark(flying & !lifting & (height < L(0)), kTouchedGround);
-  mark(flying & (x.position_m.z + p.above_m > L(world.ceiling_z_m)), kTouchedCeiling);
-  for (const Wall& w : world.walls) {
+  mark(flying & (x.position_m.z + p.above_m > L(plan.ceiling_z_m)), kTouchedCeiling);
+  for (const Wall* wall = plan.walls; wall != plan.walls + plan.wall_count; ++wall) {
+    const Wall& w = *wall;
     const L clearance =
         L(w.normal_x) * L(x.position_m.x - L(w.x_m)) + L(w.normal_y) * L(x.position_m.y - L(w.y_m));
     mark(flying & (clearance < p.around_m), kTouchedWall);
@@ -149,17 +162,31 @@ class Prefetch {
   std::size_t share_;
 };
 
+/// Back from the centre of mass to the torso; contact, plausibility, rows.
+template <class T, class L>
+FLAPPY_INLINE void finish(State<L> x, const Vec3<L>& com_m, const Voltages<L>& voltages,
+                          const Parameters<L>& p, const StepPlan& plan, Block<T>& block, int first) {
+  x.position_m =
+      where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
+  look_around(x, p, plan, block, first);
+  const typename L::Mask moves = freeze_implausible(x, block, first);
+  store_rows(where(moves, x, load_rows<State<L>>(block.state, first)), block.state, first);
+  auto drive = load_rows<Drive<L>>(block.drive, first);
+  drive.voltages = voltages;
+  store_rows(drive, block.drive, first);
+}
+
 template <bool with_effects, class T>
 void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first_step,
                 int steps, const Block<T>* next) {
   using L = Lanes<T, kWidth<T>>;
-  const Constants<L> k{plan.step_s,           plan.step_s / 2,       1 / plan.step_s, plan.world.gravity_m_s2,
-                       plan.world.ground_z_m, plan.world.ceiling_z_m};
+  const Constants<L> k{plan.step_s,       plan.step_s / 2, 1 / plan.step_s,
+                       plan.gravity_m_s2, plan.ground_z_m, plan.ceiling_z_m};
   Prefetch prefetch(next, sizeof *next, steps);
   for (int first = 0; first < kLanes<T>; first += kWidth<T>) {
-    const auto p = load_rows<Parameters<L>>(block.parameters, first);
-    auto drive = load_rows<Drive<L>>(block.drive, first);
-    const auto before = load_rows<State<L>>(block.state, first);
+    const auto& p = view_rows<Parameters<L>>(block.parameters, first);
+    auto x = load_rows<State<L>>(block.state, first);
+    Voltages<L> voltages = load_rows<Drive<L>>(block.drive, first).voltages;
     ActiveEffects<L> effects;
     if constexpr (with_effects) {
       effects.set = in_force.set;
@@ -167,25 +194,18 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
         effects.parameters[i] = L::load(in_force.rows + i * kLanes<T> + first);
     }
 
-    State<L> x = before;
     Vec3<L> com_m = x.position_m + rotation_matrix(x.attitude) * centre_of_mass(p, x);
-    int until_update = static_cast<int>((plan.steps_per_update - first_step % plan.steps_per_update) %
-                                        plan.steps_per_update);
+    std::int64_t until_update =
+        (plan.steps_per_update - first_step % plan.steps_per_update) % plan.steps_per_update;
     for (int i = 0; i < steps; ++i, --until_update) {
       if (until_update == 0) {
-        update_driver(drive, p, block, first);
+        voltages = update_driver(block, p.left, p.right, first);
         until_update = plan.steps_per_update;
       }
       prefetch.step();
-      physics_step<with_effects>(p, x, drive, com_m, effects, k);
+      physics_step<with_effects>(p, x, voltages, com_m, effects, k);
     }
-    x.position_m =
-        where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
-
-    look_around(x, p, plan.world, block, first);
-    const typename L::Mask moves = freeze_implausible(x, block, first);
-    store_rows(where(moves, x, before), block.state, first);
-    store_rows(drive, block.drive, first);
+    finish(x, com_m, voltages, p, plan, block, first);
   }
 }
 

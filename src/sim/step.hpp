@@ -10,7 +10,9 @@ namespace flappy::sim {
 struct StepPlan {
   double step_s;
   int steps_per_update;  // physics steps between updates of the driver
-  World world;
+  double gravity_m_s2, ground_z_m, ceiling_z_m;
+  const Wall* walls;
+  std::size_t wall_count;
 };
 
 /// Effects in force in a block, and their parameters: rows as in the registry, kLanes wide.
