@@ -1,7 +1,7 @@
-// One flapper as the step sees it: parameters (derived once from a Vehicle) and state, over a scalar type.
-// Every member is a T, so a flapper is also a plain list of numbers: a block of lanes stores one row for
-// each. Coordinates: stroke and rotation are the published angles psi and theta; beta = side * psi turns
-// about +z on both sides. L is the frame of a leading edge: origin at the shoulder, B turned by beta.
+// One flapper as the step sees it: parameters (derived once from a Vehicle) and state, over a scalar type. Every member
+// is a T, so a flapper is also a plain list of numbers: a block of lanes stores one row for each.
+// Coordinates: stroke and rotation are the published angles psi and theta; beta = side * psi turns about +z on both
+// sides. L is the frame of a leading edge: origin at the shoulder, B turned by beta.
 #pragma once
 
 #include "model/linear_algebra.hpp"
@@ -44,8 +44,7 @@ struct Parameters {
   T beat_steps;                  // steps in two wing beats, over which a support feels the lift
 };
 
-/// What holds a flapper, as a number so that it can be a row like any other; above zero the body does not
-/// move.
+/// What holds a flapper, as a number so that it can be a row like any other; above zero the body does not move.
 enum class Support { lifting = -1, none = 0, standing = 1, welded = 2 };
 
 template <class T>
@@ -61,10 +60,10 @@ struct State {
   Vec3<T> com_velocity_m_s;  // of the whole vehicle's centre of mass, in W: total momentum / mass
   Vec3<T> body_rate_rad_s;   // in B
   SideState<T> left, right;
-  T support;  // a Support
-  T lift_N;   // while standing: upward force of the wings, averaged over about two beats
-  Vec3<T> impulse_N_s,
-      angular_impulse_Nm_s;  // while held: of the air on the wings, in B about the torso origin
+  T support;                     // a Support
+  T lift_N;                      // while standing: upward force of the wings, averaged over about two beats
+  Vec3<T> impulse_N_s;           // while held: of the air on the wings, in B
+  Vec3<T> angular_impulse_Nm_s;  //   about the torso origin
 };
 
 /// Rows of a struct whose members are all T.

@@ -1,13 +1,14 @@
-// One wing and its leading edge, hinged at a shoulder: their inertia seen from the vehicle, and the inertial
-// forces of their motion relative to it.
+// One wing and its leading edge, hinged at a shoulder: where they are, their inertia seen from the vehicle, and
+// the inertial forces of their motion relative to it.
 //
-// All in the leading edge's frame L (B turned by beta about z), about the shoulder. h: first moment of mass,
-// P: second moment (integral of r r^T; inertia J = tr P - P); index w: wing, turned by theta about y; none:
-// wing and edge. With body rate w, relative rates W_edge = (0, 0, B), W_wing = (0, T, B), B =
-// beta', T = theta':
-//   relative acceleration of a point: 2 w x (W x r) + W x (W x r) + W' x r,  W'_wing = (-b t, 0, 0) at zero
-//   beta'', theta'' integral r x (2 w x (W x r)) = 2 (P w) x W      integral r x (W x (W x r)) = (P W) x W
-// Both are exact; summed over the two bodies they give `relative_force` and `relative_moment`.
+// In the leading edge's frame L (B turned by beta about z), about the shoulder. h: first moment of mass, P: second
+// moment (integral of r r^T; inertia J = tr P - P); index w: the wing, turned by theta about y; none: wing and edge.
+// Body rate w; relative rates W_edge = (0, 0, b), W_wing = (0, t, b) with b = beta', t = theta'. At zero beta'', theta''
+// a point accelerates, relative to the frozen vehicle, by
+//   2 w x (W x r) + W x (W x r) + W' x r          W'_edge = 0,  W'_wing = (-b t, 0, 0)
+// whose moments are
+//   integral r x (2 w x (W x r)) = 2 (P w) x W    integral r x (W x (W x r)) = (P W) x W    J W'
+// Exact; summed over the two bodies they give `relative_force` and `relative_moment`.
 #pragma once
 
 #include "model/flapper.hpp"

@@ -1,8 +1,7 @@
-// Brushed motor, gear and stroke spring of one wing. Motor-side friction f, damping b, inertia J; gear N,
-// efficiency eta:
-//   tau = N eta (K i - J N psi'' - b N psi' - f sgn psi'),  i = (V - K N psi')/R, also when driven back
-// so about the stroke axis: torque per volt N eta K/R, damping eta N^2 (K^2/R + b), friction eta N f, inertia
-// eta N^2 J. Spring: -k (psi - psi_0), k for each direction. Winding inductance is neglected.
+// Brushed motor, gear and stroke spring of one wing. Gear N, efficiency eta; friction f, damping b, inertia J motor-side:
+//   tau = N eta (K i - J N psi'' - b N psi' - f sgn psi')      i = (V - K N psi')/R, also when driven back
+// so about the stroke axis: torque per volt N eta K/R, damping eta N^2 (K^2/R + b), friction eta N f, inertia eta N^2 J.
+// Spring: -k (psi - psi_0), a k for each direction. Winding inductance is neglected.
 #pragma once
 
 #include "model/flapper.hpp"

@@ -1,21 +1,20 @@
 // Exact dynamics of the five bodies: torso, two leading edges, two wings.
 //
-// Coordinates: momentum through the velocity of the whole vehicle's centre of mass C, body rate w, and the
-// hinge rates q' = (beta_l', beta_r', theta_l', theta_r'). About C the translation decouples exactly:
+// Coordinates: momentum through the velocity of the whole vehicle's centre of mass C, body rate w, and the hinge
+// rates q' = (beta_l', beta_r', theta_l', theta_r'). About C the translation decouples exactly:
 //   M dv_C/dt = F + M g
-//   | I   G | | w' |   | t |     I: inertia about C           t: external minus relative inertial moment, - w
-//   x I w | G^T H | | q''| = | r |     G: angular momentum about C per unit hinge rate
-//                                H: hinge inertias, rotor included, minus what the motion of C takes (e_i .
-//                                e_j / M)
-// A hinge also feels its shoulder's acceleration, A = (F - F_rel)/M + w x (w x d), d from C to the shoulder.
-// Elimination goes body, strokes, rotations; the rotations come last so that a wing landing on its stop is
-// one 2x2 solve.
+//   | I    G | | w'  |   | t |     I: inertia about C
+//   | G^T  H | | q'' | = | r |     G: angular momentum about C per unit hinge rate
+//                                  H: hinge inertias, rotor included, less what the motion of C takes, e_i . e_j / M
+// e_i: momentum per unit hinge rate; t: external less relative inertial moment, less w x I w. A hinge also feels its
+// shoulder's acceleration A = (F - F_rel)/M + w x (w x d), d from C to the shoulder. Elimination goes body, strokes,
+// rotations; the rotations come last so that a wing landing on its stop is one 2x2 solve.
 //
-// Time step: velocities first, then positions with the new velocities. Positions so lead velocities by half a
-// step (a leapfrog): forces of position are second order. Linear damping is taken at the mean of old and new
-// rate, M_rd at |old| new (exact for pure quadratic drag). Dry friction is the torque that would stop the
-// hinge within the step, limited to the friction: it sticks. A stop prescribes the rate that lands on it
-// exactly: no penetration, and the impulse only ever takes energy.
+// Time step h: rates first, then positions with the new rates, a leapfrog in which positions lead by h/2. Linear
+// damping is taken at the mean of old and new rate, M_rd at |old| new (exact for pure quadratic drag). Dry friction is
+// the torque that would stop the hinge within the step, limited to the friction: it sticks, but for what reaches a
+// stroke through its wing's rotation, first order in h. A stop prescribes the turn that lands on it exactly: no
+// penetration, and the impulse only ever takes energy.
 #pragma once
 
 #include "model/hinged_wing.hpp"

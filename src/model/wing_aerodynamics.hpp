@@ -1,22 +1,20 @@
 // Blade-element quasi-steady aerodynamics of one wing (Fei et al., ICRA 2019, arXiv 1902.09628).
 //
-// E is the frame of the leading edge (y along the span, +y outward on the left, inward on the right), however
-// many angles turned it there. Seen from E, the wing moves in-plane along -x and out of plane along z. At
-// span r:
-//   U_i = U_i1 r + U_i0    U_i1 = s w_z   U_i0 = -v_x        s = +1 left, -1 right; v, w: velocity of the
-//   shoulder U_o = U_o1 r + U_o0    U_o1 = s w_x   U_o0 =  v_z        and angular velocity of E, both in E,
-//   relative to air alpha = theta + sgn(U_i) pi/2 - atan(U_o/U_i) at r_cp a2 = U_i1^2 + U_o1^2,  a1 = 2 (U_i1
-//   U_i0 + U_o1 U_o0),  a0 = U_i0^2 + U_o0^2 F_N    = 1/2 rho c C_N (a2 R^3 r22 + a1 R^2 r11 + a0 R r00)
-//   along +x of the wing, at span r_cp M_aero = -1/2 rho c^2 C_N d_cp (a2 R^3 z_cp2 + a1 R^2 z_cp1 + a0 R
-//   z_cp0)   about +y, through the chordwise
-//            centre of pressure, so it is F_N acting at -M_aero/F_N below the hinge axis
+// E is the frame of the leading edge (y along the span, +y outward on the left, inward on the right), however many
+// angles turned it there; v and w are the velocity of the shoulder and the angular velocity of E, both in E, relative
+// to the air; s = +1 left, -1 right. Seen from E the wing moves in-plane along -x and out of plane along z. At span r:
+//   U_i = U_i1 r + U_i0      U_i1 = s w_z      U_i0 = -v_x
+//   U_o = U_o1 r + U_o0      U_o1 = s w_x      U_o0 =  v_z
+//   alpha = theta + sgn(U_i) pi/2 - atan(U_o/U_i), at r_cp
+//   a2 = U_i1^2 + U_o1^2     a1 = 2 (U_i1 U_i0 + U_o1 U_o0)     a0 = U_i0^2 + U_o0^2
+//   F_N    = 1/2 rho c C_N (a2 R^3 r22 + a1 R^2 r11 + a0 R r00)               along +x of the wing, at span r_cp
+//   M_aero = -1/2 rho c^2 C_N d_cp (a2 R^3 z_cp2 + a1 R^2 z_cp1 + a0 R z_cp0)  about +y: F_N acts at -M_aero/F_N below
 //   M_rd   = -1/8 rho |theta'| theta' C_rd R c^4 z_rd                          about +y
 //   C_N  = 1.8 sin 2a cos a + 1.95 sin a - 1.5 cos 2a sin a = sin a (0.6 cos^2 a + 3.45)
 //   d_cp = 0.46 - 0.332 cos a - 0.037 cos 3a - 0.013 cos 5a, even and 2 pi periodic
 //
-// With b = sgn(U_i) pi/2 - atan(U_o/U_i):  (cos b, sin b) = (U_o, U_i)/|U| for both signs of U_i, so alpha =
-// theta + b needs no arc tangent. Assumes quasi-steady flow, Re about 1e4, a rigid wing; unsteady effects are
-// src/model/effects.
+// With b = sgn(U_i) pi/2 - atan(U_o/U_i), (cos b, sin b) = (U_o, U_i)/|U| for both signs of U_i: alpha = theta + b needs
+// no arc tangent. Assumes quasi-steady flow, Re about 1e4 and a rigid wing; unsteady effects are src/model/effects.
 #pragma once
 
 #include "model/flapper.hpp"

@@ -1,9 +1,8 @@
-// Wings whose four angles are driven, as an animal's are: stroke-plane offset Phi, stroke psi, deviation phi,
-// rotation theta (Fei et al. 2019). The leading edge's frame E follows from B by
-//   R_BE = R_y(Phi) R_z(s psi) R_x(s phi)     s = +1 left, -1 right; phi > 0 lifts the tip out of the stroke
-//   plane
-// and the wing from E by R_y(theta). The blade element sees E alone, so it is the same for a robot, whose E
-// is turned by the stroke only (hinged_wing.hpp) and which pays nothing for the other two.
+// Wings whose four angles are driven, as an animal's are: stroke-plane offset Phi, stroke psi, deviation phi, rotation
+// theta (Fei et al. 2019). The leading edge's frame E follows from B by
+//   R_BE = R_y(Phi) R_z(s psi) R_x(s phi)      s = +1 left, -1 right; phi > 0 lifts the tip out of the stroke plane
+// and the wing from E by R_y(theta). The blade element sees E alone, so it is the same for a robot, whose E is turned
+// by the stroke only (hinged_wing.hpp) and which pays nothing for the other two.
 #pragma once
 
 #include "model/math.hpp"

@@ -1,11 +1,12 @@
 // Randomised vehicles: a table of distributions over the parameters of a nominal vehicle.
 //
 //   [[randomise]]
-//   parameters = ["torso.mass_kg", "torso.inertia_kg_m2"]   # one draw for all; a table stands for all below
-//   it law = "scale_normal" sd = 0.10 cut_sd = 3.0                                            # draws farther
-//   out are drawn again
+//   parameters = ["torso.mass_kg", "torso.inertia_kg_m2"]   # one draw for all; a table stands for all below it
+//   law = "scale_normal"
+//   sd = 0.10
+//   cut_sd = 3.0                                            # draws farther out are drawn again
 //
-// With n a normal draw and u a uniform one:  scale_normal x (1 + sd n), scale_half_normal x (1 + |sd n|),
+// With n a normal draw and u a uniform one: scale_normal x (1 + sd n), scale_half_normal x (1 + |sd n|),
 // replace_normal mean + sd n, add_normal + sd n, scale_uniform x u, replace_uniform u in [low, high].
 #pragma once
 

@@ -1,6 +1,6 @@
 // An effect beyond the base model is one file in this folder: a struct with
-//   kInfo                what it is called, where it acts, its parameters, its source
-//   kParameters          their number
+//   kInfo                what it is called, where it acts, where it vanishes, its source
+//   kParameters          their names, units and ranges
 //   one or more stages   static templates over the scalar type that change what the stage hands on
 // and one line in registry.hpp. Simulation, randomisation, the vehicle file and diagnosis read that one
 // description. A stage is found by its name; an effect without it costs nothing there:

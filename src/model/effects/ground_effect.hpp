@@ -1,11 +1,9 @@
 // Thrust gained near the ground, as a factor on what the air does to the wings:
-//   k = 1 + gain exp(-h / length),  h the height of the stroke plane over the ground
-// [1] He, Leang et al., In-ground-effect modeling and nonlinear-disturbance observer for multirotor UAV
-// control,
+//   k = 1 + gain exp(-h / length)      h: height of the stroke plane over the ground
+// [1] He, Leang et al., In-ground-effect modeling and nonlinear-disturbance observer for multirotor UAV control,
 //     J. Dyn. Syst. Meas. Control 141(7), 071013, 2019: k = 1 + C_a exp(-C_b h / R), fitted to small rotors.
-// Finite when standing, unlike 1 / (1 - (R / 4h)^2) (Cheeseman and Bennett 1955), which it meets within 0.4 %
-// for h > R with gain 0.27, length 0.7 R. Level attitude and a flat ground are assumed; below the ground h
-// counts as 0.
+// Finite when standing, unlike 1 / (1 - (R / 4h)^2) (Cheeseman and Bennett 1955), which it meets within 0.4 % for
+// h > R with gain 0.27, length 0.7 R. A level attitude and a flat ground are assumed; below the ground h counts as 0.
 #pragma once
 
 #include "model/effects/effect.hpp"
