@@ -61,12 +61,9 @@ if(hash STREQUAL hash1)
   message(SEND_ERROR "another seed, the same hash ${hash}")
 endif()
 
-# Every key is there, and is what it says.
+# These keys are there, and are what they say; others may join them.
 function(expect_keys file)
   file(READ ${file} json)
-  string(JSON count LENGTH "${json}")
-  list(LENGTH ARGN expected)
-  expect_equal("number of keys in ${file}" "${count}" "${expected}")
   foreach(pair IN LISTS ARGN)
     string(REPLACE "=" " " pair "${pair}")
     separate_arguments(pair)
@@ -85,7 +82,8 @@ run(--rounds 1 --seconds 0.01 --no-peers --json ${WORK}/speed.json)
 expect_equal("exit code" "${code}" 0)
 expect_keys(${WORK}/speed.json float_steps_per_s=NUMBER double_steps_per_s=NUMBER two_thread_scaling=NUMBER
   dart_steps_per_s=NULL mujoco_steps_per_s=NULL thrust_error_100us=NUMBER position_error_100us_m=NUMBER
-  bytes_per_flapper=NUMBER ns_per_step_1000=NUMBER ns_per_step_100000=NUMBER instruction_set=STRING)
+  bytes_per_flapper=NUMBER ns_per_step_1000=NUMBER ns_per_step_100000=NUMBER flops_per_step=NUMBER
+  roof_steps_per_s=NUMBER instruction_set=STRING)
 file(READ ${WORK}/speed.json json)
 string(JSON set GET "${json}" instruction_set)
 
