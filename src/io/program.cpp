@@ -25,6 +25,7 @@ Program::Program(const std::string& name, const std::string& description,
 int Program::run(int argc, char** argv, const std::function<void()>& job) {
   try {
     app_.parse(argc, argv);
+    if (!json_path_.empty()) AtomicFile refused_before_the_work(json_path_);
     job();
     return 0;
   } catch (const CLI::ParseError& e) {

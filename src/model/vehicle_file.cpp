@@ -1,6 +1,7 @@
 #include "model/vehicle_file.hpp"
 
 #include <charconv>
+#include <cstdio>
 
 #include "io/config.hpp"
 #include "model/effects/registry.hpp"
@@ -8,16 +9,21 @@
 namespace flappy::model {
 namespace {
 
-std::string known_effects() {
+/// Every effect there is, for one that there is not.
+std::string known_effects(const std::string& wrong) {
   std::string list;
-  for (const EffectEntry& e : effects()) list += (list.empty() ? "" : ", ") + std::string(e.info.id);
-  return list;
+  std::vector<std::string> names;
+  for (const EffectEntry& e : effects()) {
+    names.push_back(e.info.id);
+    list += (list.empty() ? "" : ", ") + names.back();
+  }
+  return list + io::did_you_mean(wrong, names);
 }
 
 void read_effects(const io::Table& table, Vehicle& vehicle) {
   for (const std::string& id : table.keys()) {
     const int index = effect_index(id.c_str());
-    if (index < 0) table.fail(id, "unknown effect", known_effects());
+    if (index < 0) table.fail(id, "unknown effect", known_effects(id));
     const io::Table entry = table.table(id);
     for (const EffectParameter& p : effects()[static_cast<std::size_t>(index)].parameters)
       vehicle.effects[id][p.name] = entry.number_or(p.name, p.typical, {p.low, p.high});
@@ -30,6 +36,19 @@ std::string number_text(double value) {
   std::string s(text, end);
   if (s.find_first_of(".en") == std::string::npos) s += ".0";
   return s;
+}
+
+/// `value` as a TOML string.
+std::string string_text(const std::string& value) {
+  std::string s = "\"";
+  for (const char c : value) {
+    char escaped[8];
+    std::snprintf(escaped, sizeof escaped, "\\u%04X", static_cast<unsigned char>(c));
+    const bool control = (c >= 0 && c < ' ') || c == '\x7f';
+    if (c == '"' || c == '\\') s += '\\';
+    s += control ? escaped : std::string(1, c);
+  }
+  return s + "\"";
 }
 
 }  // namespace
@@ -48,12 +67,14 @@ Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::s
 }
 
 std::string vehicle_text(const Vehicle& vehicle) {
-  std::string text = "schema = 1\nname = \"" + vehicle.name + "\"\n";
+  std::string text = "schema = 1\nname = " + string_text(vehicle.name) + "\n";
   Vehicle copy = vehicle;
   for (const Parameter& p : parameters(copy)) text += p.path + " = " + number_text(*p.value) + "\n";
-  for (const auto& [id, values] : vehicle.effects)
+  for (const auto& [id, values] : vehicle.effects) {
+    if (values.empty()) text += "effects." + id + " = {}\n";  // in force at its typical size
     for (const auto& [name, value] : values)
       text += "effects." + id + "." + name + " = " + number_text(value) + "\n";
+  }
   return text;
 }
 

@@ -1,6 +1,7 @@
 #include "sim/randomise.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
 namespace flappy::sim {
@@ -8,12 +9,23 @@ namespace {
 
 constexpr std::uint32_t kIndicesPerDraw = 64;  // a cut at 1 sd is redrawn 63 times once in 1e31
 
+std::string six_digits(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6).ptr};
+}
+
 }  // namespace
 
 Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : nominal_(std::move(nominal)) {
   model::Vehicle vehicle = nominal_;
   const std::vector<model::Parameter> parameters = model::parameters(vehicle);
-  for (const io::Table& table : config.tables("randomise")) draws_.push_back(read_draw(table, parameters));
+  std::vector<Reach> reach;
+  for (const model::Parameter& p : parameters) reach.push_back({*p.value, *p.value});
+  for (const io::Table& table : config.tables("randomise")) {
+    draws_.push_back(read_draw(table, parameters));
+    check_reach(table, draws_.back(), parameters, reach);
+    check_bodies(table, draws_.back());
+  }
 }
 
 Randomisation::Draw Randomisation::read_draw(const io::Table& table,
@@ -23,9 +35,16 @@ Randomisation::Draw Randomisation::read_draw(const io::Table& table,
   Draw draw{};
   for (const std::string& name : table.strings("parameters")) {
     const std::size_t before = draw.parameters.size();
-    for (std::size_t i = 0; i < parameters.size(); ++i)
-      if (parameters[i].path == name || parameters[i].path.starts_with(name + "."))
-        draw.parameters.push_back(i);
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      const std::string& path = parameters[i].path;
+      if (path != name && !path.starts_with(name + ".")) continue;
+      if (std::ranges::find(draw.parameters, i) != draw.parameters.end())
+        table.fail("parameters", path + " is given twice", "each parameter once");
+      if (path == "driver.hold_s")
+        table.fail("parameters", path + " is the same for a whole batch",
+                   "what may differ from flapper to flapper");
+      draw.parameters.push_back(i);
+    }
     if (draw.parameters.size() == before) {
       std::vector<std::string> known;
       for (const model::Parameter& p : parameters) known.push_back(p.path);
@@ -33,6 +52,7 @@ Randomisation::Draw Randomisation::read_draw(const io::Table& table,
                  "paths of the vehicle file" + io::did_you_mean(name, known));
     }
   }
+  if (draw.parameters.empty()) table.fail("parameters", "is empty", "paths of the vehicle file");
   const std::string law = table.choice("law", kLaws);
   draw.law = static_cast<Law>(std::ranges::find(kLaws, law) - kLaws.begin());
   if (draw.law == Law::scale_uniform || draw.law == Law::replace_uniform) {
@@ -44,15 +64,37 @@ Randomisation::Draw Randomisation::read_draw(const io::Table& table,
     draw.b = table.number("sd", io::non_negative());
     draw.cut_sd = table.number_or("cut_sd", 3, {1, 8});
   }
-  for (const std::size_t i : draw.parameters)
-    for (const double extreme : {-draw.cut_sd, 0.0, draw.cut_sd}) {
-      const model::Parameter& p = parameters[i];
-      const double value = apply(draw, *p.value, extreme);
-      if (value < p.low || value > p.high)
-        table.fail("parameters", p.path + " could become " + std::to_string(value),
-                   "draws between " + std::to_string(p.low) + " and " + std::to_string(p.high));
-    }
   return draw;
+}
+
+/// Follows how far the draws so far can take each parameter.
+void Randomisation::check_reach(const io::Table& table, const Draw& draw,
+                                const std::vector<model::Parameter>& parameters, std::vector<Reach>& reach) {
+  for (const std::size_t i : draw.parameters) {
+    const model::Parameter& p = parameters[i];
+    const Reach before = reach[i];
+    reach[i].low = reach[i].high = apply(draw, before.low, 0);
+    for (const double from : {before.low, before.high})
+      for (const double extreme : {-draw.cut_sd, 0.0, draw.cut_sd}) {
+        const double value = apply(draw, from, extreme);
+        if (value < p.low || value > p.high)
+          table.fail("parameters", p.path + " could become " + six_digits(value),
+                     "draws between " + six_digits(p.low) + " and " + six_digits(p.high));
+        reach[i] = {std::min(reach[i].low, value), std::max(reach[i].high, value)};
+      }
+  }
+}
+
+/// Possible inertias are a convex set and the laws are straight lines, so the ends of a draw speak for all of it.
+void Randomisation::check_bodies(const io::Table& table, const Draw& draw) const {
+  for (const double extreme : {-draw.cut_sd, 0.0, draw.cut_sd}) {
+    model::Vehicle vehicle = nominal_;
+    const std::vector<model::Parameter> parameters = model::parameters(vehicle);
+    for (const std::size_t i : draw.parameters)
+      *parameters[i].value = apply(draw, *parameters[i].value, extreme);
+    if (const auto fault = model::physical_fault(vehicle))
+      table.fail("parameters", fault->path + ": " + fault->what, fault->accepted);
+  }
 }
 
 double Randomisation::apply(const Draw& draw, double nominal, double variate) {

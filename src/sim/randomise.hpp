@@ -23,8 +23,8 @@ class Randomisation {
   /// No randomisation: every vehicle is the nominal one.
   explicit Randomisation(model::Vehicle nominal) : nominal_(std::move(nominal)) {}
 
-  /// Reads the array `randomise` of a configuration. io::InputError where a parameter is unknown or a draw
-  /// could leave its accepted range.
+  /// Reads the array `randomise` of a configuration. io::InputError where a parameter is unknown, or a draw could
+  /// leave its accepted range or give a body an inertia that no body has.
   Randomisation(model::Vehicle nominal, const io::Table& config);
 
   const model::Vehicle& nominal() const { return nominal_; }
@@ -46,7 +46,13 @@ class Randomisation {
     double a, b;  // mean and sd, or low and high
     double cut_sd;
   };
+  struct Reach {
+    double low, high;
+  };
   static Draw read_draw(const io::Table& table, const std::vector<model::Parameter>& parameters);
+  static void check_reach(const io::Table& table, const Draw& draw,
+                          const std::vector<model::Parameter>& parameters, std::vector<Reach>& reach);
+  void check_bodies(const io::Table& table, const Draw& draw) const;
   static double apply(const Draw& draw, double nominal, double variate);
 
   model::Vehicle nominal_;

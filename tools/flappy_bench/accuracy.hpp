@@ -30,7 +30,7 @@ std::vector<StepRow> step_study(const model::Vehicle& vehicle);
 struct IntegratorRow {
   std::string integrator;
   double step_s;
-  int evaluations;  // of the equations of motion in 0.3 s
+  int evaluations;  // of the equations of motion in 0.3 s; those for the stops are not counted
   double position_error_m;
 };
 /// Integrators at several steps; errors against our 1 us run.

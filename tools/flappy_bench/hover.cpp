@@ -45,10 +45,11 @@ Job read_job(const std::filesystem::path& path, const std::vector<std::string>& 
   job.options.world.ceiling_z_m = root.number_or("world.ceiling_z_m", 1e3);
   root.finish();
   const double steps = vehicle.driver.hold_s / job.options.step_s;
-  if (std::abs(steps - std::round(steps)) > 1e-6)
-    root.fail("step_s",
-              "does not divide the driver's hold of " + std::to_string(vehicle.driver.hold_s) + " s",
-              "hold_s / n");
+  if (std::abs(steps - std::round(steps)) > 1e-6) {
+    char what[64];
+    std::snprintf(what, sizeof what, "does not divide the driver's hold of %g s", vehicle.driver.hold_s);
+    root.fail("step_s", what, "hold_s / n");
+  }
   return job;
 }
 

@@ -2,9 +2,9 @@
 //   explicit   the same leapfrog, but all damping taken at the old rate
 //   midpoint   Runge-Kutta of order 2, two evaluations a step
 //   RK4        the classical one, four evaluations a step
-// Runge-Kutta steps know no stops: a hinge beyond its stop is put back on it and its rate taken away with the
-// impulse that the coupled bodies feel. Dry friction and a hinge at rest on its stop are those of an
-// infinitesimal step.
+// Within a Runge-Kutta step a hinge that its stop holds at the start stays, and the others know no stop; after it, a hinge
+// beyond its stop is put back and its rate taken away with the impulse that the coupled bodies feel. So an impact is up to
+// a step late, and no order shows there. Dry friction is that of an infinitesimal step.
 #include <cmath>
 #include <functional>
 
@@ -20,6 +20,7 @@ using V = Vec3<double>;
 
 constexpr double kInstant_s = 1e-9;
 constexpr double kGravity_m_s2 = 9.81;
+constexpr double kOutOfReach_rad = 1e3;
 
 /// State with the centre of mass as position, so that all of it is integrated alike.
 struct Flapper {
@@ -111,16 +112,46 @@ Flapper plus(Flapper f, double step, const Rates& d) {
   return f;
 }
 
+struct Stops {
+  double low[4], high[4];  // psi left, right, theta left, right
+};
+
+Stops stops_of(const Parameters<double>& p) {
+  return {{p.left.stroke_lower_rad, p.right.stroke_lower_rad, p.left.rotation_lower_rad,
+           p.right.rotation_lower_rad},
+          {p.left.stroke_upper_rad, p.right.stroke_upper_rad, p.left.rotation_upper_rad,
+           p.right.rotation_upper_rad}};
+}
+
+Parameters<double> with_stops(Parameters<double> p, const Stops& s) {
+  p.left.stroke_lower_rad = s.low[0], p.right.stroke_lower_rad = s.low[1];
+  p.left.rotation_lower_rad = s.low[2], p.right.rotation_lower_rad = s.low[3];
+  p.left.stroke_upper_rad = s.high[0], p.right.stroke_upper_rad = s.high[1];
+  p.left.rotation_upper_rad = s.high[2], p.right.rotation_upper_rad = s.high[3];
+  return p;
+}
+
+/// What the stages of one step see: stops closed on the hinges that they hold, and out of reach of the others, because an
+/// infinitesimal step would throw back a stage beyond its stop at once.
+Parameters<double> within_step(const Parameters<double>& p, const Flapper& f, double volts) {
+  Stops s = stops_of(p);
+  double next[4];
+  hinge_rates(evaluate(p, f, volts, kInstant_s).motion, kInstant_s, next);
+  for (int i = 0; i < 4; ++i) {
+    const bool held = (f.angle[i] == s.low[i] || f.angle[i] == s.high[i]) && next[i] == 0;
+    s.low[i] = held ? f.angle[i] : -kOutOfReach_rad;
+    s.high[i] = held ? f.angle[i] : kOutOfReach_rad;
+  }
+  return with_stops(p, s);
+}
+
 /// Puts hinges back on their stops, with the impulse that takes their rate.
 void stop_hinges(const Parameters<double>& p, Flapper& f, double volts) {
-  const double low[4] = {p.left.stroke_lower_rad, p.right.stroke_lower_rad, p.left.rotation_lower_rad,
-                         p.right.rotation_lower_rad};
-  const double high[4] = {p.left.stroke_upper_rad, p.right.stroke_upper_rad, p.left.rotation_upper_rad,
-                          p.right.rotation_upper_rad};
+  const Stops s = stops_of(p);
   bool hit = false;
   for (int i = 0; i < 4; ++i) {
-    hit = hit || f.angle[i] < low[i] || f.angle[i] > high[i];
-    f.angle[i] = clamp(f.angle[i], low[i], high[i]);
+    hit = hit || f.angle[i] < s.low[i] || f.angle[i] > s.high[i];
+    f.angle[i] = clamp(f.angle[i], s.low[i], s.high[i]);
   }
   if (!hit) return;
   const Result e = evaluate(p, f, volts, kInstant_s);
@@ -129,15 +160,17 @@ void stop_hinges(const Parameters<double>& p, Flapper& f, double volts) {
 }
 
 void midpoint(const Parameters<double>& p, Flapper& f, double volts, double step) {
-  f = plus(f, step, rates(p, plus(f, step / 2, rates(p, f, volts)), volts));
+  const Parameters<double> stage = within_step(p, f, volts);
+  f = plus(f, step, rates(stage, plus(f, step / 2, rates(stage, f, volts)), volts));
   stop_hinges(p, f, volts);
 }
 
 void runge_kutta_4(const Parameters<double>& p, Flapper& f, double volts, double step) {
-  const Rates a = rates(p, f, volts);
-  const Rates b = rates(p, plus(f, step / 2, a), volts);
-  const Rates c = rates(p, plus(f, step / 2, b), volts);
-  const Rates d = rates(p, plus(f, step, c), volts);
+  const Parameters<double> stage = within_step(p, f, volts);
+  const Rates a = rates(stage, f, volts);
+  const Rates b = rates(stage, plus(f, step / 2, a), volts);
+  const Rates c = rates(stage, plus(f, step / 2, b), volts);
+  const Rates d = rates(stage, plus(f, step, c), volts);
   f = plus(plus(plus(plus(f, step / 6, a), step / 3, b), step / 3, c), step / 6, d);
   stop_hinges(p, f, volts);
 }

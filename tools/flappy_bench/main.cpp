@@ -136,7 +136,8 @@ int main(int argc, char** argv) {
   std::string config;
   std::vector<std::string> overrides;
   batch->add_option("config", config, "configuration of the batch")->required();
-  batch->add_option("--set", overrides, "override a key: a.b=c");
+  batch->add_option("--set", overrides, "override a key: a.b=c")
+      ->allow_extra_args(false);  // or one given before it takes the config too
   app.require_subcommand(0, 1);
   return program.run(argc, argv, [&] {
     if (*batch) return program.write_json(bench::fly_batch(config, overrides));

@@ -1,0 +1,155 @@
+# flappy-bench as a person meets it: what it prints, writes and refuses, and its exit codes.
+#   cmake -DPROGRAM=flappy-bench -DSOURCE=the project -DWORK=a folder to use -P bench_test.cmake
+cmake_minimum_required(VERSION 3.25)
+file(REMOVE_RECURSE ${WORK})
+file(MAKE_DIRECTORY ${WORK})
+
+# Runs the program; leaves `out`, `err`, `code`.
+macro(run)
+  execute_process(COMMAND ${PROGRAM} ${ARGN} OUTPUT_VARIABLE out ERROR_VARIABLE err RESULT_VARIABLE code)
+endmacro()
+
+function(expect_equal what actual expected)
+  if(NOT "${actual}" STREQUAL "${expected}")
+    message(SEND_ERROR "${what}:\n  is       ${actual}\n  expected ${expected}")
+  endif()
+endfunction()
+
+# Exit code 2, `line` alone on stderr, nothing on stdout, no file (not even a temporary one) where --json pointed.
+function(expect_refused line)
+  run(${ARGN} --json ${WORK}/refused.json)
+  expect_equal("stderr" "${err}" "${line}\n")
+  expect_equal("stdout of: ${line}" "${out}" "")
+  expect_equal("exit code of: ${line}" "${code}" 2)
+  file(GLOB left ${WORK}/refused.json*)
+  expect_equal("files left by: ${line}" "${left}" "")
+endfunction()
+
+# ---- a batch
+
+string(CONCAT good
+  "schema = 1\n"
+  "vehicle = \"${SOURCE}/configs/vehicles/hummingbird_nominal.toml\"\n"
+  "precision = \"float\"\n"
+  "count = 70\n"
+  "seed = 1\n"
+  "duration_s = 0.05\n"
+  "step_s = 1e-4\n"
+  "[input]\n"
+  "amplitude_V = 9.8\n"
+  "[[randomise]]\n"
+  "parameters = [\"torso.mass_kg\", \"torso.inertia_kg_m2\"]\n"
+  "law = \"scale_normal\"\n"
+  "sd = 0.1\n")
+file(WRITE ${WORK}/good.toml "${good}")
+
+foreach(threads IN ITEMS 1 2)
+  run(batch ${WORK}/good.toml --set threads=${threads} --json ${WORK}/batch${threads}.json)
+  expect_equal("exit code" "${code}" 0)
+  expect_equal("stderr" "${err}" "")
+  file(READ ${WORK}/batch${threads}.json json)
+  string(JSON hash${threads} GET "${json}" hash)
+endforeach()
+expect_equal("hash by two threads" "${hash2}" "${hash1}")
+if(NOT out MATCHES "state hash ${hash2}\n")
+  message(SEND_ERROR "the hash is not printed: ${out}")
+endif()
+run(batch --set seed=2 ${WORK}/good.toml --set threads=2 --json ${WORK}/seed.json)
+file(READ ${WORK}/seed.json json)
+string(JSON hash GET "${json}" hash)
+if(hash STREQUAL hash1)
+  message(SEND_ERROR "another seed, the same hash ${hash}")
+endif()
+
+# These keys are there, and are what they say; others may join them.
+function(expect_keys file)
+  file(READ ${file} json)
+  foreach(pair IN LISTS ARGN)
+    string(REPLACE "=" " " pair "${pair}")
+    separate_arguments(pair)
+    list(GET pair 0 key)
+    list(GET pair 1 type)
+    string(JSON actual ERROR_VARIABLE missing TYPE "${json}" ${key})
+    expect_equal("${key} in ${file}" "${actual}" "${type}")
+  endforeach()
+endfunction()
+expect_keys(${WORK}/batch1.json flappers=NUMBER steps=NUMBER wall_s=NUMBER steps_per_s=NUMBER climb_median_m=NUMBER
+  drift_median_m=NUMBER frozen=NUMBER hash=STRING)
+
+# ---- the benchmark, as short as it gets
+
+run(--rounds 1 --seconds 0.01 --no-peers --json ${WORK}/speed.json)
+expect_equal("exit code" "${code}" 0)
+expect_keys(${WORK}/speed.json float_steps_per_s=NUMBER double_steps_per_s=NUMBER two_thread_scaling=NUMBER
+  dart_steps_per_s=NULL mujoco_steps_per_s=NULL thrust_error_100us=NUMBER position_error_100us_m=NUMBER
+  bytes_per_flapper=NUMBER ns_per_step_1000=NUMBER ns_per_step_100000=NUMBER flops_per_step=NUMBER
+  roof_steps_per_s=NUMBER instruction_set=STRING)
+file(READ ${WORK}/speed.json json)
+string(JSON set GET "${json}" instruction_set)
+
+run(--version)
+expect_equal("exit code" "${code}" 0)
+foreach(line IN ITEMS "^flappy-bench [0-9]+\\.[0-9]+\\.[0-9]+\n" "\ncommit ([0-9a-f]+(-dirty)?|unknown)\n" "\ninstruction set ${set}\n"
+    "\ncompiler " "\nCLI11 " "\nnlohmann-json ")
+  if(NOT out MATCHES "${line}")
+    message(SEND_ERROR "--version lacks ${line}: ${out}")
+  endif()
+endforeach()
+
+# ---- what is refused: `old` of the good configuration replaced by `new`; `line` follows the file's name
+
+function(expect_edit_refused old new line)
+  string(REPLACE "${old}" "${new}" text "${good}")
+  file(WRITE ${WORK}/bad.toml "${text}")
+  expect_refused("${WORK}/bad.toml${line}" batch ${WORK}/bad.toml)
+endfunction()
+
+expect_edit_refused("seed = 1" "sed = 1" ": seed: is missing; accepted: an integer of at least 0; is it misspelt as \"sed\"?")
+expect_edit_refused("seed = 1" "seed = 1\nthread = 1"
+  ":6:1: thread: unknown key; accepted: count, duration_s, input, precision, randomise, schema, seed, step_s, threads, vehicle, world; did you mean \"threads\"?")
+expect_edit_refused("duration_s = 0.05" "duration_s = \"long\""
+  ":6:14: duration_s: is a string; accepted: a number above 0, at most 1000")
+expect_edit_refused("count = 70" "count = -70" ":4:9: count: -70 is out of range; accepted: an integer from 1 to 1000000")
+expect_edit_refused("amplitude_V = 9.8" "amplitude_V = nan" ":9:15: input.amplitude_V: nan is not finite; accepted: a number")
+expect_edit_refused("seed = 1" "seed = 1\nseed = 1"
+  ":6:8: not valid TOML: Error while parsing key-value pair: cannot redefine existing integer 'seed'")
+expect_edit_refused("sd = 0.1\n" "sd = 0.1\nlaw"
+  ":14:4: not valid TOML: Error while parsing key-value pair: encountered end-of-file")
+expect_edit_refused("step_s = 1e-4" "step_s = 3e-4"
+  ":7:10: step_s: does not divide the driver's hold of 0.001 s; accepted: hold_s / n")
+expect_edit_refused("sd = 0.1\n" "sd = 0.4\n"
+  ":11:14: randomise[0].parameters: torso.mass_kg could become -0.00218134; accepted: draws between 1e-09 and 10")
+file(WRITE ${WORK}/no_schema.toml "")
+expect_refused("${WORK}/no_schema.toml: schema: is missing; accepted: an integer from 1 to 1" batch ${WORK}/no_schema.toml)
+expect_refused("--set count=0: count: 0 is out of range; accepted: an integer from 1 to 1000000"
+  batch ${WORK}/good.toml --set count=0)
+expect_refused("${WORK}/none.toml: cannot be read: No such file or directory" batch ${WORK}/none.toml)
+expect_refused("${WORK}: cannot be read: Is a directory" batch ${WORK})
+
+file(READ ${SOURCE}/configs/vehicles/hummingbird_nominal.toml vehicle)
+string(REPLACE "mass_kg = 10.9067e-3" "mass_kg = -10.9067e-3" heavy "${vehicle}")
+string(REGEX MATCH "^.*mass_kg = -10" before "${heavy}")
+string(REGEX MATCHALL "\n" lines "${before}")
+list(LENGTH lines line)
+math(EXPR line "${line} + 1")
+file(WRITE ${WORK}/heavy.toml "${heavy}")
+expect_refused("${WORK}/heavy.toml:${line}:11: torso.mass_kg: -0.0109067 is out of range; accepted: a number from 1e-09 to 10"
+  batch ${WORK}/good.toml --set vehicle=\"${WORK}/heavy.toml\")
+expect_refused("${WORK}/heavy.toml:${line}:11: torso.mass_kg: -0.0109067 is out of range; accepted: a number from 1e-09 to 10"
+  --vehicle ${WORK}/heavy.toml)
+
+expect_refused("flappy-bench: The following argument was not expected: --fast; see flappy-bench --help" --fast)
+expect_refused("flappy-bench: --rounds: Value 0 not in range 1 to 1000; see flappy-bench --help" --rounds 0)
+expect_refused("flappy-bench: config is required; see flappy-bench --help" batch)
+
+# ---- a place that cannot be written is found out before the work, which here would outlast the test
+
+foreach(place IN ITEMS "${WORK}/none/x.json: cannot be written: No such file or directory" "${WORK}: cannot be written: Is a directory"
+    "/dev/null: cannot be written: Not a regular file")
+  string(REGEX REPLACE ": .*" "" path "${place}")
+  execute_process(COMMAND ${PROGRAM} batch ${WORK}/good.toml --set count=100000 --set duration_s=1000 --json ${path}
+    OUTPUT_VARIABLE out ERROR_VARIABLE err RESULT_VARIABLE code TIMEOUT 10)
+  expect_equal("stderr" "${err}" "${place}\n")
+  expect_equal("stdout" "${out}" "")
+  expect_equal("exit code" "${code}" 2)
+endforeach()
