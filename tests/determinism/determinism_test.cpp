@@ -10,11 +10,11 @@ namespace flappy::sim {
 namespace {
 
 // A change here means that every recorded run and every trained policy flies differently: say so in the commit.
-constexpr std::uint64_t kGoldenFloat = 0;
-constexpr std::uint64_t kGoldenDouble = 0;
+constexpr std::uint64_t kGoldenFloat = 0x59f5fd7de4140137;
+constexpr std::uint64_t kGoldenDouble = 0x45fc134e90996142;
 
 constexpr std::size_t kFlappers = 4096, kSmall = 68;
-constexpr int kPeriods = 6, kSteps = 20;
+constexpr int kPeriods = 4, kSteps = 20;
 
 const Randomisation& randomisation() {
   static const Randomisation r = [] {
