@@ -5,9 +5,9 @@
 
 #include "accuracy.hpp"
 #include "flappy/batch.hpp"
+#include "flappy/vehicle_file.hpp"
 #include "hover.hpp"
 #include "io/program.hpp"
-#include "model/vehicle_file.hpp"
 #include "speed.hpp"
 #ifdef FLAPPY_HAVE_PEERS
 #include <dart/config.hpp>
