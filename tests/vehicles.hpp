@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "model/vehicle_file.hpp"
+#include "flappy/vehicle_file.hpp"
 
 namespace flappy::test {
 

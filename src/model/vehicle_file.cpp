@@ -1,4 +1,4 @@
-#include "model/vehicle_file.hpp"
+#include "flappy/vehicle_file.hpp"
 
 #include <charconv>
 #include <cstdio>

@@ -20,9 +20,16 @@ FLAPPY_DECLARE_KERNELS(v4)
 const std::vector<KernelSet>& kernels() {
   static const std::vector<KernelSet> all = [] {
     std::vector<KernelSet> k{{scalar::kernel_float, scalar::kernel_double}};
-    if (__builtin_cpu_supports("x86-64-v2")) k.push_back({v2::kernel_float, v2::kernel_double});
-    if (__builtin_cpu_supports("x86-64-v3")) k.push_back({v3::kernel_float, v3::kernel_double});
-    if (__builtin_cpu_supports("x86-64-v4")) k.push_back({v4::kernel_float, v4::kernel_double});
+    // clang 14 does not know "x86-64-v2" and so on: the youngest extensions of each level stand for it
+    const bool has_v2 = __builtin_cpu_supports("ssse3") && __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
+    const bool has_v3 = has_v2 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+                        __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
+    const bool has_v4 = has_v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+                        __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+                        __builtin_cpu_supports("avx512vl");
+    if (has_v2) k.push_back({v2::kernel_float, v2::kernel_double});
+    if (has_v3) k.push_back({v3::kernel_float, v3::kernel_double});
+    if (has_v4) k.push_back({v4::kernel_float, v4::kernel_double});
     return k;
   }();
   return all;

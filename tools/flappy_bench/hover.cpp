@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "flappy/batch.hpp"
+#include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
-#include "model/vehicle_file.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::bench {

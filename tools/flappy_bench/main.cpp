@@ -6,6 +6,7 @@
 
 #include "accuracy.hpp"
 #include "flappy/batch.hpp"
+#include "flappy/vehicle_file.hpp"
 #include "hover.hpp"
 #include "io/program.hpp"
 #include "model/vehicle_file.hpp"

@@ -10,7 +10,7 @@
 
 namespace flappy::model {
 
-/// Reads a vehicle. `overrides`: "left.motor.resistance_ohm=14". io::InputError on any fault.
+/// Reads a vehicle. `overrides`: "left.motor.resistance_ohm=14". Throws std::runtime_error, what() "file:line:column: ..."
 Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
 
 /// The same vehicle as the text of a vehicle file.

@@ -1,0 +1,57 @@
+# What the scripts share; sourced, not run.
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+processors=$(nproc)
+
+say() { printf '%s: %s\n' "$(basename "$0")" "$*"; }
+
+# Runs a command and shows its output only when it fails.
+quietly() {
+  local log code=0
+  log=$(mktemp)
+  "$@" >"$log" 2>&1 </dev/null || code=$?
+  if [ "$code" -ne 0 ]; then
+    cat "$log" >&2
+    say "failed: $*" >&2
+  fi
+  rm -f "$log"
+  return "$code"
+}
+
+# Installs what is missing from the given groups of packages.txt.
+install_packages() {
+  local group package missing=() as_root=()
+  while read -r group package; do
+    [[ " $* " == *" $group "* ]] || continue
+    [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)" = installed ] || missing+=("$package")
+  done < <(grep -v '^#' "$root/scripts/packages.txt")
+  [ "${#missing[@]}" -gt 0 ] || return 0
+  if ! command -v apt-get >/dev/null; then
+    say "no apt here, so the build may fail: install what corresponds to the Debian packages ${missing[*]}" >&2
+    return 0
+  fi
+  if [ "$(id -u)" -ne 0 ]; then
+    if ! command -v sudo >/dev/null; then
+      say "needs root or sudo to install ${missing[*]}" >&2
+      return 1
+    fi
+    as_root=(sudo)
+    [ -z "${CI:-}" ] || as_root+=(-n)
+  fi
+  say "installing ${missing[*]}"
+  quietly "${as_root[@]}" apt-get update
+  quietly "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}"
+}
+
+# Configures a preset with the given options of cmake, and builds it.
+build() {
+  local preset=$1
+  shift
+  say "building $preset"
+  (cd "$root" && quietly cmake --preset "$preset" "$@" && quietly cmake --build --preset "$preset")
+}
+
+# All C++ files of the project, each ended by a zero byte.
+sources() {
+  (cd "$root" && find include src tools tests examples -name '*.[ch]pp' -print0)
+}

@@ -1,0 +1,120 @@
+#!/usr/bin/env python3
+"""Checks which room includes which: include_graph.py ROOT, or --self-test.
+
+A quoted or angled include that begins with a room or with flappy/ is one arrow of the graph. Files that a file of
+another room brings in are its own affair.
+"""
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+# What a room may include besides itself.
+ROOMS = {
+    "io": set(),
+    "model": {"io"},
+    "sim": {"model", "io"},
+    "flight": {"sim", "model", "io"},
+    "learn": {"flight", "sim", "model", "io"},
+    "identify": {"flight", "sim", "model", "io"},
+    "gap": {"flight", "sim", "model", "io"},
+    "deploy": {"flight", "sim", "model", "io"},
+    "blind": {"flight", "io"},
+}
+# Which room declares itself in which public header.
+PUBLIC = {"vehicle.hpp": "model", "vehicle_file.hpp": "model", "world.hpp": "sim", "batch.hpp": "sim"}
+TORCH = {"torch", "ATen", "c10", "caffe2"}
+MAY_USE_TORCH = {"learn", "deploy"}
+GENERATED = {"io/version.hpp"}
+
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTILINE)
+STANDARD = re.compile(r"[a-z][a-z0-9_]*")
+
+
+def faults(root):
+    """One line for each include that the design does not allow, and for each file that has no room."""
+    found = []
+    files = [p for folder in ("src", "include") for p in sorted((root / folder).rglob("*")) if p.suffix in (".hpp", ".cpp", ".h")]
+    for path in files:
+        where = path.relative_to(root)
+        public = where.parts[0] == "include"
+        if public:
+            room = PUBLIC.get("/".join(where.parts[2:])) if where.parts[1] == "flappy" else None
+        else:
+            room = where.parts[1] if where.parts[1] in ROOMS else None
+        if room is None:
+            found.append(f"{where}: no known room; name it in {Path(__file__).name}")
+            continue
+        text = path.read_text(encoding="utf-8")
+        for match in INCLUDE.finditer(text):
+            line = text.count("\n", 0, match.start()) + 1
+            fault = fault_of(root, room, public, match[1], match[2])
+            if fault:
+                found.append(f"{where}:{line}: {match[2]}: {fault}")
+    return found
+
+
+def fault_of(root, room, public, bracket, name):
+    """Why a file of `room` may not include `name`; None if it may."""
+    first, _, rest = name.partition("/")
+    if first in TORCH:
+        return None if room in MAY_USE_TORCH else f"LibTorch belongs to {', '.join(sorted(MAY_USE_TORCH))}"
+    if first == "flappy":
+        if not (root / "include" / name).exists():
+            return "no such public header"
+        target = PUBLIC.get(rest)
+    elif public:
+        return None if bracket == "<" and STANDARD.fullmatch(name) else "a public header includes flappy/ and the standard library only"
+    elif first in ROOMS and rest:
+        if name not in GENERATED and not (root / "src" / name).exists():
+            return "no such file"
+        target = first
+    else:
+        return None if bracket == "<" else "no known room"
+    if target is None or target == room or target in ROOMS[room]:
+        return None
+    return f"{room} may include {', '.join(sorted(ROOMS[room])) or 'no other room'}, not {target}"
+
+
+def self_test():
+    """Each tree has one file that is wrong, or none."""
+    good = {"src/io/files.hpp": "#include <string>\n", "src/model/a.hpp": '#include "io/files.hpp"\n',
+            "include/flappy/vehicle.hpp": "#include <vector>\n", "include/flappy/batch.hpp": '#include "flappy/vehicle.hpp"\n',
+            "src/sim/b.cpp": '#include "flappy/batch.hpp"\n#include "model/a.hpp"\n#include <immintrin.h>\n',
+            "src/flight/c.hpp": '#include "sim/b.hpp"\n', "src/sim/b.hpp": ""}
+    cases = [
+        ({}, None),
+        ({"src/learn/d.cpp": '#include <torch/torch.h>\n#include "flight/c.hpp"\n'}, None),
+        ({"src/model/x.hpp": '#pragma once\n#include "sim/b.hpp"\n'}, "src/model/x.hpp:2: sim/b.hpp: model may include io, not sim"),
+        ({"src/model/x.hpp": "#  include <sim/b.hpp>\n"}, "not sim"),
+        ({"src/model/x.hpp": '#include "flappy/batch.hpp"\n'}, "not sim"),
+        ({"src/io/x.cpp": '#include "flappy/vehicle.hpp"\n'}, "io may include no other room, not model"),
+        ({"src/sim/x.cpp": '#include "flight/c.hpp"\n'}, "not flight"),
+        ({"src/blind/x.cpp": '#include "model/a.hpp"\n'}, "blind may include flight, io, not model"),
+        ({"src/deploy/x.cpp": '#include "learn/d.hpp"\n', "src/learn/d.hpp": ""}, "not learn"),
+        ({"src/flight/x.cpp": "#include <torch/script.h>\n"}, "LibTorch belongs to deploy, learn"),
+        ({"src/attic/x.cpp": ""}, "src/attic/x.cpp: no known room"),
+        ({"src/loose.cpp": ""}, "no known room"),
+        ({"src/sim/x.cpp": '#include "b.hpp"\n'}, "no known room"),
+        ({"src/sim/x.cpp": '#include "model/gone.hpp"\n'}, "no such file"),
+        ({"include/flappy/extra.hpp": ""}, "no known room"),
+        ({"include/flappy/world.hpp": "#include <Eigen/Core>\n"}, "standard library only"),
+        ({"include/flappy/world.hpp": '#include "sim/b.hpp"\n'}, "standard library only"),
+    ]
+    for extra, expected in cases:
+        with tempfile.TemporaryDirectory() as folder:
+            for name, text in {**good, **extra}.items():
+                path = Path(folder, name)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8")
+            found = faults(Path(folder))
+        right = found == [] if expected is None else len(found) == 1 and expected in found[0]
+        if not right:
+            return [f"self-test: {extra} gave {found}, not {expected}"]
+    return []
+
+
+if __name__ == "__main__":
+    problems = self_test() if sys.argv[1:] == ["--self-test"] else faults(Path(sys.argv[1]))
+    print("\n".join(problems) or "no fault")
+    sys.exit(1 if problems else 0)
