@@ -105,9 +105,7 @@ std::string join(const std::string& path, std::string_view key) {
   return path.empty() ? name : path + "." + name;
 }
 
-std::string element_of(const std::string& path, std::size_t index) {
-  return path + "[" + std::to_string(index) + "]";
-}
+std::string element_of(const std::string& path, std::size_t index) { return path + "[" + std::to_string(index) + "]"; }
 
 /// `file:line:column`; an override is its own place, and a default has only the file.
 std::string place(const toml::source_region& source, const std::string& file) {
@@ -156,8 +154,7 @@ std::string kind(const toml::node& node) {
   const std::string path = join(section.path, key.str());
   const std::vector<std::string> names(section.asked.begin(), section.asked.end());
   const std::string same = in_another_unit(key.str(), names);
-  if (!same.empty())
-    refuse(where, path, "unknown key; accepted here with another unit: " + in_quotes(same), "");
+  if (!same.empty()) refuse(where, path, "unknown key; accepted here with another unit: " + in_quotes(same), "");
   std::string accepted;
   for (const auto& name : names) accepted += (accepted.empty() ? "" : ", ") + name;
   if (accepted.empty()) accepted = "no key here";
@@ -249,13 +246,11 @@ T value_or(Section& section, std::string_view key, const T& fallback, std::strin
 }
 
 bool contains(const Range& range, double value) {
-  return std::isfinite(value) && (range.above_low ? value > range.low : value >= range.low) &&
-         value <= range.high;
+  return std::isfinite(value) && (range.above_low ? value > range.low : value >= range.low) && value <= range.high;
 }
 
 /// "a number from 0 to 1", "a number above 0, at most 1", "an integer of at least 1", ...
-std::string describe(const std::string& noun, const std::string& low, const std::string& high,
-                     bool above_low) {
+std::string describe(const std::string& noun, const std::string& low, const std::string& high, bool above_low) {
   if (low.empty() && high.empty()) return noun;
   if (low.empty()) return noun + " of at most " + high;
   if (above_low) return noun + " above " + low + (high.empty() ? "" : ", at most " + high);
@@ -443,8 +438,7 @@ std::string text_of(const toml::node& node) {
   return time.str();
 }
 
-void write_section(std::string& text, const std::string& header, const toml::table& table,
-                   const std::string& path) {
+void write_section(std::string& text, const std::string& header, const toml::table& table, const std::string& path) {
   if (!header.empty()) text += (text.empty() ? "" : "\n") + header + "\n";
   for (const auto& [key, node] : table) {
     if (node.is_table() || node.is_array_of_tables()) continue;
@@ -479,8 +473,7 @@ std::int64_t Table::integer(std::string_view key, std::int64_t low, std::int64_t
   return to_integer(find_required(*section_, key, describe(low, high)), low, high);
 }
 
-std::int64_t Table::integer_or(std::string_view key, std::int64_t fallback, std::int64_t low,
-                               std::int64_t high) const {
+std::int64_t Table::integer_or(std::string_view key, std::int64_t fallback, std::int64_t low, std::int64_t high) const {
   const Entry entry = find(*section_, key);
   if (entry.node) return to_integer(entry, low, high);
   if (fallback >= low && fallback <= high) write_default(entry, fallback);
@@ -579,11 +572,9 @@ Config Config::load(const std::filesystem::path& path, const std::vector<std::st
   return parse(read_text(path), path.string(), overrides);
 }
 
-Config Config::parse(std::string_view text, const std::string& name,
-                     const std::vector<std::string>& overrides) {
+Config Config::parse(std::string_view text, const std::string& name, const std::vector<std::string>& overrides) {
   if (text.size() > kMaxBytes) {
-    refuse(name, "", "is " + std::to_string(text.size()) + " bytes long",
-           "at most " + std::to_string(kMaxBytes));
+    refuse(name, "", "is " + std::to_string(text.size()) + " bytes long", "at most " + std::to_string(kMaxBytes));
   }
   auto document = std::make_shared<Document>(Document{name, parse_toml(text, name, name), {}});
   for (const auto& each : overrides) {

@@ -33,9 +33,7 @@ struct Range {
 };
 
 constexpr Range positive(double high = std::numeric_limits<double>::infinity()) { return {0, high, true}; }
-constexpr Range non_negative(double high = std::numeric_limits<double>::infinity()) {
-  return {0, high, false};
-}
+constexpr Range non_negative(double high = std::numeric_limits<double>::infinity()) { return {0, high, false}; }
 
 /// A handle on one table; copies share it, and it keeps the configuration alive.
 ///
@@ -47,8 +45,7 @@ class Table {
   double number(std::string_view key, Range range = {}) const;
   double number_or(std::string_view key, double fallback, Range range = {}) const;
   std::int64_t integer(std::string_view key, std::int64_t low, std::int64_t high) const;
-  std::int64_t integer_or(std::string_view key, std::int64_t fallback, std::int64_t low,
-                          std::int64_t high) const;
+  std::int64_t integer_or(std::string_view key, std::int64_t fallback, std::int64_t low, std::int64_t high) const;
   bool boolean(std::string_view key) const;
   bool boolean_or(std::string_view key, bool fallback) const;
   std::string string(std::string_view key) const;
@@ -88,8 +85,7 @@ class Config {
   /// overridden.
   static Config load(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
   /// Reads text; `name` stands for the file in messages, and its folder is where relative file names start.
-  static Config parse(std::string_view text, const std::string& name,
-                      const std::vector<std::string>& overrides = {});
+  static Config parse(std::string_view text, const std::string& name, const std::vector<std::string>& overrides = {});
 
   Table root() const;
   /// TOML text of everything, overrides applied and defaults filled in; it reads identically when parsed

@@ -54,8 +54,7 @@ std::vector<std::string> column_names(const Line& line, const std::vector<Cell>&
   std::vector<std::string> names;
   std::set<std::string_view> seen;
   for (const Cell& cell : cells) {
-    if (cell.text.empty())
-      line.refuse(cell.column, "column name is empty; accepted: one name for each column");
+    if (cell.text.empty()) line.refuse(cell.column, "column name is empty; accepted: one name for each column");
     const std::string name(cell.text);
     if (!seen.insert(cell.text).second) line.refuse(cell.column, name + ": column name is given twice");
     names.push_back(name);
@@ -83,8 +82,8 @@ void add_row(const Line& line, const std::vector<Cell>& cells, CsvTable& table) 
   if (line.text.empty()) line.refuse(1, "is an empty line; accepted: " + std::to_string(width) + " cells");
   if (cells.size() != width) {
     const std::size_t column = cells.size() < width ? line.text.size() + 1 : cells[width].column;
-    line.refuse(column, "row has " + std::to_string(cells.size()) +
-                            " cells; accepted: " + std::to_string(width) + ", as in the header");
+    line.refuse(column, "row has " + std::to_string(cells.size()) + " cells; accepted: " + std::to_string(width) +
+                            ", as in the header");
   }
   for (std::size_t i = 0; i < width; ++i) {
     table.columns[i].push_back(to_number(line, cells[i], table.names[i]));
@@ -108,8 +107,7 @@ CsvTable read_csv(const std::filesystem::path& path) { return parse_csv(read_tex
 CsvTable parse_csv(std::string_view text, const std::string& name) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  if (text.empty())
-    throw InputError(name + ": is empty; accepted: a line of column names, then rows of numbers");
+  if (text.empty()) throw InputError(name + ": is empty; accepted: a line of column names, then rows of numbers");
 
   CsvTable table{name, {}, {}};
   std::vector<Cell> cells;
@@ -133,8 +131,7 @@ CsvWriter::CsvWriter(const std::filesystem::path& path, const std::vector<std::s
 }
 
 void CsvWriter::row(std::span<const double> values) {
-  if (values.size() != width_)
-    throw std::invalid_argument("CsvWriter: a row must have one value for each column");
+  if (values.size() != width_) throw std::invalid_argument("CsvWriter: a row must have one value for each column");
   line_.clear();
   std::array<char, 32> digits;
   for (const double value : values) {

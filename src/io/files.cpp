@@ -60,13 +60,12 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 /// The key with its unit replaced by the SI unit of the same quantity: "mass_kg" for "mass_g".
 std::string in_base_units(std::string_view key) {
   static const std::map<std::string_view, std::string_view> kBase = {
-      {"m", "m"},     {"km", "m"},    {"cm", "m"},    {"mm", "m"},     {"um", "m"},  {"kg", "kg"},
-      {"g", "kg"},    {"mg", "kg"},   {"s", "s"},     {"h", "s"},      {"ms", "s"},  {"us", "s"},
-      {"ns", "s"},    {"rad", "rad"}, {"N", "N"},     {"mN", "N"},     {"uN", "N"},  {"Nm", "Nm"},
-      {"mNm", "Nm"},  {"uNm", "Nm"},  {"deg", "rad"}, {"V", "V"},      {"mV", "V"},  {"A", "A"},
-      {"mA", "A"},    {"W", "W"},     {"mW", "W"},    {"mrad", "rad"}, {"J", "J"},   {"mJ", "J"},
-      {"Hz", "Hz"},   {"hz", "Hz"},   {"kHz", "Hz"},  {"rpm", "Hz"},   {"Pa", "Pa"}, {"kPa", "Pa"},
-      {"ohm", "ohm"}, {"mohm", "ohm"}};
+      {"m", "m"},    {"km", "m"},    {"cm", "m"},    {"mm", "m"},  {"um", "m"},   {"kg", "kg"},  {"g", "kg"},
+      {"mg", "kg"},  {"s", "s"},     {"h", "s"},     {"ms", "s"},  {"us", "s"},   {"ns", "s"},   {"rad", "rad"},
+      {"N", "N"},    {"mN", "N"},    {"uN", "N"},    {"Nm", "Nm"}, {"mNm", "Nm"}, {"uNm", "Nm"}, {"deg", "rad"},
+      {"V", "V"},    {"mV", "V"},    {"A", "A"},     {"mA", "A"},  {"W", "W"},    {"mW", "W"},   {"mrad", "rad"},
+      {"J", "J"},    {"mJ", "J"},    {"Hz", "Hz"},   {"hz", "Hz"}, {"kHz", "Hz"}, {"rpm", "Hz"}, {"Pa", "Pa"},
+      {"kPa", "Pa"}, {"ohm", "ohm"}, {"mohm", "ohm"}};
   std::string unit;
   for (;;) {
     const std::size_t bar = key.rfind('_');
@@ -114,8 +113,7 @@ std::string nearest_name(std::string_view wrong, const std::vector<std::string>&
 
 std::string in_another_unit(std::string_view wrong, const std::vector<std::string>& names) {
   const std::string base = in_base_units(wrong);
-  const auto found =
-      std::ranges::find_if(names, [&](const auto& name) { return in_base_units(name) == base; });
+  const auto found = std::ranges::find_if(names, [&](const auto& name) { return in_base_units(name) == base; });
   return found == names.end() ? "" : *found;
 }
 

@@ -10,8 +10,7 @@ namespace flappy::io {
 
 std::string commit() { return FLAPPY_COMMIT; }
 
-Program::Program(const std::string& name, const std::string& description,
-                 const std::vector<std::string>& facts)
+Program::Program(const std::string& name, const std::string& description, const std::vector<std::string>& facts)
     : app_(description, name) {
   std::string version = name + " " FLAPPY_VERSION "\ncommit " + commit() + "\ncompiler " + __VERSION__;
   for (const std::string& fact : facts) version += "\n" + fact;
@@ -30,8 +29,7 @@ int Program::run(int argc, char** argv, const std::function<void()>& job) {
     return 0;
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app_.exit(e);  // --help, --version
-    std::fprintf(stderr, "%s: %s; see %s --help\n", app_.get_name().c_str(), e.what(),
-                 app_.get_name().c_str());
+    std::fprintf(stderr, "%s: %s; see %s --help\n", app_.get_name().c_str(), e.what(), app_.get_name().c_str());
     return 2;
   } catch (const InputError& e) {
     std::fprintf(stderr, "%s\n", e.what());

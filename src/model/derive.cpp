@@ -9,8 +9,7 @@ Vec3<double> vec(const Triple& t) { return {t.x, t.y, t.z}; }
 Vec3<double> first_moment(const RigidBody& b) { return b.mass_kg * vec(b.com_m); }
 
 Sym3<double> outer(double mass, const Vec3<double>& r) {
-  return {mass * r.x * r.x, mass * r.y * r.y, mass * r.z * r.z,
-          mass * r.x * r.y, mass * r.y * r.z, mass * r.x * r.z};
+  return {mass * r.x * r.x, mass * r.y * r.y, mass * r.z * r.z, mass * r.x * r.y, mass * r.y * r.z, mass * r.x * r.z};
 }
 
 /// Second moment of mass (integral of r r^T) about the frame's origin, from the inertia I about the centre of
@@ -41,15 +40,13 @@ SideParameters<double> derive_side(const Side& s, double air_density, double ste
   p.moment2 = pressure * c * c * R * R * R * w.z_cp2;
   p.moment1 = 2 * pressure * c * c * R * R * w.z_cp1;
   p.moment0 = pressure * c * c * R * w.z_cp0;
-  p.rotational_damping_Nm_s2 =
-      0.125 * air_density * w.rotational_damping_coefficient * R * c * c * c * c * w.z_rd;
+  p.rotational_damping_Nm_s2 = 0.125 * air_density * w.rotational_damping_coefficient * R * c * c * c * c * w.z_rd;
   p.span_to_pressure_m = R * w.r33 / w.r22;
 
   const Motor& m = s.motor;
   const double N = m.gear_ratio, K = m.torque_constant_Nm_A;
   p.stroke_torque_per_V_Nm = N * m.efficiency * K / m.resistance_ohm;
-  p.stroke_damping_Nm_s =
-      m.efficiency * N * N * (K * K / m.resistance_ohm + m.damping_Nm_s) + s.stroke.damping_Nm_s;
+  p.stroke_damping_Nm_s = m.efficiency * N * N * (K * K / m.resistance_ohm + m.damping_Nm_s) + s.stroke.damping_Nm_s;
   p.stroke_friction_Nm = m.efficiency * N * m.friction_Nm + s.stroke.friction_Nm;
   p.rotor_kg_m2 = m.efficiency * N * N * m.rotor_inertia_kg_m2;
   p.voltage_limit_V = m.voltage_limit_V;
@@ -77,10 +74,10 @@ Parameters<double> derive(const Vehicle& v, double step_s) {
   p.left = derive_side(v.left, v.air_density_kg_m3, step_s);
   p.right = derive_side(v.right, v.air_density_kg_m3, step_s);
   p.inverse_mass_1_kg = 1 / total_mass_kg(v);
-  p.fixed_moment_kg_m = first_moment(v.torso) +
-                        (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
-  p.fixed_second_kg_m2 = second_moment(v.torso) + (outer(wing_mass(v.left), p.left.shoulder_m) +
-                                                   outer(wing_mass(v.right), p.right.shoulder_m));
+  p.fixed_moment_kg_m =
+      first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
+  p.fixed_second_kg_m2 = second_moment(v.torso) +
+                         (outer(wing_mass(v.left), p.left.shoulder_m) + outer(wing_mass(v.right), p.right.shoulder_m));
   p.air_density_kg_m3 = v.air_density_kg_m3;
   p.below_m = v.extent.below_m;
   p.above_m = v.extent.above_m;

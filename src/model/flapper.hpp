@@ -16,7 +16,7 @@ struct SideParameters {
   Sym3<T> edge_second_kg_m2;  //   second moment
   Vec3<T> wing_moment_kg_m;   // wing: the same in the wing's own frame
   Sym3<T> wing_second_kg_m2;
-  T force2, force1, force0;  // 1/2 rho c R^(n+1) r_nn of F_N = C_N sum a_n force_n; the 2 of a_1 is in force1
+  T force2, force1, force0;     // 1/2 rho c R^(n+1) r_nn of F_N = C_N sum a_n force_n; the 2 of a_1 is in force1
   T moment2, moment1, moment0;  // the same for M_aero
   T rotational_damping_Nm_s2;   // of M_rd
   T span_to_pressure_m;         // r_cp

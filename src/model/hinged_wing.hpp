@@ -47,8 +47,7 @@ FLAPPY_INLINE Vec3<T> moment_about_shoulder(const SideParameters<T>& p, const Si
 }
 
 template <int side, class T>
-FLAPPY_INLINE WingPose<T> place_wing(const SideParameters<T>& p, const SideState<T>& q,
-                                     const Vec3<T>& body_rate) {
+FLAPPY_INLINE WingPose<T> place_wing(const SideParameters<T>& p, const SideState<T>& q, const Vec3<T>& body_rate) {
   WingPose<T> g;
   g.beta = sin_cos(T(T(side) * q.stroke_rad));
   g.theta = sin_cos(q.rotation_rad);
@@ -83,8 +82,7 @@ FLAPPY_INLINE WingInertia<T> wing_inertia(const SideParameters<T>& p, const Wing
   const T k_x = (pw_x + pw_x) + (b * pw.xz + t * pw.xy), k_z = (pw_z + pw_z) + (b * pw.zz + t * pw.yz);
   const T bt = b * t, t2 = t * t;
   const T wing_y = bt * pw.xy - k_x * b;
-  i.relative_moment_L = {m_y * b - (k_z * t + bt * T(pw.yy + pw.zz)), bt * pw.xy - m_x * b,
-                         k_x * t + bt * pw.xz};
+  i.relative_moment_L = {m_y * b - (k_z * t + bt * T(pw.yy + pw.zz)), bt * pw.xy - m_x * b, k_x * t + bt * pw.xz};
   const Vec3<T> twice{w.x + w.x, w.y + w.y, w.z + w.z + b};
   const Vec3<T> momentum_L{t * hw.z - b * h.y, b * h.x, -(t * hw.x)};
   i.relative_force_L = cross(twice, momentum_L) + Vec3<T>{-(t2 * hw.x), bt * hw.z, -(t2 * hw.z)};

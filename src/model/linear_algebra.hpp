@@ -10,12 +10,8 @@ template <class T>
 struct Vec3 {
   T x, y, z;
 
-  friend FLAPPY_INLINE Vec3 operator+(const Vec3& a, const Vec3& b) {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
-  }
-  friend FLAPPY_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) {
-    return {a.x - b.x, a.y - b.y, a.z - b.z};
-  }
+  friend FLAPPY_INLINE Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+  friend FLAPPY_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
   friend FLAPPY_INLINE Vec3 operator*(const T& s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
 };
 
@@ -164,8 +160,7 @@ struct Matrix3 {
 
 template <class T>
 FLAPPY_INLINE Vec3<T> transpose_times(const Matrix3<T>& m, const Vec3<T>& v) {
-  return {m.row_x.x * v.x + (m.row_y.x * v.y + m.row_z.x * v.z),
-          m.row_x.y * v.x + (m.row_y.y * v.y + m.row_z.y * v.z),
+  return {m.row_x.x * v.x + (m.row_y.x * v.y + m.row_z.x * v.z), m.row_x.y * v.x + (m.row_y.y * v.y + m.row_z.y * v.z),
           m.row_x.z * v.x + (m.row_y.z * v.y + m.row_z.z * v.z)};
 }
 
@@ -183,9 +178,8 @@ FLAPPY_INLINE Matrix3<T> rotation_matrix(const Quaternion<T>& q) {
 /// length by one Newton step, exact to |e|^4 and free of drift.
 template <class T>
 FLAPPY_INLINE Quaternion<T> turned(const Quaternion<T>& q, const Vec3<T>& e) {
-  const Quaternion<T> r{
-      q.w - (q.x * e.x + (q.y * e.y + q.z * e.z)), q.x + (q.w * e.x + (q.y * e.z - q.z * e.y)),
-      q.y + (q.w * e.y + (q.z * e.x - q.x * e.z)), q.z + (q.w * e.z + (q.x * e.y - q.y * e.x))};
+  const Quaternion<T> r{q.w - (q.x * e.x + (q.y * e.y + q.z * e.z)), q.x + (q.w * e.x + (q.y * e.z - q.z * e.y)),
+                        q.y + (q.w * e.y + (q.z * e.x - q.x * e.z)), q.z + (q.w * e.z + (q.x * e.y - q.y * e.x))};
   const T norm2 = r.w * r.w + (r.x * r.x + (r.y * r.y + r.z * r.z));
   const T scale = T(1.5) - T(0.5) * norm2;
   return {scale * r.w, scale * r.x, scale * r.y, scale * r.z};

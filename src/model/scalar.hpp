@@ -33,9 +33,7 @@ FLAPPY_INLINE float abs(float a) { return __builtin_fabsf(a); }
 FLAPPY_INLINE double abs(double a) { return __builtin_fabs(a); }
 
 /// 2^-k for a whole number k within the normal range.
-FLAPPY_INLINE float half_to(float k) {
-  return std::bit_cast<float>((127 - static_cast<std::int32_t>(k)) << 23);
-}
+FLAPPY_INLINE float half_to(float k) { return std::bit_cast<float>((127 - static_cast<std::int32_t>(k)) << 23); }
 FLAPPY_INLINE double half_to(double k) {
   return std::bit_cast<double>((std::int64_t{1023} - static_cast<std::int64_t>(k)) << 52);
 }

@@ -87,8 +87,7 @@ class Lister {
 bool possible(const InertiaTensor& i) {
   Eigen::Matrix3d m;
   m << i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz;
-  const Eigen::Vector3d e =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector3d e = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
   return e[0] > 0 && e[0] + e[1] >= e[2];
 }
 

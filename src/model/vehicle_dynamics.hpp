@@ -74,8 +74,8 @@ FLAPPY_INLINE Sym3<T> hung_at(const Vec3<T>& s, const Vec3<T>& h) {
 template <class T>
 FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const Sides<WingPose<T>>& pose,
                                               const Sides<WingInertia<T>>& wing, const Vec3<T>& com) {
-  const Sym3<T> o = p.fixed_second_kg_m2 + (hung_at(p.left.shoulder_m, pose.left.moment) +
-                                            hung_at(p.right.shoulder_m, pose.right.moment));
+  const Sym3<T> o = p.fixed_second_kg_m2 +
+                    (hung_at(p.left.shoulder_m, pose.left.moment) + hung_at(p.right.shoulder_m, pose.right.moment));
   const Vec3<T> m = p.fixed_moment_kg_m + (pose.left.moment + pose.right.moment);
   const Sym3<T> placed{o.xx - m.x * com.x, o.yy - m.y * com.y, o.zz - m.z * com.z,
                        o.xy - m.x * com.y, o.yz - m.y * com.z, o.xz - m.x * com.z};
@@ -92,10 +92,8 @@ struct Hinge {
 template <int side, class T>
 FLAPPY_INLINE Hinge<T> stroke_hinge(const SideParameters<T>& p, const SideState<T>& q) {
   const T lowest = p.stroke_lower_rad - q.stroke_rad, highest = p.stroke_upper_rad - q.stroke_rad;
-  if constexpr (side > 0)
-    return {q.stroke_rate_rad_s, lowest, highest, p.stroke_friction_Nm};
-  else
-    return {-q.stroke_rate_rad_s, -highest, -lowest, p.stroke_friction_Nm};
+  if constexpr (side > 0) return {q.stroke_rate_rad_s, lowest, highest, p.stroke_friction_Nm};
+  else return {-q.stroke_rate_rad_s, -highest, -lowest, p.stroke_friction_Nm};
 }
 
 template <class T>
@@ -134,9 +132,8 @@ struct BodyInertia {
 };
 
 template <class T>
-FLAPPY_INLINE BodyInertia<T> body_inertia(const Parameters<T>& p, const State<T>& x,
-                                          const Sides<WingPose<T>>& pose, const Sides<WingInertia<T>>& wing,
-                                          const WholeVehicle<T>& v) {
+FLAPPY_INLINE BodyInertia<T> body_inertia(const Parameters<T>& p, const State<T>& x, const Sides<WingPose<T>>& pose,
+                                          const Sides<WingInertia<T>>& wing, const WholeVehicle<T>& v) {
   const Sym3<T> second = second_moment_about_com(p, pose, wing, v.com);
   BodyInertia<T> b{p.inverse_mass_1_kg, second, inverse(inertia_of(second))};
   const auto held = x.support > T(0);
@@ -156,11 +153,10 @@ struct BodyDrive {
 
 /// `up_B`: the vertical in B; `gravity`: m/s^2.
 template <class T>
-FLAPPY_INLINE BodyDrive<T> drive_body(const Parameters<T>& p, const State<T>& x,
-                                      const Sides<WingPose<T>>& pose, const Sides<WingInertia<T>>& wing,
-                                      const WholeVehicle<T>& v, const BodyInertia<T>& inertia,
-                                      const Sides<SideLoad<T>>& load, const BodyLoad<T>& body,
-                                      const Vec3<T>& up_B, const T& gravity) {
+FLAPPY_INLINE BodyDrive<T> drive_body(const Parameters<T>& p, const State<T>& x, const Sides<WingPose<T>>& pose,
+                                      const Sides<WingInertia<T>>& wing, const WholeVehicle<T>& v,
+                                      const BodyInertia<T>& inertia, const Sides<SideLoad<T>>& load,
+                                      const BodyLoad<T>& body, const Vec3<T>& up_B, const T& gravity) {
   const Vec3<T>& w = x.body_rate_rad_s;
   const auto to_B = [](const WingPose<T>& g, const Vec3<T>& a) { return turn_z(g.beta.sin, g.beta.cos, a); };
   const auto air = [](const WingPose<T>& g, const SideLoad<T>& a) {
@@ -193,7 +189,7 @@ struct HingeSystem {
   Vec3<T> stroke_l, stroke_r, rotation_l, rotation_r;  // columns of G
   Sym2<T> strokes, rotations;                          // blocks of H - G^T I^-1 G
   T ll, rr, lr, rl;                                    // and between them: (stroke, rotation)
-  T s_l, s_r, r_l, r_r;  // what drives strokes and rotations, dry friction excluded
+  T s_l, s_r, r_l, r_r;                                // what drives strokes and rotations, dry friction excluded
 };
 
 template <class T>
@@ -220,10 +216,9 @@ FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const Sides<
     return T((own - body.inverse_mass * dot(e, f)) - scale * dot(g, x));
   };
   const SideParameters<T>&pl = p.left, &pr = p.right;
-  h.strokes = {
-      left(l.stroke_inertia + (pl.rotor_kg_m2 + pl.stroke_stiffening_kg_m2), esl, esl, h.stroke_l, xsl),
-      left(r.stroke_inertia + (pr.rotor_kg_m2 + pr.stroke_stiffening_kg_m2), esr, esr, h.stroke_r, xsr),
-      left(T(0), esl, esr, h.stroke_l, xsr)};
+  h.strokes = {left(l.stroke_inertia + (pl.rotor_kg_m2 + pl.stroke_stiffening_kg_m2), esl, esl, h.stroke_l, xsl),
+               left(r.stroke_inertia + (pr.rotor_kg_m2 + pr.stroke_stiffening_kg_m2), esr, esr, h.stroke_r, xsr),
+               left(T(0), esl, esr, h.stroke_l, xsr)};
   const auto rotation = [](const WingInertia<T>& g, const T& rate, const SideParameters<T>& s) {
     return T(g.rotation_inertia + (s.rotation_stiffening_kg_m2 + s.rotation_stiffening_kg_m2_s * abs(rate)));
   };
@@ -280,8 +275,7 @@ struct Motion {
 
 template <class T>
 FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const BodyInertia<T>& body,
-                             const BodyDrive<T>& drive, const HingeSystem<T>& h, const T& step,
-                             const T& per_step) {
+                             const BodyDrive<T>& drive, const HingeSystem<T>& h, const T& step, const T& per_step) {
   const Hinge<T> stroke_l = stroke_hinge<+1>(p.left, x.left), stroke_r = stroke_hinge<-1>(p.right, x.right);
   const Hinge<T> rotation_l = rotation_hinge(p.left, x.left), rotation_r = rotation_hinge(p.right, x.right);
   const T s_l = h.s_l + dry_friction(h.strokes.ll, stroke_l, h.s_l, per_step);
@@ -294,13 +288,11 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
       __attribute__((always_inline)) {
     const RotationSystem<T> e = eliminate_strokes(h, K);
     const Sym2<T>&k = K.adjugate, &a = e.inverse.adjugate;
-    const T y_l = given_l + K.scale * T(k.ll * s_l + k.lr * s_r),
-            y_r = given_r + K.scale * T(k.lr * s_l + k.rr * s_r);
+    const T y_l = given_l + K.scale * T(k.ll * s_l + k.lr * s_r), y_r = given_r + K.scale * T(k.lr * s_l + k.rr * s_r);
     T b_l = h.r_l - (h.ll * y_l + h.rl * y_r), b_r = h.r_r - (h.lr * y_l + h.rr * y_r);
     b_l += dry_friction(e.A.ll, rotation_l, b_l, per_step);
     b_r += dry_friction(e.A.rr, rotation_r, b_r, per_step);
-    const T coast_l = step * rotation_l.rate, coast_r = step * rotation_r.rate,
-            scale = step2 * e.inverse.scale;
+    const T coast_l = step * rotation_l.rate, coast_r = step * rotation_r.rate, scale = step2 * e.inverse.scale;
     const T free_l = coast_l + scale * T(a.ll * b_l + a.lr * b_r);
     const T free_r = coast_r + scale * T(a.lr * b_l + a.rr * b_r);
     const T taken_l = free_l - stopped(rotation_l, free_l), taken_r = free_r - stopped(rotation_r, free_r);
@@ -315,22 +307,18 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
   };
   const Inverse<Sym2<T>, T> free = inverse(h.strokes);
   accelerate(free, T(0), T(0));
-  const auto beyond = [](const Hinge<T>& q, const T& turn) {
-    return (turn < q.lowest_turn) | (turn > q.highest_turn);
-  };
+  const auto beyond = [](const Hinge<T>& q, const T& turn) { return (turn < q.lowest_turn) | (turn > q.highest_turn); };
   auto out_l = beyond(stroke_l, m.stroke_left), out_r = beyond(stroke_r, m.stroke_right);
-  if (rarely(out_l |
-             out_r)) {  // a stroke reaches its stop: once more, with its turn given and its row of K gone
+  if (rarely(out_l | out_r)) {  // a stroke reaches its stop: once more, with its turn given and its row of K gone
     const T zero(0);
     const Sym2<T>& S = h.strokes;
     const auto prescribe = [&](const T& stop_l, const T& stop_r) __attribute__((always_inline)) {
       const auto row = [&](const auto& out, const auto& other_out, const T& own, const T& pair) {
         return where(out, zero, where(other_out, T(T(1) / own), pair));
       };
-      const Inverse<Sym2<T>, T> K{
-          {row(out_l, out_r, S.ll, free.adjugate.ll), row(out_r, out_l, S.rr, free.adjugate.rr),
-           where(out_l | out_r, zero, free.adjugate.lr)},
-          where(out_l | out_r, T(1), free.scale)};
+      const Inverse<Sym2<T>, T> K{{row(out_l, out_r, S.ll, free.adjugate.ll), row(out_r, out_l, S.rr, free.adjugate.rr),
+                                   where(out_l | out_r, zero, free.adjugate.lr)},
+                                  where(out_l | out_r, T(1), free.scale)};
       accelerate(K, where(out_l, stop_l, where(out_r, T(-(T(S.lr / S.ll) * stop_r)), zero)),
                  where(out_r, stop_r, where(out_l, T(-(T(S.lr / S.rr) * stop_l)), zero)));
     };
@@ -340,8 +328,7 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
     T stop_l = landing(stroke_l, m.stroke_left), stop_r = landing(stroke_r, m.stroke_right);
     prescribe(stop_l, stop_r);
     // the landing of one may throw the other out; lanes where it does not get the same numbers again
-    const auto also_l = beyond(stroke_l, m.stroke_left) & !out_l,
-               also_r = beyond(stroke_r, m.stroke_right) & !out_r;
+    const auto also_l = beyond(stroke_l, m.stroke_left) & !out_l, also_r = beyond(stroke_r, m.stroke_right) & !out_r;
     if (rarely(also_l | also_r)) {
       stop_l = where(also_l, landing(stroke_l, m.stroke_left), stop_l);
       stop_r = where(also_r, landing(stroke_r, m.stroke_right), stop_r);
@@ -353,8 +340,8 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
     m.stroke_right = stopped(stroke_r, m.stroke_right);
   }
 
-  const Vec3<T> hinges = add_scaled(
-      add_scaled(add_scaled(a_sl * h.stroke_l, a_sr, h.stroke_r), a_rl, h.rotation_l), a_rr, h.rotation_r);
+  const Vec3<T> hinges =
+      add_scaled(add_scaled(add_scaled(a_sl * h.stroke_l, a_sr, h.stroke_r), a_rl, h.rotation_l), a_rr, h.rotation_r);
   m.body_acceleration = body.inverse.scale * (body.inverse.adjugate * (drive.moment - hinges));
   return m;
 }

@@ -72,8 +72,7 @@ std::string vehicle_text(const Vehicle& vehicle) {
   for (const Parameter& p : parameters(copy)) text += p.path + " = " + number_text(*p.value) + "\n";
   for (const auto& [id, values] : vehicle.effects) {
     if (values.empty()) text += "effects." + id + " = {}\n";  // in force at its typical size
-    for (const auto& [name, value] : values)
-      text += "effects." + id + "." + name + " = " + number_text(value) + "\n";
+    for (const auto& [name, value] : values) text += "effects." + id + "." + name + " = " + number_text(value) + "\n";
   }
   return text;
 }

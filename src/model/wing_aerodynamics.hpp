@@ -55,8 +55,8 @@ FLAPPY_INLINE WingWrench<T> scaled(const WingWrench<T>& w, const T& factor) {
 /// `v`, `w`: velocity of the shoulder and angular velocity of E relative to the air, in E. `side`: +1 left,
 /// -1 right.
 template <int side, class T>
-FLAPPY_INLINE WingWrench<T> blade_element(const SideParameters<T>& p, const SinCos<T>& theta,
-                                          const T& theta_rate, const Vec3<T>& v, const Vec3<T>& w) {
+FLAPPY_INLINE WingWrench<T> blade_element(const SideParameters<T>& p, const SinCos<T>& theta, const T& theta_rate,
+                                          const Vec3<T>& v, const Vec3<T>& w) {
   constexpr double s = side;
   const T ui1 = T(s) * w.z, ui0 = -v.x;
   const T uo1 = T(s) * w.x, uo0 = v.z;
@@ -71,16 +71,12 @@ FLAPPY_INLINE WingWrench<T> blade_element(const SideParameters<T>& p, const SinC
   const T half_a1 = ui1 * ui0 + uo1 * uo0;
   const T a0 = ui0 * ui0 + uo0 * uo0;
   const T normal = c.force * T(a2 * p.force2 + (half_a1 * p.force1 + a0 * p.force0));
-  const T pressure =
-      -(T(c.force * c.pressure_centre) * T(a2 * p.moment2 + (half_a1 * p.moment1 + a0 * p.moment0)));
+  const T pressure = -(T(c.force * c.pressure_centre) * T(a2 * p.moment2 + (half_a1 * p.moment1 + a0 * p.moment0)));
   const T damping = -(T(p.rotational_damping_Nm_s2 * abs(theta_rate)) * theta_rate);
 
   // (F_N, 0, 0) at (0, s r_cp, -D) of the wing frame, turned by theta about y
   const T arm = T(-s) * p.span_to_pressure_m * normal;
-  return {normal,
-          theta.cos * normal,
-          -(theta.sin * normal),
-          {theta.sin * arm, pressure + damping, theta.cos * arm}};
+  return {normal, theta.cos * normal, -(theta.sin * normal), {theta.sin * arm, pressure + damping, theta.cos * arm}};
 }
 
 }  // namespace FLAPPY_ISA

@@ -29,8 +29,7 @@ FLAPPY_INLINE ShoulderWrench<T> air_on_driven_wing(const SideParameters<T>& p, c
                                                    const WingAngles<T>& rates, const Vec3<T>& velocity_B,
                                                    const Vec3<T>& body_rate) {
   const SinCos<T> plane = sin_cos(angles.stroke_plane_rad), theta = sin_cos(angles.rotation_rad);
-  const SinCos<T> beta = sin_cos(T(T(side) * angles.stroke_rad)),
-                  lift = sin_cos(T(T(side) * angles.deviation_rad));
+  const SinCos<T> beta = sin_cos(T(T(side) * angles.stroke_rad)), lift = sin_cos(T(T(side) * angles.deviation_rad));
   const T zero(0), beta_rate = T(side) * rates.stroke_rad, lift_rate = T(side) * rates.deviation_rad;
   const auto to_E = [&](const Vec3<T>& v, const Vec3<T>& plane_part, const Vec3<T>& beta_part,
                         const Vec3<T>& lift_part) {

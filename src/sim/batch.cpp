@@ -35,9 +35,8 @@ S get(const T (*rows)[lanes], int lane) {
 
 /// How the centre of mass moves relative to the torso origin, in W.
 Vec3<double> com_minus_origin_velocity(const Parameters<double>& p, const State<double>& x) {
-  const auto whole =
-      model::whole_vehicle<double>(p, {model::place_wing<+1>(p.left, x.left, x.body_rate_rad_s),
-                                       model::place_wing<-1>(p.right, x.right, x.body_rate_rad_s)});
+  const auto whole = model::whole_vehicle<double>(p, {model::place_wing<+1>(p.left, x.left, x.body_rate_rad_s),
+                                                      model::place_wing<-1>(p.right, x.right, x.body_rate_rad_s)});
   return model::rotation_matrix(x.attitude) * (model::cross(x.body_rate_rad_s, whole.com) + whole.com_rate);
 }
 
@@ -50,10 +49,8 @@ std::uint64_t mixed(std::uint64_t h, std::uint64_t word) {  // splitmix64's fina
 
 template <class T>
 std::uint64_t bits(T value) {
-  if constexpr (sizeof(T) == 4)
-    return std::bit_cast<std::uint32_t>(value);
-  else
-    return std::bit_cast<std::uint64_t>(value);
+  if constexpr (sizeof(T) == 4) return std::bit_cast<std::uint32_t>(value);
+  else return std::bit_cast<std::uint64_t>(value);
 }
 
 }  // namespace
@@ -117,8 +114,7 @@ struct Batch<T>::Storage {
       if (own != v.effects.end()) lane_effects[i] |= std::uint64_t{1} << e;
       for (std::size_t k = 0; k < entry.parameters.size(); ++k) {
         const model::EffectParameter& parameter = entry.parameters[k];
-        double value =
-            static_cast<int>(k) == entry.info.vanishing ? entry.info.vanishing_value : parameter.typical;
+        double value = static_cast<int>(k) == entry.info.vanishing ? entry.info.vanishing_value : parameter.typical;
         if (own != v.effects.end()) {
           const auto given = own->second.find(parameter.name);
           value = given != own->second.end() ? given->second : parameter.typical;
@@ -188,8 +184,7 @@ void Batch<T>::reset(std::size_t i, const FlapperState& f, Start start) {
   x.left = {f.stroke_rad[0], f.rotation_rad[0], f.stroke_rate_rad_s[0], f.rotation_rate_rad_s[0]};
   x.right = {f.stroke_rad[1], f.rotation_rad[1], f.stroke_rate_rad_s[1], f.rotation_rate_rad_s[1]};
   const Vec3<double> velocity{f.velocity_m_s[0], f.velocity_m_s[1], f.velocity_m_s[2]};
-  x.com_velocity_m_s =
-      velocity + com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
+  x.com_velocity_m_s = velocity + com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
   if (start == Start::standing) x.support = static_cast<double>(model::Support::standing);
   if (start == Start::welded) x.support = static_cast<double>(model::Support::welded);
   put(x, block.state, lane);
@@ -224,8 +219,7 @@ void Batch<T>::step(int steps) {
   for (std::ptrdiff_t b = 0; b < blocks; ++b) {
     BlockEffects<T> effects;
     const auto i = static_cast<std::size_t>(b);
-    if (!s.block_effects.empty())
-      effects = {s.block_effects[i], &s.effect_rows[i * model::kEffectRows * kLanes<T>]};
+    if (!s.block_effects.empty()) effects = {s.block_effects[i], &s.effect_rows[i * model::kEffectRows * kLanes<T>]};
     const Block<T>* next = i + 1 < s.blocks.size() ? &s.blocks[i + 1] : nullptr;
     s.kernel(s.blocks[i], effects, plan, s.steps, steps, next);
   }

@@ -21,7 +21,8 @@ const std::vector<KernelSet>& kernels() {
   static const std::vector<KernelSet> all = [] {
     std::vector<KernelSet> k{{scalar::kernel_float, scalar::kernel_double}};
     // clang 14 does not know "x86-64-v2" and so on: the youngest extensions of each level stand for it
-    const bool has_v2 = __builtin_cpu_supports("ssse3") && __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
+    const bool has_v2 =
+        __builtin_cpu_supports("ssse3") && __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
     const bool has_v3 = has_v2 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
                         __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
     const bool has_v4 = has_v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
@@ -39,8 +40,7 @@ const KernelSet& kernel_named(std::string_view instruction_set) {
   if (instruction_set.empty()) return kernels().back();
   for (const KernelSet& k : kernels())
     if (instruction_set == k.single.instruction_set) return k;
-  throw std::invalid_argument("no instruction set \"" + std::string(instruction_set) +
-                              "\" on this processor");
+  throw std::invalid_argument("no instruction set \"" + std::string(instruction_set) + "\" on this processor");
 }
 
 std::string best_instruction_set() { return kernels().back().single.instruction_set; }

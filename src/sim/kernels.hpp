@@ -15,10 +15,8 @@ struct KernelSet {
 
   template <class T>
   const Kernel<T>& of() const {
-    if constexpr (sizeof(T) == sizeof(float))
-      return single;
-    else
-      return twice;
+    if constexpr (sizeof(T) == sizeof(float)) return single;
+    else return twice;
   }
 };
 

@@ -46,8 +46,7 @@ struct LaneMask {
 
 template <class T, int N>
 struct Lanes {
-  using Raw __attribute__((vector_size(N * sizeof(T)), may_alias)) =
-      T;  // a row of numbers may be seen as lanes
+  using Raw __attribute__((vector_size(N * sizeof(T)), may_alias)) = T;  // a row of numbers may be seen as lanes
   using Mask = LaneMask<T, N>;
   using P = Product<Lanes>;
   Raw raw;
@@ -104,61 +103,45 @@ struct Lanes {
   friend FLAPPY_INLINE Lanes fused(Lanes a, Lanes b, Lanes c) {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
-      if constexpr (sizeof(T) == 4)
-        return Lanes((Raw)_mm512_fmadd_ps((__m512)a.raw, (__m512)b.raw, (__m512)c.raw));
-      else
-        return Lanes((Raw)_mm512_fmadd_pd((__m512d)a.raw, (__m512d)b.raw, (__m512d)c.raw));
+      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm512_fmadd_ps((__m512)a.raw, (__m512)b.raw, (__m512)c.raw));
+      else return Lanes((Raw)_mm512_fmadd_pd((__m512d)a.raw, (__m512d)b.raw, (__m512d)c.raw));
     }
 #endif
 #if defined(__FMA__)
     if constexpr (N * sizeof(T) == 32) {
-      if constexpr (sizeof(T) == 4)
-        return Lanes((Raw)_mm256_fmadd_ps((__m256)a.raw, (__m256)b.raw, (__m256)c.raw));
-      else
-        return Lanes((Raw)_mm256_fmadd_pd((__m256d)a.raw, (__m256d)b.raw, (__m256d)c.raw));
+      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm256_fmadd_ps((__m256)a.raw, (__m256)b.raw, (__m256)c.raw));
+      else return Lanes((Raw)_mm256_fmadd_pd((__m256d)a.raw, (__m256d)b.raw, (__m256d)c.raw));
     }
 #endif
-    if constexpr (sizeof(T) == 4)
-      return each([&](int i) { return __builtin_fmaf(a.raw[i], b.raw[i], c.raw[i]); });
-    else
-      return each([&](int i) { return __builtin_fma(a.raw[i], b.raw[i], c.raw[i]); });
+    if constexpr (sizeof(T) == 4) return each([&](int i) { return __builtin_fmaf(a.raw[i], b.raw[i], c.raw[i]); });
+    else return each([&](int i) { return __builtin_fma(a.raw[i], b.raw[i], c.raw[i]); });
   }
   friend FLAPPY_INLINE Lanes sqrt(Lanes a) {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
-      if constexpr (sizeof(T) == 4)
-        return Lanes((Raw)_mm512_maskz_sqrt_ps(__mmask16(-1), (__m512)a.raw));
-      else
-        return Lanes((Raw)_mm512_maskz_sqrt_pd(__mmask8(-1), (__m512d)a.raw));
+      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm512_maskz_sqrt_ps(__mmask16(-1), (__m512)a.raw));
+      else return Lanes((Raw)_mm512_maskz_sqrt_pd(__mmask8(-1), (__m512d)a.raw));
     }
 #endif
 #if defined(__AVX__)
     if constexpr (N * sizeof(T) == 32) {
-      if constexpr (sizeof(T) == 4)
-        return Lanes((Raw)_mm256_sqrt_ps((__m256)a.raw));
-      else
-        return Lanes((Raw)_mm256_sqrt_pd((__m256d)a.raw));
+      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm256_sqrt_ps((__m256)a.raw));
+      else return Lanes((Raw)_mm256_sqrt_pd((__m256d)a.raw));
     }
 #endif
     if constexpr (N * sizeof(T) == 16) {
-      if constexpr (sizeof(T) == 4)
-        return Lanes((Raw)_mm_sqrt_ps((__m128)a.raw));
-      else
-        return Lanes((Raw)_mm_sqrt_pd((__m128d)a.raw));
+      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm_sqrt_ps((__m128)a.raw));
+      else return Lanes((Raw)_mm_sqrt_pd((__m128d)a.raw));
     }
-    if constexpr (sizeof(T) == 4)
-      return each([&](int i) { return __builtin_sqrtf(a.raw[i]); });
-    else
-      return each([&](int i) { return __builtin_sqrt(a.raw[i]); });
+    if constexpr (sizeof(T) == 4) return each([&](int i) { return __builtin_sqrtf(a.raw[i]); });
+    else return each([&](int i) { return __builtin_sqrt(a.raw[i]); });
   }
   // min and max as the x86 instructions define them: the second operand where they compare unordered.
   friend FLAPPY_INLINE Lanes min(Lanes a, Lanes b) {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
-      if constexpr (sizeof(T) == 4)
-        return Lanes((Raw)_mm512_maskz_min_ps(__mmask16(-1), (__m512)a.raw, (__m512)b.raw));
-      else
-        return Lanes((Raw)_mm512_maskz_min_pd(__mmask8(-1), (__m512d)a.raw, (__m512d)b.raw));
+      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm512_maskz_min_ps(__mmask16(-1), (__m512)a.raw, (__m512)b.raw));
+      else return Lanes((Raw)_mm512_maskz_min_pd(__mmask8(-1), (__m512d)a.raw, (__m512d)b.raw));
     }
 #endif
     return select(Mask{a.raw < b.raw}, a, b);
@@ -166,10 +149,8 @@ struct Lanes {
   friend FLAPPY_INLINE Lanes max(Lanes a, Lanes b) {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
-      if constexpr (sizeof(T) == 4)
-        return Lanes((Raw)_mm512_maskz_max_ps(__mmask16(-1), (__m512)a.raw, (__m512)b.raw));
-      else
-        return Lanes((Raw)_mm512_maskz_max_pd(__mmask8(-1), (__m512d)a.raw, (__m512d)b.raw));
+      if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm512_maskz_max_ps(__mmask16(-1), (__m512)a.raw, (__m512)b.raw));
+      else return Lanes((Raw)_mm512_maskz_max_pd(__mmask8(-1), (__m512d)a.raw, (__m512d)b.raw));
     }
 #endif
     return select(Mask{a.raw > b.raw}, a, b);

@@ -30,8 +30,7 @@ struct ActiveEffects {
     if constexpr (I < kEffects) {
       using Effect = std::tuple_element_t<I, Effects>;
       constexpr int kCount = static_cast<int>(Effect::kParameters.size());
-      if (set >> I & 1)
-        stage(Effect{}, *reinterpret_cast<const T(*)[kCount]>(parameters + effect_rows_before<I>()));
+      if (set >> I & 1) stage(Effect{}, *reinterpret_cast<const T(*)[kCount]>(parameters + effect_rows_before<I>()));
       apply<Stage, I + 1>(stage);
     }
   }
@@ -39,8 +38,8 @@ struct ActiveEffects {
 
 /// What air and motor do to one side.
 template <int side, class T>
-FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<T>& q,
-                                    const WingWrench<T>& air, const T& voltage_V) {
+FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<T>& q, const WingWrench<T>& air,
+                                    const T& voltage_V) {
   SideLoad<T> load;
   load.force_x_N = air.force_x_N;
   load.force_z_N = air.force_z_N;
@@ -52,16 +51,14 @@ FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<
 
 /// Air on one wing, from the velocity of its shoulder in B.
 template <int side, class T>
-FLAPPY_INLINE WingWrench<T> air_on_wing(const SideParameters<T>& p, const WingPose<T>& g,
-                                        const Vec3<T>& velocity_B) {
+FLAPPY_INLINE WingWrench<T> air_on_wing(const SideParameters<T>& p, const WingPose<T>& g, const Vec3<T>& velocity_B) {
   return blade_element<side>(p, g.theta, g.theta_rate, turn_back_z(g.beta.sin, g.beta.cos, velocity_B),
                              {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate});
 }
 
 /// Turns the hinges of one side. The last clamp takes the rounding of a landing on a stop.
 template <int side, class T>
-FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& beta, const T& theta,
-                        const T& per_step) {
+FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& beta, const T& theta, const T& per_step) {
   q.stroke_rate_rad_s = T(side) * T(beta * per_step);
   q.rotation_rate_rad_s = theta * per_step;
   q.stroke_rad = clamp(T(q.stroke_rad + T(T(side) * beta)), p.stroke_lower_rad, p.stroke_upper_rad);
@@ -70,8 +67,8 @@ FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& be
 
 /// Lets effects scale the air on the wings and load the body.
 template <class T>
-FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, const Surroundings<T>& s,
-                                 Sides<WingWrench<T>>& air, BodyLoad<T>& body) {
+FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, const Surroundings<T>& s, Sides<WingWrench<T>>& air,
+                                 BodyLoad<T>& body) {
   AirFactor<T> factor{T(1), T(1)};
   effects.apply([&](auto effect, const auto& parameters) {
     if constexpr (requires { effect.air(parameters, s, factor); }) effect.air(parameters, s, factor);
@@ -96,8 +93,7 @@ FLAPPY_INLINE typename T::Mask hold(const Parameters<T>& p, State<T>& x, const W
 /// What holds the body feels the air on the wings.
 template <class T>
 FLAPPY_INLINE void feel(const Parameters<T>& p, State<T>& x, const Sides<WingPose<T>>& pose,
-                        const Sides<WingWrench<T>>& air, const T& lift, const T& step,
-                        typename T::Mask held) {
+                        const Sides<WingWrench<T>>& air, const T& lift, const T& step, typename T::Mask held) {
   if (!rarely(held)) return;
   const auto force = [](const WingPose<T>& g, const WingWrench<T>& a) {
     return turn_z(g.beta.sin, g.beta.cos, a.force_x_N, a.force_z_N);
@@ -109,15 +105,14 @@ FLAPPY_INLINE void feel(const Parameters<T>& p, State<T>& x, const Sides<WingPos
   const Vec3<T> about_origin = (moment(pose.left, air.left) + moment(pose.right, air.right)) +
                                (cross(p.left.shoulder_m, force_l) + cross(p.right.shoulder_m, force_r));
   x.impulse_N_s = where(held, add_scaled(x.impulse_N_s, step, force_l + force_r), x.impulse_N_s);
-  x.angular_impulse_Nm_s =
-      where(held, add_scaled(x.angular_impulse_Nm_s, step, about_origin), x.angular_impulse_Nm_s);
+  x.angular_impulse_Nm_s = where(held, add_scaled(x.angular_impulse_Nm_s, step, about_origin), x.angular_impulse_Nm_s);
   x.lift_N = where(held, T(x.lift_N + T(lift - x.lift_N) / p.beat_steps), x.lift_N);
 }
 
 /// One physics step. `com_m`: the vehicle's centre of mass in W, carried along because it is what inertia moves.
 template <bool with_effects, class T>
-FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Voltages<T>& voltages,
-                                Vec3<T>& com_m, const ActiveEffects<T>& effects, const Constants<T>& k) {
+FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Voltages<T>& voltages, Vec3<T>& com_m,
+                                const ActiveEffects<T>& effects, const Constants<T>& k) {
   // where everything is and how it moves
   const Matrix3<T> R = rotation_matrix(x.attitude);
   const Vec3<T>& w = x.body_rate_rad_s;
@@ -133,8 +128,8 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Volta
   if constexpr (with_effects) {
     const T stroke_plane = T(0.5) * T(p.left.shoulder_m.z + p.right.shoulder_m.z);
     apply_effects(effects,
-                  {R, com_m - R * whole.com, v_C - cross(w, whole.com), w, whole.com, stroke_plane,
-                   p.air_density_kg_m3, k.ground_z, k.ceiling_z},
+                  {R, com_m - R * whole.com, v_C - cross(w, whole.com), w, whole.com, stroke_plane, p.air_density_kg_m3,
+                   k.ground_z, k.ceiling_z},
                   air, body);
   }
   const Sides<SideLoad<T>> load{load_side<+1>(p.left, x.left, air.left, voltages.left_V),
@@ -143,8 +138,7 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Volta
   // new rates
   const Sides<WingInertia<T>> wing{wing_inertia(p.left, pose.left), wing_inertia(p.right, pose.right)};
   const BodyInertia<T> inertia = body_inertia(p, x, pose, wing, whole);
-  const BodyDrive<T> body_drive =
-      drive_body(p, x, pose, wing, whole, inertia, load, body, R.row_z, k.gravity);
+  const BodyDrive<T> body_drive = drive_body(p, x, pose, wing, whole, inertia, load, body, R.row_z, k.gravity);
   const HingeSystem<T> hinges = eliminate_body(p, pose, wing, whole, inertia, body_drive, load);
   const Motion<T> m = move(p, x, inertia, body_drive, hinges, k.step, k.per_step);
   const Vec3<T> force = R * body_drive.force;

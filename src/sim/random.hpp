@@ -27,8 +27,7 @@ struct UniformPair {
 inline UniformPair uniform_pair(const RandomKey& key, std::uint32_t index) {
   using Philox = r123::Philox4x32;
   const Philox::ctr_type counter{{index, static_cast<std::uint32_t>(key.stream), key.flapper, key.episode}};
-  const Philox::key_type k{
-      {static_cast<std::uint32_t>(key.seed), static_cast<std::uint32_t>(key.seed >> 32)}};
+  const Philox::key_type k{{static_cast<std::uint32_t>(key.seed), static_cast<std::uint32_t>(key.seed >> 32)}};
   const Philox::ctr_type r = Philox()(counter, k);
   const auto unit = [](std::uint32_t high, std::uint32_t low) {
     const std::uint64_t bits = (std::uint64_t{high} << 21) ^ (low >> 11);

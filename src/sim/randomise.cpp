@@ -28,8 +28,7 @@ Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : 
   }
 }
 
-Randomisation::Draw Randomisation::read_draw(const io::Table& table,
-                                             const std::vector<model::Parameter>& parameters) {
+Randomisation::Draw Randomisation::read_draw(const io::Table& table, const std::vector<model::Parameter>& parameters) {
   static const std::vector<std::string> kLaws = {"scale_normal", "scale_half_normal", "replace_normal",
                                                  "add_normal",   "scale_uniform",     "replace_uniform"};
   Draw draw{};
@@ -41,8 +40,7 @@ Randomisation::Draw Randomisation::read_draw(const io::Table& table,
       if (std::ranges::find(draw.parameters, i) != draw.parameters.end())
         table.fail("parameters", path + " is given twice", "each parameter once");
       if (path == "driver.hold_s")
-        table.fail("parameters", path + " is the same for a whole batch",
-                   "what may differ from flapper to flapper");
+        table.fail("parameters", path + " is the same for a whole batch", "what may differ from flapper to flapper");
       draw.parameters.push_back(i);
     }
     if (draw.parameters.size() == before) {
@@ -90,8 +88,7 @@ void Randomisation::check_bodies(const io::Table& table, const Draw& draw) const
   for (const double extreme : {-draw.cut_sd, 0.0, draw.cut_sd}) {
     model::Vehicle vehicle = nominal_;
     const std::vector<model::Parameter> parameters = model::parameters(vehicle);
-    for (const std::size_t i : draw.parameters)
-      *parameters[i].value = apply(draw, *parameters[i].value, extreme);
+    for (const std::size_t i : draw.parameters) *parameters[i].value = apply(draw, *parameters[i].value, extreme);
     if (const auto fault = model::physical_fault(vehicle))
       table.fail("parameters", fault->path + ": " + fault->what, fault->accepted);
   }
@@ -132,8 +129,7 @@ model::Vehicle Randomisation::sample(RandomKey key) const {
         if (std::abs(variate) <= draw.cut_sd) break;
       }
     }
-    for (const std::size_t i : draw.parameters)
-      *parameters[i].value = apply(draw, *parameters[i].value, variate);
+    for (const std::size_t i : draw.parameters) *parameters[i].value = apply(draw, *parameters[i].value, variate);
     base += kIndicesPerDraw;
   }
   return vehicle;

@@ -32,14 +32,7 @@ class Randomisation {
   model::Vehicle sample(RandomKey key) const;
 
  private:
-  enum class Law {
-    scale_normal,
-    scale_half_normal,
-    replace_normal,
-    add_normal,
-    scale_uniform,
-    replace_uniform
-  };
+  enum class Law { scale_normal, scale_half_normal, replace_normal, add_normal, scale_uniform, replace_uniform };
   struct Draw {
     std::vector<std::size_t> parameters;  // index in model::parameters()
     Law law;
@@ -50,8 +43,8 @@ class Randomisation {
     double low, high;
   };
   static Draw read_draw(const io::Table& table, const std::vector<model::Parameter>& parameters);
-  static void check_reach(const io::Table& table, const Draw& draw,
-                          const std::vector<model::Parameter>& parameters, std::vector<Reach>& reach);
+  static void check_reach(const io::Table& table, const Draw& draw, const std::vector<model::Parameter>& parameters,
+                          std::vector<Reach>& reach);
   void check_bodies(const io::Table& table, const Draw& draw) const;
   static double apply(const Draw& draw, double nominal, double variate);
 

@@ -47,10 +47,8 @@ FLAPPY_INLINE S load_rows(const T (*rows)[lanes], int first) {
 /// leave the stack, whose spills would otherwise collide with them in the cache: 4 % of the step.
 template <class S, class T, int lanes>
 FLAPPY_INLINE decltype(auto) view_rows(const T (*rows)[lanes], int first) {
-  if constexpr (kWidth<T> == lanes)
-    return (*reinterpret_cast<const S*>(rows));
-  else
-    return load_rows<S>(rows, first);
+  if constexpr (kWidth<T> == lanes) return (*reinterpret_cast<const S*>(rows));
+  else return load_rows<S>(rows, first);
 }
 
 template <class S, class T, int lanes>
@@ -62,8 +60,8 @@ FLAPPY_INLINE void store_rows(const S& s, T (*rows)[lanes], int first) {
 
 /// Driver: new voltages from the wing-beat signal, held until the next update.
 template <class T, class L>
-FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>& left,
-                                        const SideParameters<L>& right, int first) {
+FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>& left, const SideParameters<L>& right,
+                                        int first) {
   T fraction[kWidth<T>];
   for (int i = 0; i < kWidth<T>; ++i) {
     std::uint32_t& phase = block.phase[first + i];
@@ -81,8 +79,7 @@ FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>
 
 /// Marks flappers that have come apart or touched something, and stands those that never took off back up.
 template <class T, class L>
-FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const StepPlan& plan, Block<T>& block,
-                               int first) {
+FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const StepPlan& plan, Block<T>& block, int first) {
   const auto mark = [&](typename L::Mask mask, std::uint32_t bit) {
     if (!any(mask)) return;
     for (int i = 0; i < kWidth<T>; ++i)
@@ -102,8 +99,7 @@ FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const StepPl
   mark(flying & (x.position_m.z + p.above_m > L(plan.ceiling_z_m)), kTouchedCeiling);
   for (const Wall* wall = plan.walls; wall != plan.walls + plan.wall_count; ++wall) {
     const Wall& w = *wall;
-    const L clearance =
-        L(w.normal_x) * L(x.position_m.x - L(w.x_m)) + L(w.normal_y) * L(x.position_m.y - L(w.y_m));
+    const L clearance = L(w.normal_x) * L(x.position_m.x - L(w.x_m)) + L(w.normal_y) * L(x.position_m.y - L(w.y_m));
     mark(flying & (clearance < p.around_m), kTouchedWall);
   }
 }
@@ -120,8 +116,7 @@ FLAPPY_INLINE typename L::Mask plausible(const State<L>& x) {
            within(q.rotation_rate_rad_s, kPlausibleHingeRate_rad_s);
   };
   return all(x.position_m, kPlausiblePosition_m) & all(x.com_velocity_m_s, kPlausibleSpeed_m_s) &
-         all(x.body_rate_rad_s, kPlausibleBodyRate_rad_s) & within(x.attitude.w, 2) & side(x.left) &
-         side(x.right);
+         all(x.body_rate_rad_s, kPlausibleBodyRate_rad_s) & within(x.attitude.w, 2) & side(x.left) & side(x.right);
 }
 
 /// Freezes what is no longer plausible; true for lanes that may move on.
@@ -152,8 +147,7 @@ class Prefetch {
         end_(at_ + (from != nullptr ? bytes : 0)),
         share_((bytes / kLine + steps - 1) / steps * kLine) {}
   void step() {
-    for (const char* until = at_ + share_; at_ < until && at_ < end_; at_ += kLine)
-      __builtin_prefetch(at_, 1);
+    for (const char* until = at_ + share_; at_ < until && at_ < end_; at_ += kLine) __builtin_prefetch(at_, 1);
   }
 
  private:
@@ -164,10 +158,9 @@ class Prefetch {
 
 /// Back from the centre of mass to the torso; contact, plausibility, rows.
 template <class T, class L>
-FLAPPY_INLINE void finish(State<L> x, const Vec3<L>& com_m, const Voltages<L>& voltages,
-                          const Parameters<L>& p, const StepPlan& plan, Block<T>& block, int first) {
-  x.position_m =
-      where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
+FLAPPY_INLINE void finish(State<L> x, const Vec3<L>& com_m, const Voltages<L>& voltages, const Parameters<L>& p,
+                          const StepPlan& plan, Block<T>& block, int first) {
+  x.position_m = where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
   look_around(x, p, plan, block, first);
   const typename L::Mask moves = freeze_implausible(x, block, first);
   store_rows(where(moves, x, load_rows<State<L>>(block.state, first)), block.state, first);
@@ -177,8 +170,8 @@ FLAPPY_INLINE void finish(State<L> x, const Vec3<L>& com_m, const Voltages<L>& v
 }
 
 template <bool with_effects, class T>
-void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first_step,
-                int steps, const Block<T>* next) {
+void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first_step, int steps,
+                const Block<T>* next) {
   using L = Lanes<T, kWidth<T>>;
   const Constants<L> k{plan.step_s,       plan.step_s / 2, 1 / plan.step_s,
                        plan.gravity_m_s2, plan.ground_z_m, plan.ceiling_z_m};
@@ -190,13 +183,11 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     ActiveEffects<L> effects;
     if constexpr (with_effects) {
       effects.set = in_force.set;
-      for (int i = 0; i < kEffectRows; ++i)
-        effects.parameters[i] = L::load(in_force.rows + i * kLanes<T> + first);
+      for (int i = 0; i < kEffectRows; ++i) effects.parameters[i] = L::load(in_force.rows + i * kLanes<T> + first);
     }
 
     Vec3<L> com_m = x.position_m + rotation_matrix(x.attitude) * centre_of_mass(p, x);
-    std::int64_t until_update =
-        (plan.steps_per_update - first_step % plan.steps_per_update) % plan.steps_per_update;
+    std::int64_t until_update = (plan.steps_per_update - first_step % plan.steps_per_update) % plan.steps_per_update;
     for (int i = 0; i < steps; ++i, --until_update) {
       if (until_update == 0) {
         voltages = update_driver(block, p.left, p.right, first);
@@ -210,12 +201,10 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
 }
 
 template <class T>
-void step_any_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first,
-                    int steps, const Block<T>* next) {
-  if (in_force.set == 0)
-    step_block<false>(block, in_force, plan, first, steps, next);
-  else
-    step_block<true>(block, in_force, plan, first, steps, next);
+void step_any_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first, int steps,
+                    const Block<T>* next) {
+  if (in_force.set == 0) step_block<false>(block, in_force, plan, first, steps, next);
+  else step_block<true>(block, in_force, plan, first, steps, next);
 }
 
 }  // namespace

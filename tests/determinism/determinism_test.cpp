@@ -49,7 +49,8 @@ Batch<T> fly(std::size_t first, std::size_t count, int threads, const std::strin
   options.world.walls = {{1, 0, -1, 0}};
   Batch<T> batch(count, test::identified(), options);
   const auto input = [](std::size_t id) {
-    return Input{8 + static_cast<double>(id % 21) / 2, 0.1 * static_cast<double>(id % 7), -0.2, 0.01 * static_cast<double>(id % 5)};
+    return Input{8 + static_cast<double>(id % 21) / 2, 0.1 * static_cast<double>(id % 7), -0.2,
+                 0.01 * static_cast<double>(id % 5)};
   };
   for (std::size_t i = 0; i < count; ++i) {
     batch.set_vehicle(i, vehicle(first + i));

@@ -108,19 +108,16 @@ TEST(Config, TablesOutliveTheConfig) {
 TEST(Config, RefusesUnknownKeys) {
   const std::string known = "[torso]\nmass_kg = 0.1\n";
   EXPECT_EQ(message(known, read_torso), "accepted");
-  EXPECT_EQ(
-      message(known + "lenght_m = 1\n", read_torso),
-      "v.toml:3:1: torso.lenght_m: unknown key; accepted: length_m, mass_kg; did you mean \"length_m\"?");
-  EXPECT_EQ(
-      message(known + "Length_M = 1\n", read_torso),
-      "v.toml:3:1: torso.Length_M: unknown key; accepted: length_m, mass_kg; did you mean \"length_m\"?");
+  EXPECT_EQ(message(known + "lenght_m = 1\n", read_torso),
+            "v.toml:3:1: torso.lenght_m: unknown key; accepted: length_m, mass_kg; did you mean \"length_m\"?");
+  EXPECT_EQ(message(known + "Length_M = 1\n", read_torso),
+            "v.toml:3:1: torso.Length_M: unknown key; accepted: length_m, mass_kg; did you mean \"length_m\"?");
   EXPECT_EQ(message(known + "colour = 1\n", read_torso),
             "v.toml:3:1: torso.colour: unknown key; accepted: length_m, mass_kg");
   EXPECT_EQ(message(known + "[torsoo]\nmass_kg = 1\n", read_torso),
             "v.toml:3:2: torsoo: unknown key; accepted: torso; did you mean \"torso\"?");
   EXPECT_EQ(message("  seed = 1\n", nothing), "v.toml:1:3: seed: unknown key; accepted: no key here");
-  EXPECT_EQ(message("\"a\\u001b b\" = 1\n", nothing),
-            "v.toml:1:1: \"a\\u001B b\": unknown key; accepted: no key here");
+  EXPECT_EQ(message("\"a\\u001b b\" = 1\n", nothing), "v.toml:1:1: \"a\\u001B b\": unknown key; accepted: no key here");
 }
 
 TEST(Config, RefusesUnknownKeysBelowTables) {
@@ -140,8 +137,7 @@ TEST(Config, RefusesUnknownKeysBelowTables) {
 TEST(Config, NamesDifferingInADigitAreNotTakenForMisspellings) {
   const auto read = [](const Table& root) { root.number_or("z_cp1", 0); };
   EXPECT_EQ(message("z_cp2 = 1\n", read), "v.toml:1:1: z_cp2: unknown key; accepted: z_cp1");
-  EXPECT_EQ(message("z_pc1 = 1\n", read),
-            "v.toml:1:1: z_pc1: unknown key; accepted: z_cp1; did you mean \"z_cp1\"?");
+  EXPECT_EQ(message("z_pc1 = 1\n", read), "v.toml:1:1: z_pc1: unknown key; accepted: z_cp1; did you mean \"z_cp1\"?");
 }
 
 TEST(Config, RefusesAnotherUnit) {
@@ -171,10 +167,8 @@ TEST(Config, RefusesMissingKeys) {
             "v.toml:1:1: a.c.d_m: is missing; accepted: a number");
   EXPECT_EQ(missing([](const Table& root) { root.integer("n", 1, 9); }),
             "v.toml: n: is missing; accepted: an integer from 1 to 9");
-  EXPECT_EQ(missing([](const Table& root) { root.boolean("f"); }),
-            "v.toml: f: is missing; accepted: true or false");
-  EXPECT_EQ(missing([](const Table& root) { root.string("s"); }),
-            "v.toml: s: is missing; accepted: a string");
+  EXPECT_EQ(missing([](const Table& root) { root.boolean("f"); }), "v.toml: f: is missing; accepted: true or false");
+  EXPECT_EQ(missing([](const Table& root) { root.string("s"); }), "v.toml: s: is missing; accepted: a string");
   EXPECT_EQ(missing([](const Table& root) {
               root.choice("c", {"x", "y"});
             }),
@@ -183,8 +177,7 @@ TEST(Config, RefusesMissingKeys) {
             "v.toml: g: is missing; accepted: an array, each a number above 0");
   EXPECT_EQ(missing([](const Table& root) { root.strings("t"); }),
             "v.toml: t: is missing; accepted: an array of strings");
-  EXPECT_EQ(missing([](const Table& root) { root.file("v"); }),
-            "v.toml: v: is missing; accepted: the name of a file");
+  EXPECT_EQ(missing([](const Table& root) { root.file("v"); }), "v.toml: v: is missing; accepted: the name of a file");
 }
 
 TEST(Config, RefusesWrongTypes) {
@@ -194,8 +187,7 @@ TEST(Config, RefusesWrongTypes) {
   EXPECT_EQ(wrong("true", number), "v.toml:1:5: k: is a boolean; accepted: a number above 0, at most 1");
   EXPECT_EQ(wrong("[1]", number), "v.toml:1:5: k: is an array; accepted: a number above 0, at most 1");
   EXPECT_EQ(wrong("{a=1}", number), "v.toml:1:5: k: is a table; accepted: a number above 0, at most 1");
-  EXPECT_EQ(wrong("1979-05-27", number),
-            "v.toml:1:5: k: is a date or time; accepted: a number above 0, at most 1");
+  EXPECT_EQ(wrong("1979-05-27", number), "v.toml:1:5: k: is a date or time; accepted: a number above 0, at most 1");
   EXPECT_EQ(wrong("'a'", [](const Table& root) { root.number_or("k", 1); }),
             "v.toml:1:5: k: is a string; accepted: a number");
   EXPECT_EQ(wrong("3.0", [](const Table& root) { root.integer("k", 1, 9); }),
@@ -222,8 +214,7 @@ TEST(Config, RefusesWrongTypes) {
             "v.toml:1:11: k[1]: is an integer; accepted: a string");
   EXPECT_EQ(wrong("1", [](const Table& root) { root.file("k"); }),
             "v.toml:1:5: k: is an integer; accepted: the name of a file");
-  EXPECT_EQ(wrong("1", [](const Table& root) { root.table("k"); }),
-            "v.toml:1:5: k: is an integer; accepted: a table");
+  EXPECT_EQ(wrong("1", [](const Table& root) { root.table("k"); }), "v.toml:1:5: k: is an integer; accepted: a table");
   EXPECT_EQ(wrong("1", [](const Table& root) { root.optional_table("k"); }),
             "v.toml:1:5: k: is an integer; accepted: a table");
   EXPECT_EQ(wrong("1", [](const Table& root) { root.number("k.motor.x"); }),
@@ -236,8 +227,7 @@ TEST(Config, RefusesWrongTypes) {
 
 TEST(Config, RefusesNumbersOutOfRange) {
   const auto at = [](const std::string& value, Range range) {
-    return message("[torso]\n\nmass_kg = " + value,
-                   [&](const Table& root) { root.number("torso.mass_kg", range); });
+    return message("[torso]\n\nmass_kg = " + value, [&](const Table& root) { root.number("torso.mass_kg", range); });
   };
   EXPECT_EQ(at("-0.01", positive(1)),
             "v.toml:3:11: torso.mass_kg: -0.01 is out of range; accepted: a number above 0, at most 1");
@@ -278,17 +268,15 @@ TEST(Config, RefusesIntegersOutOfRange) {
 
 TEST(Config, RefusesUnknownChoices) {
   const Read read = [](const Table& root) { root.choice("k", {"hover", "landing"}); };
-  EXPECT_EQ(
-      message("k = 'huver'", read),
-      "v.toml:1:5: k: \"huver\" is not known; accepted: \"hover\", \"landing\"; did you mean \"hover\"?");
+  EXPECT_EQ(message("k = 'huver'", read),
+            "v.toml:1:5: k: \"huver\" is not known; accepted: \"hover\", \"landing\"; did you mean \"hover\"?");
   EXPECT_EQ(message("k = 'x'", read), "v.toml:1:5: k: \"x\" is not known; accepted: \"hover\", \"landing\"");
 }
 
 TEST(Config, RefusesFileNamesThatAreNone) {
   const Read read = [](const Table& root) { root.file("k"); };
   EXPECT_EQ(message("k = ''", read), "v.toml:1:5: k: is empty; accepted: the name of a file");
-  EXPECT_EQ(message("k = \"a\\u0000b\"", read),
-            "v.toml:1:5: k: holds a NUL character; accepted: the name of a file");
+  EXPECT_EQ(message("k = \"a\\u0000b\"", read), "v.toml:1:5: k: holds a NUL character; accepted: the name of a file");
 }
 
 TEST(Config, FilesStartAtTheFolderOfTheConfig) {
@@ -316,9 +304,8 @@ TEST(Config, ReportsFaultsOfTheCaller) {
 TEST(Config, RefusesWhatIsNotToml) {
   EXPECT_EQ(message("a = 1\nb = = 2\n", nothing),
             "v.toml:2:5: not valid TOML: Error while parsing value: could not determine value type");
-  EXPECT_EQ(
-      message("a = 1\n\n  a = 2\n", nothing),
-      "v.toml:3:7: not valid TOML: Error while parsing key-value pair: cannot redefine existing integer 'a'");
+  EXPECT_EQ(message("a = 1\n\n  a = 2\n", nothing),
+            "v.toml:3:7: not valid TOML: Error while parsing key-value pair: cannot redefine existing integer 'a'");
   EXPECT_EQ(message("a = 1\nb = [1, 2", nothing),
             "v.toml:2:10: not valid TOML: Error while parsing array: encountered end-of-file");
   EXPECT_EQ(message("a = 010\n", nothing),
@@ -334,14 +321,11 @@ TEST(Config, RefusesDeepNestingBeforeParsing) {
   const std::string fault = "tables and arrays nest too deeply; accepted: at most 32 levels";
   EXPECT_EQ(message("a = 1\nb = " + repeated("[", 200000), nothing), "v.toml:2:37: " + fault);
   EXPECT_EQ(message(repeated("a.", 200000) + "b = 1", nothing), "v.toml:1:66: " + fault);
-  EXPECT_EQ(message("a = 1\nb = [\"\"\"\n\"\"\"\", " + repeated("[", 200000), nothing),
-            "v.toml:3:38: " + fault);
+  EXPECT_EQ(message("a = 1\nb = [\"\"\"\n\"\"\"\", " + repeated("[", 200000), nothing), "v.toml:3:38: " + fault);
   EXPECT_EQ(message("a = '''\n'''''\n[" + repeated("b.", 200000) + "c]", nothing), "v.toml:3:67: " + fault);
-  EXPECT_EQ(message(repeated("a.", 20) + "b = {" + repeated("c.", 20) + "d = 1}", nothing),
-            "v.toml: " + fault);
+  EXPECT_EQ(message(repeated("a.", 20) + "b = {" + repeated("c.", 20) + "d = 1}", nothing), "v.toml: " + fault);
   const Read read = [](const Table& root) { root.string("k"); };
-  EXPECT_EQ(message("# " + repeated("[.", 99) + "\nk = \"\\\"" + repeated("[.", 99) + "\"", read),
-            "accepted");
+  EXPECT_EQ(message("# " + repeated("[.", 99) + "\nk = \"\\\"" + repeated("[.", 99) + "\"", read), "accepted");
 }
 
 TEST(Config, SurvivesWhatTomlCallsUnreachable) {
@@ -381,8 +365,8 @@ TEST(Config, LoadReadsAFile) {
 
 TEST(Overrides, ReplaceAndCreate) {
   const Table root = Config::parse("a.b = 1\nc = [1]\nd = {x = 1, y = 2}\n", "v.toml",
-                                   {"a.b=2.5", "a.new.deep = true", "c=[1, 2]", "d={x = 3}", "e=bare-word",
-                                    "f='q'", "a.b=4", "g=two words"})
+                                   {"a.b=2.5", "a.new.deep = true", "c=[1, 2]", "d={x = 3}", "e=bare-word", "f='q'",
+                                    "a.b=4", "g=two words"})
                          .root();
   EXPECT_EQ(root.number("a.b"), 4.0);
   EXPECT_TRUE(root.boolean("a.new.deep"));
@@ -416,8 +400,7 @@ TEST(Overrides, RefuseElementsOfArraysAndWhatIsNoTable) {
   const std::string text = "n = 1\n[[wall]]\nx_m = 1\n";
   EXPECT_EQ(message(text, nothing, {"wall[0].x_m=2"}),
             "--set wall[0].x_m=2: wall[0].x_m: is an element of an array; accepted: the whole array");
-  EXPECT_EQ(message(text, nothing, {"wall.x_m=2"}),
-            "--set wall.x_m=2: wall: is an array; accepted: the whole array");
+  EXPECT_EQ(message(text, nothing, {"wall.x_m=2"}), "--set wall.x_m=2: wall: is an array; accepted: the whole array");
   EXPECT_EQ(message(text, nothing, {"n.x_m=2"}), "--set n.x_m=2: n: is an integer; accepted: a table");
 }
 
@@ -428,8 +411,7 @@ TEST(Overrides, RefuseMalformedOnes) {
     EXPECT_EQ(at(text), "--set " + text + ":" + fault);
   }
   EXPECT_EQ(at("a=1\nb=2"), "--set a=1\\x0ab=2:" + fault);
-  EXPECT_EQ(at("a=[1, 2"),
-            "--set a=[1, 2: not valid TOML: Error while parsing array: encountered end-of-file");
+  EXPECT_EQ(at("a=[1, 2"), "--set a=[1, 2: not valid TOML: Error while parsing array: encountered end-of-file");
   EXPECT_NE(at("a..b=1").find("--set a..b=1: not valid TOML: "), std::string::npos);
   std::string deep = "a";
   for (int i = 0; i < 100000; ++i) deep += ".a";
@@ -437,8 +419,7 @@ TEST(Overrides, RefuseMalformedOnes) {
 }
 
 TEST(Resolved, HoldsOverridesAndDefaults) {
-  const Config config =
-      Config::parse("name = 'v'\n[torso]\nmass_kg = 0.1\n", "v.toml", {"torso.mass_kg=0.2"});
+  const Config config = Config::parse("name = 'v'\n[torso]\nmass_kg = 0.1\n", "v.toml", {"torso.mass_kg=0.2"});
   const Table root = config.root();
   root.number_or("torso.length_m", 2);
   root.number_or("left.motor.resistance_ohm", 0.1);

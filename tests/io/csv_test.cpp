@@ -61,9 +61,8 @@ TEST(Csv, NamesTheNearestColumn) {
     table.column("batery_V");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "log.csv: batery_V: column is missing; columns here: t_s, battery_V; did you mean \"battery_V\"?");
+    EXPECT_STREQ(error.what(),
+                 "log.csv: batery_V: column is missing; columns here: t_s, battery_V; did you mean \"battery_V\"?");
   }
 }
 
@@ -93,8 +92,7 @@ TEST_F(CsvWriterTest, WritesDigitsThatReadBackToTheSameDoubles) {
   writer.row(first);
   writer.row(second);
   writer.close();
-  EXPECT_EQ(read_text(path_),
-            "a_m,b_m,c_m\n0.1,1e+300,-5e-324\n0.3333333333333333,2,1.7976931348623157e+308\n");
+  EXPECT_EQ(read_text(path_), "a_m,b_m,c_m\n0.1,1e+300,-5e-324\n0.3333333333333333,2,1.7976931348623157e+308\n");
   const CsvTable table = read_csv(path_);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(table.columns[i], (std::vector<double>{first[i], second[i]}));
 }

@@ -57,8 +57,7 @@ TEST_F(FilesTest, RefusesWhatCannotBeRead) {
 
 TEST_F(FilesTest, RefusesWhatCannotBeWritten) {
   const std::string folder = folder_.string();
-  EXPECT_EQ(write_message(folder + "/none/a"),
-            folder + "/none/a: cannot be written: No such file or directory");
+  EXPECT_EQ(write_message(folder + "/none/a"), folder + "/none/a: cannot be written: No such file or directory");
   EXPECT_EQ(write_message(folder), folder + ": cannot be written: Is a directory");
   // Stands for a device: a failing test must not replace a real one.
   ASSERT_EQ(mkfifo((folder + "/pipe").c_str(), 0600), 0);
@@ -84,9 +83,7 @@ TEST_F(FilesTest, ReportsAFolderThatVanished) {
   EXPECT_THROW(file.commit(), InputError);
 }
 
-TEST(InputErrorTest, IsOneLine) {
-  EXPECT_STREQ(InputError("a\nb\x1b[0m\x7fü").what(), "a\\x0ab\\x1b[0m\\x7fü");
-}
+TEST(InputErrorTest, IsOneLine) { EXPECT_STREQ(InputError("a\nb\x1b[0m\x7fü").what(), "a\\x0ab\\x1b[0m\\x7fü"); }
 
 TEST(NearestName, FindsMisspellings) {
   const std::vector<std::string> names = {"flapping_Hz", "seed", "r22", "hold_s"};

@@ -53,14 +53,13 @@ inline KaneSystem kane(const model::Vehicle& vehicle, const KaneState& x, const 
   };
   // angular velocity w = Jw u, its rate at zero u' alpha0; velocity of a point Jv u, its acceleration at zero
   // u' a0
-  const auto add_body = [&](const model::RigidBody& body, const Matrix3d& R, const Vector3d& com,
-                            const Jacobian& Jw, const Jacobian& Jv, const Vector3d& alpha0,
-                            const Vector3d& a0) {
+  const auto add_body = [&](const model::RigidBody& body, const Matrix3d& R, const Vector3d& com, const Jacobian& Jw,
+                            const Jacobian& Jv, const Vector3d& alpha0, const Vector3d& a0) {
     const Matrix3d I = R * tensor(body.inertia_kg_m2) * R.transpose();
     const Vector3d w = Jw * u, v = Jv * u;
     s.mass += body.mass_kg * Jv.transpose() * Jv + Jw.transpose() * I * Jw;
-    s.right_side -= Jv.transpose() * (body.mass_kg * (a0 - loads.gravity_B)) +
-                    Jw.transpose() * (I * alpha0 + w.cross(I * w));
+    s.right_side -=
+        Jv.transpose() * (body.mass_kg * (a0 - loads.gravity_B)) + Jw.transpose() * (I * alpha0 + w.cross(I * w));
     s.total_mass += body.mass_kg;
     s.com += body.mass_kg * com;
     s.momentum += body.mass_kg * v;
@@ -101,8 +100,8 @@ inline KaneSystem kane(const model::Vehicle& vehicle, const KaneState& x, const 
     const Vector3d alpha_wing = alpha_edge + w_edge.cross(x.theta_rate[i] * axis_y);
     const Vector3d w_wing = Jw_wing * u;
 
-    const auto hung = [&](const model::RigidBody& body, const Matrix3d& R, const Jacobian& Jw,
-                          const Vector3d& w, const Vector3d& alpha) {
+    const auto hung = [&](const model::RigidBody& body, const Matrix3d& R, const Jacobian& Jw, const Vector3d& w,
+                          const Vector3d& alpha) {
       const Vector3d r = R * vec(body.com_m);
       add_body(body, R, shoulder + r, Jw, point(Jshoulder, Jw, r), alpha,
                shoulder_acceleration + alpha.cross(r) + w.cross(w.cross(r)));

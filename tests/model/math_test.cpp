@@ -26,8 +26,7 @@ TEST(Math, SineAndCosineWithinTheJoints) {
 }
 
 TEST(Math, CosineOfHalfTurns) {
-  for (int i = -1000; i <= 1000; ++i)
-    EXPECT_NEAR(cos_pi(i / 1000.0), std::cos(M_PI * i / 1000.0), 2 * kDouble);
+  for (int i = -1000; i <= 1000; ++i) EXPECT_NEAR(cos_pi(i / 1000.0), std::cos(M_PI * i / 1000.0), 2 * kDouble);
   EXPECT_EQ(cos_pi(0.5), 0);
 }
 
@@ -48,8 +47,8 @@ TEST(Math, ExponentialDecays) {
 TEST(Math, Logarithm) {
   std::mt19937_64 engine(1);
   for (int i = 0; i < 20000; ++i) {
-    const double x = std::ldexp(std::uniform_real_distribution<double>(0.5, 1)(engine),
-                                static_cast<int>(engine() % 100) - 60);
+    const double x =
+        std::ldexp(std::uniform_real_distribution<double>(0.5, 1)(engine), static_cast<int>(engine() % 100) - 60);
     EXPECT_NEAR(log(x), std::log(x), 4.5e-16 * std::max(1.0, std::abs(std::log(x)))) << x;
   }
   EXPECT_EQ(log(1.0), 0);

@@ -29,14 +29,10 @@ model::Vehicle scrambled(Random& random) {
   model::Vehicle v = test::nominal();
   for (const model::Parameter& p : model::parameters(v)) {
     const bool product = p.path.ends_with(".xy") || p.path.ends_with(".yz") || p.path.ends_with(".xz");
-    const bool com =
-        p.path.find("com_m") != std::string::npos || p.path.find("shoulder_m") != std::string::npos;
-    if (product)
-      *p.value += random(0.1e-9);
-    else if (com)
-      *p.value += random(2e-3);
-    else
-      *p.value *= 1 + random(0.2);
+    const bool com = p.path.find("com_m") != std::string::npos || p.path.find("shoulder_m") != std::string::npos;
+    if (product) *p.value += random(0.1e-9);
+    else if (com) *p.value += random(2e-3);
+    else *p.value *= 1 + random(0.2);
   }
   return v;
 }
@@ -61,8 +57,7 @@ Case random_case(Random& random) {
     s->stroke = {-1.75, 1.75, 0, 0};
     s->rotation = {-1.75, 1.75, 0, 0};
   }
-  for (model::Side* s :
-       {&c.vehicle.left, &c.vehicle.right}) {  // no implicit damping: it would be part of the step
+  for (model::Side* s : {&c.vehicle.left, &c.vehicle.right}) {  // no implicit damping: it would be part of the step
     s->planform.rotational_damping_coefficient = 0;
     s->motor.torque_constant_Nm_A = 0;
     s->motor.damping_Nm_s = 0;
@@ -132,9 +127,7 @@ TEST(VehicleDynamics, AcceleratesAsKaneSays) {
     const test::KaneSystem k = test::kane(c.vehicle, c.kane, c.loads);
     const test::Speeds a = k.mass.llt().solve(k.right_side);
     const auto [m, applied] = solve(c, k, kStep);
-    const auto near = [&](double ours, double theirs, double scale) {
-      EXPECT_NEAR(ours, theirs, kTolerance * scale);
-    };
+    const auto near = [&](double ours, double theirs, double scale) { EXPECT_NEAR(ours, theirs, kTolerance * scale); };
     const double body = a.segment<3>(3).norm(), hinge = a.tail<4>().norm();
     near(m.body_acceleration.x, a[3], body);
     near(m.body_acceleration.y, a[4], body);

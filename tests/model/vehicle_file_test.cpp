@@ -1,6 +1,6 @@
 // The shipped vehicles hold the published figures, text and vehicle are one, and a broken file is refused by
 // name and place.
-#include "model/vehicle_file.hpp"
+#include "flappy/vehicle_file.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -26,10 +26,8 @@ void body(Figures& f, const std::string& path, double mass_g, Triple com_mm, Ine
   f[path + ".com_m.x"] = com_mm.x * 1e-3, f[path + ".com_m.y"] = com_mm.y * 1e-3;
   f[path + ".com_m.z"] = com_mm.z * 1e-3;
   const std::string inertia = path + ".inertia_kg_m2.";
-  f[inertia + "xx"] = g_mm2.xx * 1e-9, f[inertia + "yy"] = g_mm2.yy * 1e-9,
-              f[inertia + "zz"] = g_mm2.zz * 1e-9;
-  f[inertia + "xy"] = g_mm2.xy * 1e-9, f[inertia + "yz"] = g_mm2.yz * 1e-9,
-              f[inertia + "xz"] = g_mm2.xz * 1e-9;
+  f[inertia + "xx"] = g_mm2.xx * 1e-9, f[inertia + "yy"] = g_mm2.yy * 1e-9, f[inertia + "zz"] = g_mm2.zz * 1e-9;
+  f[inertia + "xy"] = g_mm2.xy * 1e-9, f[inertia + "yz"] = g_mm2.yz * 1e-9, f[inertia + "xz"] = g_mm2.xz * 1e-9;
 }
 
 Figures published() {
@@ -43,8 +41,7 @@ Figures published() {
                {"extent.below_m", 0},
                {"extent.above_m", 18.9913e-3},   // the stroke plane
                {"extent.around_m", 0.168 / 2}};  // half of the span
-  body(f, "torso", 10.9067, {0.1797, 0.0008, -1.3998},
-       {4238.1285, 3970.1646, 2440.9505, -76.8896, 0.3011, 16.5500});
+  body(f, "torso", 10.9067, {0.1797, 0.0008, -1.3998}, {4238.1285, 3970.1646, 2440.9505, -76.8896, 0.3011, 16.5500});
   // the right leading edge is the left one mirrored in y, the right wing the left one turned by 180 deg about
   // z
   body(f, "left.leading_edge", 0.7081, {-0.2837, 3.3023, -6.3984},
@@ -223,19 +220,17 @@ TEST_F(VehicleFile, TextKeepsAnEffectOfTypicalSize) {
 }
 
 TEST_F(VehicleFile, TakesOverrides) {
-  const Vehicle v =
-      read(nominal_text(), {"left.motor.resistance_ohm=14", "effects.body_drag.centre_z_m=0.01"});
+  const Vehicle v = read(nominal_text(), {"left.motor.resistance_ohm=14", "effects.body_drag.centre_z_m=0.01"});
   EXPECT_EQ(v.left.motor.resistance_ohm, 14);
   EXPECT_EQ(v.right.motor.resistance_ohm, 12.4);
   EXPECT_EQ(v.effects.at("body_drag").at("centre_z_m"), 0.01);
   EXPECT_EQ(message(nominal_text(), {"left.motor.resistance_ohm=-1"}),
             "--set left.motor.resistance_ohm=-1: left.motor.resistance_ohm: -1 is out of range; "
             "accepted: a number from 0.001 to 10000");
-  EXPECT_EQ(
-      message(nominal_text(), {"left.motor.resistence_ohm=14"}),
-      "--set left.motor.resistence_ohm=14: left.motor.resistence_ohm: unknown key; accepted: damping_Nm_s, "
-      "efficiency, friction_Nm, gear_ratio, resistance_ohm, rotor_inertia_kg_m2, torque_constant_Nm_A, "
-      "voltage_limit_V; did you mean \"resistance_ohm\"?");
+  EXPECT_EQ(message(nominal_text(), {"left.motor.resistence_ohm=14"}),
+            "--set left.motor.resistence_ohm=14: left.motor.resistence_ohm: unknown key; accepted: damping_Nm_s, "
+            "efficiency, friction_Nm, gear_ratio, resistance_ohm, rotor_inertia_kg_m2, torque_constant_Nm_A, "
+            "voltage_limit_V; did you mean \"resistance_ohm\"?");
 }
 
 // ---- what is refused
@@ -260,16 +255,14 @@ TEST_F(VehicleFile, RefusesAnInertiaOfNoBody) {
       "no rigid body has this inertia; accepted: positive principal moments, none above the sum of the other "
       "two";
   // a flat plate is at the limit: 2.2204 + 19.2209 and a little from its small product of inertia
-  EXPECT_EQ(edited("[left.wing]", "{ xx = 21.4402e-9", "^{ xx = 21.4414e-9"),
-            "^: left.wing.inertia_kg_m2: " + why);
+  EXPECT_EQ(edited("[left.wing]", "{ xx = 21.4402e-9", "^{ xx = 21.4414e-9"), "^: left.wing.inertia_kg_m2: " + why);
   EXPECT_EQ(edited("[left.wing]", "{ xx = 21.4402e-9", "{ xx = 21.4412e-9"), "accepted");
   // a negative principal moment
   EXPECT_EQ(edited("[torso]", "{ xx = 4238.1285e-9", "^{ xx = 1e-15"), "^: torso.inertia_kg_m2: " + why);
 }
 
 TEST_F(VehicleFile, RefusesWhatIsNoVehicle) {
-  EXPECT_EQ(edited("", "schema = 1", "schema = ^2"),
-            "^: schema: 2 is out of range; accepted: an integer from 1 to 1");
+  EXPECT_EQ(edited("", "schema = 1", "schema = ^2"), "^: schema: 2 is out of range; accepted: an integer from 1 to 1");
   EXPECT_EQ(edited("", "schema = 1\n", ""), "^: schema: is missing; accepted: an integer from 1 to 1");
   EXPECT_EQ(edited("", "name = \"hummingbird_nominal\"", ""), "^: name: is missing; accepted: a string");
   EXPECT_EQ(edited("[left.motor]", "resistance_ohm = 12.4", "resistance_ohm = ^\"12.4\""),
@@ -287,8 +280,7 @@ TEST_F(VehicleFile, RefusesWhatIsNoVehicle) {
 
 TEST_F(VehicleFile, RefusesTruncatedFiles) {
   const std::string text = nominal_text(), start = text.substr(0, text.find("[torso]"));
-  EXPECT_EQ(message(start + "[torso^"),
-            "^: not valid TOML: Error while parsing table header: encountered end-of-file");
+  EXPECT_EQ(message(start + "[torso^"), "^: not valid TOML: Error while parsing table header: encountered end-of-file");
   EXPECT_EQ(message(start), "^: torso.mass_kg: is missing; accepted: a number from 1e-09 to 10");
   // wherever it is cut, no figure is guessed: only the last line's end may go
   for (std::size_t length = 0; length + 2 < text.size(); length += 101)
@@ -296,11 +288,9 @@ TEST_F(VehicleFile, RefusesTruncatedFiles) {
 }
 
 TEST_F(VehicleFile, FillsInEffects) {
-  const Vehicle v =
-      read(nominal_text() + "[effects.body_drag]\ndrag_area_m2 = 0.002\n[effects.ground_effect]\n");
-  const std::map<std::string, Figures> expected = {
-      {"body_drag", {{"drag_area_m2", 0.002}, {"centre_z_m", 0}}},
-      {"ground_effect", {{"gain", 0.15}, {"length_m", 0.06}}}};
+  const Vehicle v = read(nominal_text() + "[effects.body_drag]\ndrag_area_m2 = 0.002\n[effects.ground_effect]\n");
+  const std::map<std::string, Figures> expected = {{"body_drag", {{"drag_area_m2", 0.002}, {"centre_z_m", 0}}},
+                                                   {"ground_effect", {{"gain", 0.15}, {"length_m", 0.06}}}};
   EXPECT_EQ(v.effects, expected);
   for (const EffectEntry& e : effects())
     for (const EffectParameter& p : e.parameters) {
@@ -318,10 +308,9 @@ TEST_F(VehicleFile, RefusesEffectsThatDoNotExist) {
   EXPECT_EQ(with("[effects.body_drag]\n^drag_area_cm2 = 15.0\n"),
             "^: effects.body_drag.drag_area_cm2: unknown key; accepted here with another unit: "
             "\"drag_area_m2\"");
-  EXPECT_EQ(
-      with("[effects.body_drag]\n^drag_aera_m2 = 0.002\n"),
-      "^: effects.body_drag.drag_aera_m2: unknown key; accepted: centre_z_m, drag_area_m2; did you mean "
-      "\"drag_area_m2\"?");
+  EXPECT_EQ(with("[effects.body_drag]\n^drag_aera_m2 = 0.002\n"),
+            "^: effects.body_drag.drag_aera_m2: unknown key; accepted: centre_z_m, drag_area_m2; did you mean "
+            "\"drag_area_m2\"?");
   EXPECT_EQ(with("[effects.ground_effect]\ngain = ^1.5\n"),
             "^: effects.ground_effect.gain: 1.5 is out of range; accepted: a number from 0 to 1");
   EXPECT_EQ(with("[effects]\nbody_drag = ^0.002\n"),

@@ -47,8 +47,7 @@ PaperWing paper_wing(const model::Side& s, double rho, int sg, double psi, doubl
   const auto [u, v, w] = velocity;
   const double d_0 = std::abs(s.shoulder_m.y), d_s = s.shoulder_m.z;
   const double ui1 = psi_rate + sg * r;
-  const double ui0 =
-      sg * (r * d_0 * std::cos(psi) - (v - p * d_s) * std::sin(psi)) - (u + q * d_s) * std::cos(psi);
+  const double ui0 = sg * (r * d_0 * std::cos(psi) - (v - p * d_s) * std::sin(psi)) - (u + q * d_s) * std::cos(psi);
   const double uo1 = sg * p * std::cos(psi) + q * std::sin(psi);
   const double uo0 = sg * p * d_0 + w;
   const model::Planform& f = s.planform;
@@ -60,8 +59,8 @@ PaperWing paper_wing(const model::Side& s, double rho, int sg, double psi, doubl
       0.5 * rho * paper_force(alpha) * c * (a2 * R * R * R * f.r22 + a1 * R * R * f.r11 + a0 * R * f.r00);
   const double aero = -0.5 * rho * c * c * paper_force(alpha) * paper_pressure_centre(alpha) *
                       (a2 * R * R * R * f.z_cp2 + a1 * R * R * f.z_cp1 + a0 * R * f.z_cp0);
-  const double damping = -0.125 * rho * std::abs(theta_rate) * theta_rate * f.rotational_damping_coefficient *
-                         R * std::pow(c, 4) * f.z_rd;
+  const double damping =
+      -0.125 * rho * std::abs(theta_rate) * theta_rate * f.rotational_damping_coefficient * R * std::pow(c, 4) * f.z_rd;
   return {force, aero + damping};
 }
 
@@ -71,13 +70,10 @@ void compare_with_paper(const model::Vehicle& vehicle) {
   const auto parameters = model::derive(vehicle, 1e-4);
   const auto& p = side > 0 ? parameters.left : parameters.right;
   std::mt19937_64 engine(3);
-  const auto random = [&](double scale) {
-    return scale * std::uniform_real_distribution<double>(-1, 1)(engine);
-  };
+  const auto random = [&](double scale) { return scale * std::uniform_real_distribution<double>(-1, 1)(engine); };
   for (int trial = 0; trial < 500; ++trial) {
     const double psi = random(1.2), psi_rate = random(300), theta = random(0.8), theta_rate = random(400);
-    const double velocity[3] = {random(2), random(2), random(2)},
-                 rate[3] = {random(30), random(30), random(30)};
+    const double velocity[3] = {random(2), random(2), random(2)}, rate[3] = {random(30), random(30), random(30)};
     const PaperWing expected =
         paper_wing(s, vehicle.air_density_kg_m3, side, psi, psi_rate, theta, theta_rate, velocity, rate);
 
@@ -150,9 +146,7 @@ void drive_four_angles() {
   const auto parameters = model::derive(test::nominal(), 1e-4);
   const auto& p = side > 0 ? parameters.left : parameters.right;
   std::mt19937_64 engine(5);
-  const auto random = [&](double scale) {
-    return scale * std::uniform_real_distribution<double>(-1, 1)(engine);
-  };
+  const auto random = [&](double scale) { return scale * std::uniform_real_distribution<double>(-1, 1)(engine); };
   for (int trial = 0; trial < 200; ++trial) {
     const Angles angles{random(0.5), random(1.2), random(0.4), random(0.8)};
     const Angles rates{random(50), random(300), random(100), random(300)};
@@ -168,17 +162,14 @@ void drive_four_angles() {
       const V here = leading_edge_direction<side>(angles, {0, side * r, 0});
       return velocity + (model::cross(body_rate, here) + (0.5 / h) * (out - in));
     };
-    const V x = leading_edge_direction<side>(angles, {1, 0, 0}),
-            z = leading_edge_direction<side>(angles, {0, 0, 1});
+    const V x = leading_edge_direction<side>(angles, {1, 0, 0}), z = leading_edge_direction<side>(angles, {0, 0, 1});
     const auto in_plane = [&](double r) { return -model::dot(velocity_at(r), x); };
     const auto out_of_plane = [&](double r) { return model::dot(velocity_at(r), z); };
-    const double ui0 = in_plane(0), ui1 = in_plane(1) - ui0, uo0 = out_of_plane(0),
-                 uo1 = out_of_plane(1) - uo0;
+    const double ui0 = in_plane(0), ui1 = in_plane(1) - ui0, uo0 = out_of_plane(0), uo1 = out_of_plane(1) - uo0;
     const double r_cp = p.span_to_pressure_m, ui = ui1 * r_cp + ui0, uo = uo1 * r_cp + uo0;
     const double alpha = angles.rotation_rad + (ui > 0 ? pi / 2 : -pi / 2) - std::atan(uo / ui);
-    const double force =
-        paper_force(alpha) * ((ui1 * ui1 + uo1 * uo1) * p.force2 + (ui1 * ui0 + uo1 * uo0) * p.force1 +
-                              (ui0 * ui0 + uo0 * uo0) * p.force0);
+    const double force = paper_force(alpha) * ((ui1 * ui1 + uo1 * uo1) * p.force2 + (ui1 * ui0 + uo1 * uo0) * p.force1 +
+                                               (ui0 * ui0 + uo0 * uo0) * p.force0);
     const V normal = std::cos(angles.rotation_rad) * x - std::sin(angles.rotation_rad) * z;  // x of the wing
     EXPECT_NEAR(ours.force_N.x, force * normal.x, 1e-6 * std::abs(force) + 1e-9);
     EXPECT_NEAR(ours.force_N.y, force * normal.y, 1e-6 * std::abs(force) + 1e-9);

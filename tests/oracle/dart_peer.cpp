@@ -37,8 +37,7 @@ RevoluteJoint* add_hinged(BodyNode* parent, const std::string& name, const model
   properties.mName = name + " joint";
   properties.mAxis = axis;
   properties.mT_ParentBodyToJoint.translation() = origin_m;
-  auto* hinge =
-      parent->createChildJointAndBodyNodePair<RevoluteJoint>(properties, body_properties(name, body)).first;
+  auto* hinge = parent->createChildJointAndBodyNodePair<RevoluteJoint>(properties, body_properties(name, body)).first;
   hinge->setPositionLowerLimit(0, joint.lower_rad);
   hinge->setPositionUpperLimit(0, joint.upper_rad);
   hinge->setLimitEnforcement(true);
@@ -63,18 +62,16 @@ DartPeer::DartPeer(const model::Vehicle& vehicle, const PeerOptions& options, co
   if (options.torso_welded) {
     engine.torso = engine.skeleton->createJointAndBodyNodePair<WeldJoint>(nullptr, {}, torso).second;
   } else {
-    std::tie(engine.free, engine.torso) =
-        engine.skeleton->createJointAndBodyNodePair<FreeJoint>(nullptr, {}, torso);
+    std::tie(engine.free, engine.torso) = engine.skeleton->createJointAndBodyNodePair<FreeJoint>(nullptr, {}, torso);
   }
   for (std::size_t i : {0u, 1u}) {
     const model::Side& side = side_of(vehicle, i);
     const std::string name = i == 0 ? "left " : "right ";
-    engine.stroke[i] =
-        add_hinged(engine.torso, name + "leading edge", side.leading_edge, vector(side.shoulder_m),
-                   side_sign(i) * Vector3d::UnitZ(), side.stroke, options.dry_friction);
+    engine.stroke[i] = add_hinged(engine.torso, name + "leading edge", side.leading_edge, vector(side.shoulder_m),
+                                  side_sign(i) * Vector3d::UnitZ(), side.stroke, options.dry_friction);
     engine.stroke[i]->setRestPosition(0, side.spring.rest_angle_rad);
-    engine.rotation[i] = add_hinged(engine.stroke[i]->getChildBodyNode(), name + "wing", side.wing,
-                                    Vector3d::Zero(), Vector3d::UnitY(), side.rotation, options.dry_friction);
+    engine.rotation[i] = add_hinged(engine.stroke[i]->getChildBodyNode(), name + "wing", side.wing, Vector3d::Zero(),
+                                    Vector3d::UnitY(), side.rotation, options.dry_friction);
   }
   engine.world->setTimeStep(options.step_s);
   engine.world->setGravity({0, 0, -options.gravity_m_s2});
@@ -100,8 +97,7 @@ void DartPeer::step(double left_V, double right_V) {
 
     const WingLoad& load = loads_.wing[i];
     BodyNode* wing = rotation->getChildBodyNode();
-    wing->addExtForce({load.normal_force_N, 0, 0}, {0, side_sign(i) * load.span_m, -load.depth_m}, true,
-                      true);
+    wing->addExtForce({load.normal_force_N, 0, 0}, {0, side_sign(i) * load.span_m, -load.depth_m}, true, true);
     wing->addExtTorque({0, load.damping_moment_Nm, 0}, true);
   }
   engine_->world->step();
@@ -112,8 +108,7 @@ PeerState DartPeer::state() const {
   if (!options_.torso_welded) {
     const Eigen::Isometry3d& pose = engine_->torso->getTransform();
     const Eigen::Quaterniond q(pose.linear());
-    const Eigen::Vector6d& twist_B =
-        engine_->torso->getSpatialVelocity();  // angular, then linear at the origin
+    const Eigen::Vector6d& twist_B = engine_->torso->getSpatialVelocity();  // angular, then linear at the origin
     state.q_WB = {q.w(), q.x(), q.y(), q.z()};
     Vector3d::Map(state.p_WB_W_m.data()) = pose.translation();
     Vector3d::Map(state.v_WB_W_m_s.data()) = pose.linear() * twist_B.tail<3>();

@@ -30,33 +30,31 @@ std::string inertial(const model::RigidBody& body) {
   if (axes.determinant() < 0) axes.col(0) = -axes.col(0);
   const Eigen::Quaterniond q(axes);
   std::ostringstream xml;
-  xml << std::setprecision(17) << "<inertial mass='" << body.mass_kg << "' pos='" << body.com_m.x << ' '
-      << body.com_m.y << ' ' << body.com_m.z << "' diaginertia='" << moments[0] << ' ' << moments[1] << ' '
-      << moments[2] << "' quat='" << q.w() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << "'/>";
+  xml << std::setprecision(17) << "<inertial mass='" << body.mass_kg << "' pos='" << body.com_m.x << ' ' << body.com_m.y
+      << ' ' << body.com_m.z << "' diaginertia='" << moments[0] << ' ' << moments[1] << ' ' << moments[2] << "' quat='"
+      << q.w() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << "'/>";
   return xml.str();
 }
 
 std::string hinge(const char* axis, const model::Joint& joint, double armature, bool friction) {
   std::ostringstream xml;
-  xml << std::setprecision(17) << "<joint axis='" << axis << "' limited='true' range='" << joint.lower_rad
-      << ' ' << joint.upper_rad << "' armature='" << armature << "' frictionloss='"
-      << (friction ? joint.friction_Nm : 0) << "'/>";
+  xml << std::setprecision(17) << "<joint axis='" << axis << "' limited='true' range='" << joint.lower_rad << ' '
+      << joint.upper_rad << "' armature='" << armature << "' frictionloss='" << (friction ? joint.friction_Nm : 0)
+      << "'/>";
   return xml.str();
 }
 
 std::string wing(const model::Side& side, const char* stroke_axis, bool friction) {
   const auto& [x, y, z] = side.shoulder_m;
   std::ostringstream xml;
-  xml << std::setprecision(17) << "<body pos='" << x << ' ' << y << ' ' << z << "'>"
-      << inertial(side.leading_edge)
+  xml << std::setprecision(17) << "<body pos='" << x << ' ' << y << ' ' << z << "'>" << inertial(side.leading_edge)
       << hinge(stroke_axis, side.stroke, reflected_rotor_inertia(side.motor), friction) << "<body>"
       << inertial(side.wing) << hinge("0 1 0", side.rotation, 0, friction) << "</body></body>";
   return xml.str();
 }
 
 /// Dampers and springs come with the loads, so MuJoCo's own passive forces are off.
-std::string vehicle_xml(const model::Vehicle& vehicle, const PeerOptions& options,
-                        const MujocoSettings& settings) {
+std::string vehicle_xml(const model::Vehicle& vehicle, const PeerOptions& options, const MujocoSettings& settings) {
   const bool friction = options.dry_friction == DryFriction::constraint;
   std::ostringstream xml;
   xml << std::setprecision(17) << "<mujoco><compiler angle='radian'/><option timestep='" << options.step_s
@@ -84,8 +82,7 @@ mjModel* load(const std::string& xml) {
 
 }  // namespace
 
-MujocoPeer::MujocoPeer(const model::Vehicle& vehicle, const PeerOptions& options,
-                       const MujocoSettings& settings)
+MujocoPeer::MujocoPeer(const model::Vehicle& vehicle, const PeerOptions& options, const MujocoSettings& settings)
     : vehicle_(vehicle),
       options_(options),
       model_(load(vehicle_xml(vehicle, options, settings)), mj_deleteModel),

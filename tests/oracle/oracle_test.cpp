@@ -133,9 +133,9 @@ double from_published(const Path& path) {
   double largest = 0;
   for (std::size_t row = 0; row < table.column("t_s").size(); ++row) {
     const Vec3 p = torso_com(path[static_cast<std::size_t>(steps_in(table.column("t_s")[row], kHold_s))]);
-    largest = std::max(largest, std::hypot(p[0] - table.column("torso_com_x_m")[row],
-                                           p[1] - table.column("torso_com_y_m")[row],
-                                           p[2] - table.column("torso_com_z_m")[row]));
+    largest = std::max(largest,
+                       std::hypot(p[0] - table.column("torso_com_x_m")[row], p[1] - table.column("torso_com_y_m")[row],
+                                  p[2] - table.column("torso_com_z_m")[row]));
   }
   return largest;
 }
@@ -147,8 +147,8 @@ TEST(FreeFlight, DiffersFromThePublishedOneByItsSoftStop) {
   const PeerOptions published{.step_s = kStep_s, .shoulder = ShoulderVelocity::published};
   EXPECT_LT(from_published(flight(MujocoPeer(test::nominal(), published), kStep_s)), 1e-6);
   EXPECT_LT(from_published(flight(MujocoPeer(test::nominal(), {.step_s = kStep_s}), kStep_s)), 0.1e-3);
-  EXPECT_NEAR(from_published(flight(hard_mujoco({.step_s = kStep_s}), kStep_s)),
-              from_published(our_flight(kStep_s)), 0.25e-3);
+  EXPECT_NEAR(from_published(flight(hard_mujoco({.step_s = kStep_s}), kStep_s)), from_published(our_flight(kStep_s)),
+              0.25e-3);
 }
 
 // ---- mean thrust, torso welded
@@ -179,8 +179,7 @@ TEST(MeanThrust, IsThatOfMujoco) {
   for (const auto& [volts, newton] : published) {
     const double ours = our_mean_thrust_N(kStep_s, volts);
     // MuJoCo's hard stop is 0.04 to 0.05 % off at 10 us, half of that at 5 us; ours 0.01 %
-    EXPECT_NEAR(mean_thrust_N(hard_mujoco({.step_s = kStep_s, .torso_welded = true}), kStep_s, volts) / ours,
-                1, 0.8e-3)
+    EXPECT_NEAR(mean_thrust_N(hard_mujoco({.step_s = kStep_s, .torso_welded = true}), kStep_s, volts) / ours, 1, 0.8e-3)
         << volts;
     // its soft one is that of the published study, to six digits
     const PeerOptions welded{.step_s = kStep_s, .torso_welded = true};
@@ -226,17 +225,12 @@ model::Vehicle scrambled(Random& random) {
   model::Vehicle v = test::nominal();
   for (const model::Parameter& p : model::parameters(v)) {
     const bool inertia = p.path.find("inertia_kg_m2.") != std::string::npos;
-    const bool length =
-        p.path.find("com_m.") != std::string::npos || p.path.find("shoulder_m.") != std::string::npos;
-    if (length)
-      *p.value += random(2e-3);
-    else if (p.path.ends_with("rest_angle_rad"))
-      *p.value = random(0.3);
-    else if (!inertia)
-      *p.value *= 1 + random(0.2);
+    const bool length = p.path.find("com_m.") != std::string::npos || p.path.find("shoulder_m.") != std::string::npos;
+    if (length) *p.value += random(2e-3);
+    else if (p.path.ends_with("rest_angle_rad")) *p.value = random(0.3);
+    else if (!inertia) *p.value *= 1 + random(0.2);
   }
-  for (model::RigidBody* b :
-       {&v.torso, &v.left.leading_edge, &v.left.wing, &v.right.leading_edge, &v.right.wing}) {
+  for (model::RigidBody* b : {&v.torso, &v.left.leading_edge, &v.left.wing, &v.right.leading_edge, &v.right.wing}) {
     model::InertiaTensor& I = b->inertia_kg_m2;
     for (int point = 0; point < 3; ++point) {
       const double x = random(3e-3), y = random(3e-3), z = random(3e-3), m = 0.1 * b->mass_kg;
@@ -303,8 +297,7 @@ TEST(Accelerations, AreThoseOfMujoco) {
     const auto ours = change(peer_state(start), peer_state(batch.state(0)), kStep_s);
     const auto theirs = change(peer_state(start), peer.state(), kStep_s);
     for (std::size_t group = welded ? 2 : 0; group < ours.size(); ++group) {
-      const double scale =
-          std::abs(*std::ranges::max_element(theirs[group], {}, [](double a) { return std::abs(a); }));
+      const double scale = std::abs(*std::ranges::max_element(theirs[group], {}, [](double a) { return std::abs(a); }));
       for (std::size_t i = 0; i < ours[group].size(); ++i)
         ASSERT_NEAR(ours[group][i], theirs[group][i], kTolerance * scale)
             << "trial " << trial << " group " << group << " " << i;

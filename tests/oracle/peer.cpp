@@ -30,8 +30,8 @@ struct WingMotion {
 };
 
 /// Blade elements of one wing; `velocity` is that of the point from which d_0 and d_s are measured, in B.
-WingLoad wing_load(const model::Side& side, double density, double sg, const Vec3& velocity,
-                   const Vec3& rates, const WingMotion& wing) {
+WingLoad wing_load(const model::Side& side, double density, double sg, const Vec3& velocity, const Vec3& rates,
+                   const WingMotion& wing) {
   const model::Planform& planform = side.planform;
   const auto [u, v, w] = velocity;
   const auto [p, q, r] = rates;
@@ -67,8 +67,8 @@ WingLoad wing_load(const model::Side& side, double density, double sg, const Vec
   load.span_m = r_cp;
   // D = -M_aero/F_N; C_N and the dynamic pressure cancel, so it stays finite where C_N passes zero.
   load.depth_m = area == 0 ? 0.0 : c * centre_of_pressure_fraction(alpha) * moment / area;
-  load.damping_moment_Nm = -density / 8 * std::abs(thetadot) * thetadot *
-                           planform.rotational_damping_coefficient * R_w * c * c * c * c * planform.z_rd;
+  load.damping_moment_Nm = -density / 8 * std::abs(thetadot) * thetadot * planform.rotational_damping_coefficient *
+                           R_w * c * c * c * c * planform.z_rd;
   return load;
 }
 
@@ -90,8 +90,7 @@ double reflected_rotor_inertia(const model::Motor& motor) {
 }
 
 double spring_stiffness(const model::Spring& spring, double stroke_rad) {
-  return stroke_rad > spring.rest_angle_rad ? spring.stiffness_positive_Nm_rad
-                                            : spring.stiffness_negative_Nm_rad;
+  return stroke_rad > spring.rest_angle_rad ? spring.stiffness_positive_Nm_rad : spring.stiffness_negative_Nm_rad;
 }
 
 Loads loads_at(const model::Vehicle& vehicle, const PeerOptions& options, const PeerState& state,
@@ -107,8 +106,7 @@ Loads loads_at(const model::Vehicle& vehicle, const PeerOptions& options, const 
     const WingMotion wing{state.stroke_rad[i], state.rotation_rad[i], state.stroke_rate_rad_s[i],
                           state.rotation_rate_rad_s[i]};
     const Vec3 reference = exact ? Vec3{side.shoulder_m.x, 0, 0} : Vec3{com.x, com.y, com.z};
-    loads.wing[i] =
-        wing_load(side, vehicle.air_density_kg_m3, side_sign(i), v_B + cross(w_B, reference), w_B, wing);
+    loads.wing[i] = wing_load(side, vehicle.air_density_kg_m3, side_sign(i), v_B + cross(w_B, reference), w_B, wing);
     loads.spring_Nm[i] =
         -spring_stiffness(side.spring, wing.stroke_rad) * (wing.stroke_rad - side.spring.rest_angle_rad);
     loads.stroke_Nm[i] = motor_torque(side.motor, voltage_V[i], wing.stroke_rate_rad_s) +
@@ -129,8 +127,7 @@ Wrench aerodynamic_wrench(const model::Vehicle& vehicle, const PeerState& state,
     const Vec3 y{-std::sin(psi), std::cos(psi), 0};
     const Vec3 z{std::cos(psi) * std::sin(theta), std::sin(psi) * std::sin(theta), std::cos(theta)};
     const Vec3 force = load.normal_force_N * x;
-    const Vec3 point =
-        Vec3{shoulder.x, shoulder.y, shoulder.z} + side_sign(i) * load.span_m * y + -load.depth_m * z;
+    const Vec3 point = Vec3{shoulder.x, shoulder.y, shoulder.z} + side_sign(i) * load.span_m * y + -load.depth_m * z;
     sum.force_N = sum.force_N + force;
     sum.moment_Nm = sum.moment_Nm + cross(point, force) + load.damping_moment_Nm * y;
   }
@@ -143,8 +140,6 @@ Vec3 to_world(const Quat& q_WB, const Vec3& v_B) {
   return v_B + q_WB[0] * twice + cross(axis, twice);
 }
 
-Vec3 to_body(const Quat& q_WB, const Vec3& v_W) {
-  return to_world({q_WB[0], -q_WB[1], -q_WB[2], -q_WB[3]}, v_W);
-}
+Vec3 to_body(const Quat& q_WB, const Vec3& v_W) { return to_world({q_WB[0], -q_WB[1], -q_WB[2], -q_WB[3]}, v_W); }
 
 }  // namespace flappy::oracle

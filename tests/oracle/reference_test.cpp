@@ -32,12 +32,9 @@ int steps_in(double seconds, double step_s) { return static_cast<int>(std::lroun
 Vector torso_com(const sim::FlapperState& s) {
   const model::Triple c = test::nominal().torso.com_m;
   const auto [w, x, y, z] = s.attitude;
-  return {s.position_m[0] + (1 - 2 * (y * y + z * z)) * c.x + 2 * (x * y - w * z) * c.y +
-              2 * (x * z + w * y) * c.z,
-          s.position_m[1] + 2 * (x * y + w * z) * c.x + (1 - 2 * (x * x + z * z)) * c.y +
-              2 * (y * z - w * x) * c.z,
-          s.position_m[2] + 2 * (x * z - w * y) * c.x + 2 * (y * z + w * x) * c.y +
-              (1 - 2 * (x * x + y * y)) * c.z};
+  return {s.position_m[0] + (1 - 2 * (y * y + z * z)) * c.x + 2 * (x * y - w * z) * c.y + 2 * (x * z + w * y) * c.z,
+          s.position_m[1] + 2 * (x * y + w * z) * c.x + (1 - 2 * (x * x + z * z)) * c.y + 2 * (y * z - w * x) * c.z,
+          s.position_m[2] + 2 * (x * z - w * y) * c.x + 2 * (y * z + w * x) * c.y + (1 - 2 * (x * x + y * y)) * c.z};
 }
 
 /// Largest deviations from MuJoCo's flight in the rows from `begin` to `end`.
@@ -57,11 +54,11 @@ Deviation deviation_from_mujoco(double begin_s, double end_s) {
     if (t < begin_s || t > end_s) continue;
     const sim::FlapperState s = batch.state(0);
     const Vector com = torso_com(s);
-    d.position_m = std::max(d.position_m,
-                            std::hypot(com[0] - at("torso_com_x_m", row), com[1] - at("torso_com_y_m", row),
-                                       com[2] - at("torso_com_z_m", row)));
-    const double turn = s.attitude[0] * at("qw", row) + s.attitude[1] * at("qx", row) +
-                        s.attitude[2] * at("qy", row) + s.attitude[3] * at("qz", row);
+    d.position_m =
+        std::max(d.position_m, std::hypot(com[0] - at("torso_com_x_m", row), com[1] - at("torso_com_y_m", row),
+                                          com[2] - at("torso_com_z_m", row)));
+    const double turn = s.attitude[0] * at("qw", row) + s.attitude[1] * at("qx", row) + s.attitude[2] * at("qy", row) +
+                        s.attitude[3] * at("qz", row);
     d.attitude_rad = std::max(d.attitude_rad, 2 * std::acos(std::min(1.0, std::abs(turn))));
     for (const auto& [stroke, rotation, i] : {std::tuple{"left_stroke_rad", "left_rotation_rad", 0},
                                               std::tuple{"right_stroke_rad", "right_rotation_rad", 1}}) {
@@ -182,8 +179,7 @@ TEST(Published, SplitCycleAlsoRollsAFreeVehicle) {
   // %.
   const double yaw[] = {-0.53, 0.39, 0.63, 0.71}, roll[] = {-0.13, -1.10, -2.07, -2.92};
   constexpr double kStep_s = 2e-5;
-  sim::Batch<double> batch =
-      one_flapper(kStep_s, sim::Start::flying, {.amplitude_V = 10, .split_cycle = 0.02});
+  sim::Batch<double> batch = one_flapper(kStep_s, sim::Start::flying, {.amplitude_V = 10, .split_cycle = 0.02});
   const int steps = steps_in(1 / 34.0, kStep_s);
   for (int beat = 0; beat < 4; ++beat) {
     double mean_roll = 0, mean_yaw = 0;
@@ -204,8 +200,7 @@ TEST(Dart, MapsForcesAsWeDoButForItsDamping) {
   const io::CsvTable map = reference("force_map_dart.csv");
   const auto at = [&](const char* column, std::size_t row) { return map.column(column)[row]; };
   for (std::size_t row = 0; row < map.column("amplitude_V").size(); ++row) {
-    const sim::Input u{at("amplitude_V", row), at("difference_V", row), at("bias_V", row),
-                       at("split_cycle", row)};
+    const sim::Input u{at("amplitude_V", row), at("difference_V", row), at("bias_V", row), at("split_cycle", row)};
     const MeanWrench w = mean_wrench(u, kDefaultStep_s);
     const auto ratio = [&](double ours, const char* column) { return ours / at(column, row); };
     EXPECT_NEAR(ratio(w.thrust_N, "thrust_N"), 1 + 0.0473 * std::sqrt(10 / u.amplitude_V), 0.003) << row;

@@ -193,8 +193,7 @@ TEST(Effects, VanishExactlyAtTheirVanishingValue) {
   for (const model::EffectEntry& e : model::effects()) {
     model::Vehicle v = test::nominal();
     for (const model::EffectParameter& p : e.parameters) v.effects[e.info.id][p.name] = p.typical;
-    v.effects[e.info.id][e.parameters[static_cast<std::size_t>(e.info.vanishing)].name] =
-        e.info.vanishing_value;
+    v.effects[e.info.id][e.parameters[static_cast<std::size_t>(e.info.vanishing)].name] = e.info.vanishing_value;
     EXPECT_EQ(height_after(v, 0.2, 0.1), height_after(test::nominal(), 0.2, 0.1)) << e.info.id;
     v.effects[e.info.id].clear();  // typical size
     EXPECT_NE(height_after(v, 0.2, 0.1), height_after(test::nominal(), 0.2, 0.1)) << e.info.id;
@@ -211,10 +210,8 @@ TEST(Effects, OfOneFlapperLeaveItsBlockAlone) {
   plain.step(3000);
   mixed.step(3000);
   for (std::size_t i = 0; i < 8; ++i) {
-    if (i == 3)
-      EXPECT_NE(plain.hash(i, i + 1), mixed.hash(i, i + 1));
-    else
-      EXPECT_EQ(plain.hash(i, i + 1), mixed.hash(i, i + 1)) << i;
+    if (i == 3) EXPECT_NE(plain.hash(i, i + 1), mixed.hash(i, i + 1));
+    else EXPECT_EQ(plain.hash(i, i + 1), mixed.hash(i, i + 1)) << i;
   }
 }
 

@@ -111,8 +111,7 @@ Mechanics mechanics(const model::Vehicle& v, const FlapperState& s) {
     const Oscillator o(side(v, i));
     energy += 0.5 * o.stiffness * std::pow(s.stroke_rad[i] - o.rest, 2);
   }
-  const Matrix3d at_C =
-      m.total_mass * (m.com.squaredNorm() * Matrix3d::Identity() - m.com * m.com.transpose());
+  const Matrix3d at_C = m.total_mass * (m.com.squaredNorm() * Matrix3d::Identity() - m.com * m.com.transpose());
   return {m.total_mass,
           energy,
           Vector3d(s.position_m) + R * m.com,
@@ -149,8 +148,8 @@ TEST(Physics, FallsFreely) {
   const int steps = steps_in(seconds, kStep);
   model::Vehicle beating = test::identified();
   beating.air_density_kg_m3 = 0;
-  const model::Vehicle vehicles[] = {conservative(kLocked, kLocked),
-                                     without_springs(conservative(kFree, kFree)), beating};
+  const model::Vehicle vehicles[] = {conservative(kLocked, kLocked), without_springs(conservative(kFree, kFree)),
+                                     beating};
   for (int wings = 0; wings < 3; ++wings) {
     SCOPED_TRACE(wings);  // locked, at rest, beating
     const model::Vehicle& v = vehicles[wings];
@@ -239,9 +238,7 @@ TEST(Physics, StrokeAnswersTheDriverLikeADampedOscillator) {
       for (std::size_t i = 0; i < 2; ++i) stroke[i].push_back(b.state(0).stroke_rad[i]);
 
     const double w = 2 * pi * hertz;
-    const auto turn = [&](std::size_t n) {
-      return std::polar(1.0, w * kStep * static_cast<double>(kSettle + n));
-    };
+    const auto turn = [&](std::size_t n) { return std::polar(1.0, w * kStep * static_cast<double>(kSettle + n)); };
     for (std::size_t i = 0; i < 2; ++i) {
       const Oscillator o(side(v, i));
       const std::complex<double> Z(o.stiffness - o.inertia * w * w, o.damping * w);
@@ -254,8 +251,7 @@ TEST(Physics, StrokeAnswersTheDriverLikeADampedOscillator) {
         mean += stroke[i][n] / kWindow;
       }
       // leapfrog: psi'' off by (w h)^2/12, psi' by (w h)^2/6; driver: half a 2^-32 of a beat in each update
-      const double scheme =
-          std::pow(w * kStep, 2) * (o.inertia * w * w / 12 + o.damping * w / 6) / std::abs(Z);
+      const double scheme = std::pow(w * kStep, 2) * (o.inertia * w * w / 12 + o.damping * w / 6) / std::abs(Z);
       const double phase = 2 * pi * 0x1p-33 * (kSettle + kWindow);
       EXPECT_LT(std::abs(measured / expected - 1.0), scheme + phase) << "side " << i;
       const double allowed = phase * std::abs(expected);
@@ -378,8 +374,7 @@ Drift drift(const model::Vehicle& v, const FlapperState& start, double seconds, 
     d.energy = std::max(d.energy, std::abs(now.energy - first.energy));
     fastest = std::max(fastest, fastest_rate(s));
     body = std::max(body, Vector3d(s.body_rate_rad_s).norm());
-    for (int i = 0; i < 2; ++i)
-      widest = std::max({widest, std::abs(s.stroke_rad[i]), std::abs(s.rotation_rad[i])});
+    for (int i = 0; i < 2; ++i) widest = std::max({widest, std::abs(s.stroke_rad[i]), std::abs(s.rotation_rad[i])});
   }
   EXPECT_LT(widest, kFree.upper_rad) << "a stop would take energy";
   // the attitude's length, (h w / 2)^4 off, and rounding scale the momenta of wings at 5 m/s
@@ -403,8 +398,7 @@ FlapperState spinning(const Vector3d& body_rate, double scale) {
   return s;
 }
 
-void expect_conservation(const std::string& name, const model::Vehicle& v, const FlapperState& start,
-                         double seconds) {
+void expect_conservation(const std::string& name, const model::Vehicle& v, const FlapperState& start, double seconds) {
   const Drift coarse = drift(v, start, seconds, kStep), fine = drift(v, start, seconds, kFine);
   expect_below(name + "_momentum_kg_m_s", coarse.momentum, coarse.momentum_bound);
   expect_below(name + "_momentum_fine_kg_m_s", fine.momentum, fine.momentum_bound);
@@ -467,8 +461,7 @@ TEST(ForceFree, RigidVehicleTumblesAsEulerSays) {
     const Eigen::Quaterniond q(s.attitude[0], s.attitude[1], s.attitude[2], s.attitude[3]);
     angle[fine] = q.normalized().angularDistance(Eigen::Quaterniond(x.data()).normalized());
     rate[fine] = (Vector3d(s.body_rate_rad_s) - x.tail<3>()).norm();
-    for (int i = 0; i < 2; ++i)
-      EXPECT_EQ(std::abs(s.stroke_rate_rad_s[i]) + std::abs(s.rotation_rate_rad_s[i]), 0);
+    for (int i = 0; i < 2; ++i) EXPECT_EQ(std::abs(s.stroke_rate_rad_s[i]) + std::abs(s.rotation_rate_rad_s[i]), 0);
   }
   // each step keeps constant what turns at the body's rate
   const double bound = kStep * w0.squaredNorm() * seconds;
@@ -497,8 +490,7 @@ FlapperState mirrored(FlapperState s) {
   s.position_m[1] *= -1, s.velocity_m_s[1] *= -1;
   s.attitude[1] *= -1, s.attitude[3] *= -1;
   s.body_rate_rad_s[0] *= -1, s.body_rate_rad_s[2] *= -1;
-  for (auto* p : {s.stroke_rad, s.rotation_rad, s.stroke_rate_rad_s, s.rotation_rate_rad_s})
-    std::swap(p[0], p[1]);
+  for (auto* p : {s.stroke_rad, s.rotation_rad, s.stroke_rate_rad_s, s.rotation_rate_rad_s}) std::swap(p[0], p[1]);
   return s;
 }
 
@@ -580,8 +572,7 @@ TEST(Stops, HoldDrivenWings) {
       const FlapperState now = b.state(0);
       for (std::size_t i = 0; i < 2; ++i) {
         stroke.look(side(v, i).stroke, before.stroke_rad[i], now.stroke_rad[i], now.stroke_rate_rad_s[i]);
-        rotation.look(side(v, i).rotation, before.rotation_rad[i], now.rotation_rad[i],
-                      now.rotation_rate_rad_s[i]);
+        rotation.look(side(v, i).rotation, before.rotation_rad[i], now.rotation_rad[i], now.rotation_rate_rad_s[i]);
       }
       before = now;
     }
@@ -597,13 +588,10 @@ TEST(Stops, DoNotThrowBack) {
   const model::Joint stopped{-limit, limit, 0, 0};
   for (const bool stroke : {true, false})
     for (const int sense : {+1, -1}) {
-      const model::Vehicle v =
-          without_springs(conservative(stroke ? stopped : kLocked, stroke ? kLocked : stopped));
+      const model::Vehicle v = without_springs(conservative(stroke ? stopped : kLocked, stroke ? kLocked : stopped));
       Batch<double> b(1, v, options(kStep, 0));
       const auto angle = [&] { return (stroke ? b.state(0).stroke_rad : b.state(0).rotation_rad)[1]; };
-      const auto speed = [&] {
-        return (stroke ? b.state(0).stroke_rate_rad_s : b.state(0).rotation_rate_rad_s)[1];
-      };
+      const auto speed = [&] { return (stroke ? b.state(0).stroke_rate_rad_s : b.state(0).rotation_rate_rad_s)[1]; };
       FlapperState s;
       (stroke ? s.stroke_rate_rad_s : s.rotation_rate_rad_s)[1] = sense * rate;
       b.reset(0, s, Start::welded);
@@ -622,9 +610,7 @@ TEST(Stops, DoNotThrowBack) {
 /// Throws the wings of force-free vehicles at their stops and holds every step against conservation.
 void throw_at_stops(const std::string& name, double right_stroke_rate, int least_landings_right) {
   std::mt19937_64 engine{11};
-  const auto random = [&](double scale) {
-    return scale * (2 * static_cast<double>(engine() >> 11) * 0x1p-53 - 1);
-  };
+  const auto random = [&](double scale) { return scale * (2 * static_cast<double>(engine() >> 11) * 0x1p-53 - 1); };
   const model::Vehicle v = without_springs(conservative({-0.8, 0.8, 0, 0}, {-0.7, 0.7, 0, 0}));
   int landings[2] = {0, 0};
   double worst_energy = -1, worst_spin = 0;  // over their bounds
@@ -703,8 +689,7 @@ Vector3d com_after_flight(const model::Vehicle& v, double step_s) {
 
 TEST(Precision, StepOf100MicrosecondsHasConverged) {
   for (const model::Vehicle& v : {test::nominal(), test::identified()})
-    expect_below(v.name + "_step_mm", 1e3 * (com_after_flight(v, kStep) - com_after_flight(v, 5e-6)).norm(),
-                 3);
+    expect_below(v.name + "_step_mm", 1e3 * (com_after_flight(v, kStep) - com_after_flight(v, 5e-6)).norm(), 3);
 
   const model::Vehicle v = test::nominal();
   Batch<double> b(1, v, options(kStep, kGravity));

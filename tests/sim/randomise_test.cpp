@@ -91,8 +91,7 @@ TEST(Laws, ScaleNormal) {
 }
 
 TEST(Laws, ScaleHalfNormalNeverFallsBelowNominal) {
-  const auto r =
-      randomisation(table("\"left.motor.resistance_ohm\"", "law = \"scale_half_normal\"\nsd = 0.1"));
+  const auto r = randomisation(table("\"left.motor.resistance_ohm\"", "law = \"scale_half_normal\"\nsd = 0.1"));
   const std::vector<double> x = draw(r, resistance);
   const double sd = std::sqrt(kCutSd * kCutSd - kCutMagnitude * kCutMagnitude);
   expect_moments(x, 12.4 * (1 + 0.1 * kCutMagnitude), 12.4 * 0.1 * sd);
@@ -106,21 +105,19 @@ TEST(Laws, ReplaceAndAddNormal) {
   const auto replace = randomisation(
       table("\"right.spring.rest_angle_rad\"", "law = \"replace_normal\"\nmean = 0.01\nsd = 0.05"), nominal);
   expect_moments(draw(replace, rest_angle), 0.01, 0.05 * kCutSd);
-  const auto add =
-      randomisation(table("\"right.spring.rest_angle_rad\"", "law = \"add_normal\"\nsd = 0.05"), nominal);
+  const auto add = randomisation(table("\"right.spring.rest_angle_rad\"", "law = \"add_normal\"\nsd = 0.05"), nominal);
   expect_moments(draw(add, rest_angle), nominal.right.spring.rest_angle_rad, 0.05 * kCutSd);
 }
 
 TEST(Laws, Uniform) {
-  const auto replace = randomisation(
-      table("\"right.spring.rest_angle_rad\"", "law = \"replace_uniform\"\nlow = -0.1\nhigh = 0.3"));
+  const auto replace =
+      randomisation(table("\"right.spring.rest_angle_rad\"", "law = \"replace_uniform\"\nlow = -0.1\nhigh = 0.3"));
   const std::vector<double> x = draw(replace, rest_angle);
   expect_moments(x, 0.1, 0.4 / std::sqrt(12));
   EXPECT_GE(moments(x).low, -0.1);
   EXPECT_LE(moments(x).high, 0.3);
   expect_share(x, 0.25, [](double a) { return a < 0; });
-  const auto scale =
-      randomisation(table("\"torso.mass_kg\"", "law = \"scale_uniform\"\nlow = 0.8\nhigh = 1.2"));
+  const auto scale = randomisation(table("\"torso.mass_kg\"", "law = \"scale_uniform\"\nlow = 0.8\nhigh = 1.2"));
   const double nominal = scale.nominal().torso.mass_kg;
   expect_moments(draw(scale, torso_mass), nominal, 0.4 / std::sqrt(12) * nominal);
 }
@@ -138,8 +135,7 @@ TEST(Laws, AreCutWhereTheTableSays) {
 // ---- what a draw depends on
 
 const std::string kMass = table("\"torso.mass_kg\"", "law = \"scale_normal\"\nsd = 0.1");
-const std::string kAngle =
-    table("\"right.spring.rest_angle_rad\"", "law = \"replace_normal\"\nmean = 0.0\nsd = 0.05");
+const std::string kAngle = table("\"right.spring.rest_angle_rad\"", "law = \"replace_normal\"\nmean = 0.0\nsd = 0.05");
 
 void expect_same(model::Vehicle a, model::Vehicle b) {
   const auto p = model::parameters(a), q = model::parameters(b);
@@ -177,8 +173,8 @@ TEST(Sample, KeepsItsDrawsWhenOthersAreAppendedOrChanged) {
 }
 
 TEST(Sample, ScalesMassAndInertiaOfABodyByOneFactor) {
-  const auto r = randomisation(
-      table("\"left.wing.mass_kg\", \"left.wing.inertia_kg_m2\"", "law = \"scale_normal\"\nsd = 0.1"));
+  const auto r =
+      randomisation(table("\"left.wing.mass_kg\", \"left.wing.inertia_kg_m2\"", "law = \"scale_normal\"\nsd = 0.1"));
   const model::RigidBody nominal = r.nominal().left.wing;
   const model::Vehicle v = r.sample({.seed = 4});
   const double factor = v.left.wing.mass_kg / nominal.mass_kg;
@@ -221,26 +217,21 @@ std::string message(const std::string& tables) {
 std::string mass(const std::string& law) { return message(table("\"torso.mass_kg\"", law)); }
 
 TEST(RandomisationTable, RefusesWhatItCannotDraw) {
-  EXPECT_EQ(
-      message(table("\"torso.mass\"", "law = \"scale_normal\"\nsd = 0.1")),
-      "r.toml:2:14: randomise[0].parameters: no parameter \"torso.mass\"; accepted: paths of the vehicle "
-      "file; did you mean \"torso.mass_kg\"?");
-  EXPECT_EQ(
-      message(table("\"torso.mass_k\", \"elephant\"", "law = \"scale_normal\"\nsd = 0.1")),
-      "r.toml:2:14: randomise[0].parameters: no parameter \"torso.mass_k\"; accepted: paths of the vehicle "
-      "file; did you mean \"torso.mass_kg\"?");
-  EXPECT_EQ(
-      message(table("\"elephant\"", "law = \"scale_normal\"\nsd = 0.1")),
-      "r.toml:2:14: randomise[0].parameters: no parameter \"elephant\"; accepted: paths of the vehicle file");
+  EXPECT_EQ(message(table("\"torso.mass\"", "law = \"scale_normal\"\nsd = 0.1")),
+            "r.toml:2:14: randomise[0].parameters: no parameter \"torso.mass\"; accepted: paths of the vehicle "
+            "file; did you mean \"torso.mass_kg\"?");
+  EXPECT_EQ(message(table("\"torso.mass_k\", \"elephant\"", "law = \"scale_normal\"\nsd = 0.1")),
+            "r.toml:2:14: randomise[0].parameters: no parameter \"torso.mass_k\"; accepted: paths of the vehicle "
+            "file; did you mean \"torso.mass_kg\"?");
+  EXPECT_EQ(message(table("\"elephant\"", "law = \"scale_normal\"\nsd = 0.1")),
+            "r.toml:2:14: randomise[0].parameters: no parameter \"elephant\"; accepted: paths of the vehicle file");
   EXPECT_EQ(message(table("", "law = \"scale_normal\"\nsd = 0.1")),
             "r.toml:2:14: randomise[0].parameters: is empty; accepted: paths of the vehicle file");
-  EXPECT_EQ(
-      message(table("\"torso\", \"torso.mass_kg\"", "law = \"scale_uniform\"\nlow = 1.0\nhigh = 1.1")),
-      "r.toml:2:14: randomise[0].parameters: torso.mass_kg is given twice; accepted: each parameter once");
-  EXPECT_EQ(
-      message(table("\"driver\"", "law = \"scale_normal\"\nsd = 0.01")),
-      "r.toml:2:14: randomise[0].parameters: driver.hold_s is the same for a whole batch; accepted: what may "
-      "differ from flapper to flapper");
+  EXPECT_EQ(message(table("\"torso\", \"torso.mass_kg\"", "law = \"scale_uniform\"\nlow = 1.0\nhigh = 1.1")),
+            "r.toml:2:14: randomise[0].parameters: torso.mass_kg is given twice; accepted: each parameter once");
+  EXPECT_EQ(message(table("\"driver\"", "law = \"scale_normal\"\nsd = 0.01")),
+            "r.toml:2:14: randomise[0].parameters: driver.hold_s is the same for a whole batch; accepted: what may "
+            "differ from flapper to flapper");
   EXPECT_EQ(message("[[randomise]]\nlaw = \"scale_normal\"\nsd = 0.1\n"),
             "r.toml:1:1: randomise[0].parameters: is missing; accepted: an array of strings");
 }
@@ -266,10 +257,9 @@ TEST(RandomisationTable, RefusesLawsThatDoNotExistOrFit) {
 }
 
 TEST(RandomisationTable, RefusesDrawsThatCouldLeaveTheAcceptedRange) {
-  EXPECT_EQ(
-      mass("law = \"scale_normal\"\nsd = 0.4"),
-      "r.toml:2:14: randomise[0].parameters: torso.mass_kg could become -0.00218134; accepted: draws between "
-      "1e-09 and 10");
+  EXPECT_EQ(mass("law = \"scale_normal\"\nsd = 0.4"),
+            "r.toml:2:14: randomise[0].parameters: torso.mass_kg could become -0.00218134; accepted: draws between "
+            "1e-09 and 10");
   EXPECT_EQ(mass("law = \"scale_normal\"\nsd = 0.4\ncut_sd = 2.0"), "accepted");
   EXPECT_EQ(message(table("\"left.motor.efficiency\"", "law = \"scale_half_normal\"\nsd = 0.05")),
             "r.toml:2:14: randomise[0].parameters: left.motor.efficiency could become 1.035; accepted: draws "
@@ -285,10 +275,9 @@ TEST(RandomisationTable, RefusesDrawsThatCouldLeaveTheAcceptedRange) {
 TEST(RandomisationTable, FollowsAParameterThroughAllItsDraws) {
   const std::string half = table("\"left.motor.efficiency\"", "law = \"scale_half_normal\"\nsd = 0.02");
   EXPECT_EQ(message(half), "accepted");
-  EXPECT_EQ(
-      message(half + half),
-      "r.toml:6:14: randomise[1].parameters: left.motor.efficiency could become 1.01124; accepted: draws "
-      "between 0.001 and 1");
+  EXPECT_EQ(message(half + half),
+            "r.toml:6:14: randomise[1].parameters: left.motor.efficiency could become 1.01124; accepted: draws "
+            "between 0.001 and 1");
 }
 
 TEST(RandomisationTable, RefusesDrawsThatMakeAnInertiaOfNoBody) {
@@ -391,8 +380,8 @@ TEST(Random, IsUniformAndUncorrelatedBetweenStreamsAndNeighbours) {
   expect_moments(x, 0, 1);
   expect_share(x, 0.682689, [](double n) { return std::abs(n) < 1; });
   expect_share(x, 0.022750, [](double n) { return n > 2; });
-  for (const RandomKey& other : {RandomKey{1, 2, 3, static_cast<Stream>(2)}, RandomKey{1, 2, 4},
-                                 RandomKey{1, 3, 3}, RandomKey{2, 2, 3}})
+  for (const RandomKey& other :
+       {RandomKey{1, 2, 3, static_cast<Stream>(2)}, RandomKey{1, 2, 4}, RandomKey{1, 3, 3}, RandomKey{2, 2, 3}})
     EXPECT_LT(std::abs(correlation(x, stream(other))), limit);
   const std::vector<double> next(x.begin() + 1, x.end());
   EXPECT_LT(std::abs(correlation({x.begin(), x.end() - 1}, next)), limit);

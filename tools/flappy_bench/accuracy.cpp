@@ -26,10 +26,9 @@ Flight free_flight(const model::Vehicle& vehicle, double step_s) {
   const sim::FlapperState s = batch.state(0);
   const auto [w, x, y, z] = s.attitude;
   const auto [cx, cy, cz] = vehicle.torso.com_m;
-  return {
-      s.position_m[0] + (1 - 2 * (y * y + z * z)) * cx + 2 * (x * y - w * z) * cy + 2 * (x * z + w * y) * cz,
-      s.position_m[1] + 2 * (x * y + w * z) * cx + (1 - 2 * (x * x + z * z)) * cy + 2 * (y * z - w * x) * cz,
-      s.position_m[2] + 2 * (x * z - w * y) * cx + 2 * (y * z + w * x) * cy + (1 - 2 * (x * x + y * y)) * cz};
+  return {s.position_m[0] + (1 - 2 * (y * y + z * z)) * cx + 2 * (x * y - w * z) * cy + 2 * (x * z + w * y) * cz,
+          s.position_m[1] + 2 * (x * y + w * z) * cx + (1 - 2 * (x * x + z * z)) * cy + 2 * (y * z - w * x) * cz,
+          s.position_m[2] + 2 * (x * z - w * y) * cx + 2 * (y * z + w * x) * cy + (1 - 2 * (x * x + y * y)) * cz};
 }
 
 double mean_thrust_N(const model::Vehicle& vehicle, double step_s) {
@@ -41,9 +40,7 @@ double mean_thrust_N(const model::Vehicle& vehicle, double step_s) {
   return (batch.held_impulse(0).force_N_s[2] - before) / beats;
 }
 
-double distance_m(const Flight& a, const Flight& b) {
-  return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m, a.z_m - b.z_m);
-}
+double distance_m(const Flight& a, const Flight& b) { return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m, a.z_m - b.z_m); }
 
 std::vector<StepRow> step_study(const model::Vehicle& vehicle) {
   const Flight fine = free_flight(vehicle, 5e-6);

@@ -34,8 +34,8 @@ Job read_job(const std::filesystem::path& path, const std::vector<std::string>& 
           static_cast<std::size_t>(root.integer("count", 1, 1'000'000)),
           static_cast<std::uint64_t>(root.integer("seed", 0, INT64_MAX)),
           root.number("duration_s", io::positive(1000)),
-          {root.number("input.amplitude_V"), root.number_or("input.difference_V", 0),
-           root.number_or("input.bias_V", 0), root.number_or("input.split_cycle", 0)},
+          {root.number("input.amplitude_V"), root.number_or("input.difference_V", 0), root.number_or("input.bias_V", 0),
+           root.number_or("input.split_cycle", 0)},
           {},
           sim::Randomisation(vehicle, root)};
   job.options.step_s = root.number("step_s", {1e-6, 1e-3});
@@ -57,8 +57,7 @@ template <class T>
 nlohmann::ordered_json fly(const Job& job) {
   sim::Batch<T> batch(job.count, job.vehicle, job.options);
   for (std::size_t i = 0; i < job.count; ++i) {
-    batch.set_vehicle(i,
-                      job.randomisation.sample({.seed = job.seed, .flapper = static_cast<std::uint32_t>(i)}));
+    batch.set_vehicle(i, job.randomisation.sample({.seed = job.seed, .flapper = static_cast<std::uint32_t>(i)}));
     batch.set_input(i, job.input);
   }
   constexpr int kPeriod = 20;  // plausibility and contact are looked at this often
@@ -81,17 +80,17 @@ nlohmann::ordered_json fly(const Job& job) {
   char hash[17];
   std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(batch.hash()));
 
-  std::printf("%zu %s flappers, %g s each in steps of %g us, %s\n", job.count, job.precision.c_str(),
-              job.duration_s, job.options.step_s * 1e6, sim::best_instruction_set().c_str());
+  std::printf("%zu %s flappers, %g s each in steps of %g us, %s\n", job.count, job.precision.c_str(), job.duration_s,
+              job.options.step_s * 1e6, sim::best_instruction_set().c_str());
   std::printf("  %.1f million steps/s, %.0f times real time\n", flown / wall_s / 1e6,
               flown * job.options.step_s / wall_s);
   std::printf("  climb  10 / 50 / 90 %%  %+.3f %+.3f %+.3f m\n", quantile(climb, 0.1), quantile(climb, 0.5),
               quantile(climb, 0.9));
   std::printf("  drift  10 / 50 / 90 %%   %.3f  %.3f  %.3f m\n", quantile(drift, 0.1), quantile(drift, 0.5),
               quantile(drift, 0.9));
-  std::printf("  frozen %zu, touched the ground %zu, the ceiling %zu, a wall %zu\n",
-              batch.count_status(sim::kFrozen), batch.count_status(sim::kTouchedGround),
-              batch.count_status(sim::kTouchedCeiling), batch.count_status(sim::kTouchedWall));
+  std::printf("  frozen %zu, touched the ground %zu, the ceiling %zu, a wall %zu\n", batch.count_status(sim::kFrozen),
+              batch.count_status(sim::kTouchedGround), batch.count_status(sim::kTouchedCeiling),
+              batch.count_status(sim::kTouchedWall));
   std::printf("  state hash %s\n", hash);
   return {{"flappers", job.count},
           {"steps", steps},
@@ -105,8 +104,7 @@ nlohmann::ordered_json fly(const Job& job) {
 
 }  // namespace
 
-nlohmann::ordered_json fly_batch(const std::filesystem::path& config,
-                                 const std::vector<std::string>& overrides) {
+nlohmann::ordered_json fly_batch(const std::filesystem::path& config, const std::vector<std::string>& overrides) {
   const Job job = read_job(config, overrides);
   return job.precision == "float" ? fly<float>(job) : fly<double>(job);
 }

@@ -9,7 +9,6 @@
 namespace flappy::bench {
 
 /// Flies the batch that `config` describes, prints a summary, and returns it.
-nlohmann::ordered_json fly_batch(const std::filesystem::path& config,
-                                 const std::vector<std::string>& overrides);
+nlohmann::ordered_json fly_batch(const std::filesystem::path& config, const std::vector<std::string>& overrides);
 
 }  // namespace flappy::bench

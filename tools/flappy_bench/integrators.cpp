@@ -64,8 +64,8 @@ Result evaluate(const Parameters<double>& p, const Flapper& f, double volts, dou
                                      sim::load_side<-1>(p.right, x.right, air_r, volts)};
   const Sides<WingInertia<double>> wing{wing_inertia(p.left, pose.left), wing_inertia(p.right, pose.right)};
   const auto inertia = body_inertia(p, x, pose, wing, whole);
-  const auto drive = drive_body(p, x, pose, wing, whole, inertia, load,
-                                BodyLoad<double>{{0, 0, 0}, {0, 0, 0}}, R.row_z, kGravity_m_s2);
+  const auto drive = drive_body(p, x, pose, wing, whole, inertia, load, BodyLoad<double>{{0, 0, 0}, {0, 0, 0}}, R.row_z,
+                                kGravity_m_s2);
   const auto hinges = eliminate_body(p, pose, wing, whole, inertia, drive, load);
   return {move(p, x, inertia, drive, hinges, step_s, 1 / step_s),
           p.inverse_mass_1_kg * (R * drive.force) - V{0, 0, kGravity_m_s2}};
@@ -117,10 +117,8 @@ struct Stops {
 };
 
 Stops stops_of(const Parameters<double>& p) {
-  return {{p.left.stroke_lower_rad, p.right.stroke_lower_rad, p.left.rotation_lower_rad,
-           p.right.rotation_lower_rad},
-          {p.left.stroke_upper_rad, p.right.stroke_upper_rad, p.left.rotation_upper_rad,
-           p.right.rotation_upper_rad}};
+  return {{p.left.stroke_lower_rad, p.right.stroke_lower_rad, p.left.rotation_lower_rad, p.right.rotation_lower_rad},
+          {p.left.stroke_upper_rad, p.right.stroke_upper_rad, p.left.rotation_upper_rad, p.right.rotation_upper_rad}};
 }
 
 Parameters<double> with_stops(Parameters<double> p, const Stops& s) {
@@ -177,8 +175,7 @@ void runge_kutta_4(const Parameters<double>& p, Flapper& f, double volts, double
 
 using Integrator = std::function<void(const Parameters<double>&, Flapper&, double, double)>;
 
-Flight fly(const model::Vehicle& vehicle, const Integrator& integrate, const Parameters<double>& p,
-           double step_s) {
+Flight fly(const model::Vehicle& vehicle, const Integrator& integrate, const Parameters<double>& p, double step_s) {
   Flapper f{};
   f.q.w = 1;
   f.com_m = centre_of_mass(p, state_of(f));
@@ -187,16 +184,16 @@ Flight fly(const model::Vehicle& vehicle, const Integrator& integrate, const Par
   for (int i = 0; i < static_cast<int>(std::lround(0.3 / step_s)); ++i) {
     if (i % per_hold == 0) {
       const double beats = vehicle.driver.flapping_Hz * vehicle.driver.hold_s * (i / per_hold);
-      volts = wing_beat_voltage<+1>(WingBeat<double>{10, 0, 0, 0}, beats - std::floor(beats + 0.5),
-                                    p.left.voltage_limit_V);
+      volts =
+          wing_beat_voltage<+1>(WingBeat<double>{10, 0, 0, 0}, beats - std::floor(beats + 0.5), p.left.voltage_limit_V);
     }
     integrate(p, f, volts, step_s);
     const double norm = std::sqrt(f.q.w * f.q.w + f.q.x * f.q.x + f.q.y * f.q.y + f.q.z * f.q.z);
     f.q = {f.q.w / norm, f.q.x / norm, f.q.y / norm, f.q.z / norm};
   }
-  const V torso = f.com_m + rotation_matrix(f.q) *
-                                (V{vehicle.torso.com_m.x, vehicle.torso.com_m.y, vehicle.torso.com_m.z} -
-                                 centre_of_mass(p, state_of(f)));
+  const V torso =
+      f.com_m + rotation_matrix(f.q) * (V{vehicle.torso.com_m.x, vehicle.torso.com_m.y, vehicle.torso.com_m.z} -
+                                        centre_of_mass(p, state_of(f)));
   return {torso.x, torso.y, torso.z};
 }
 
@@ -218,10 +215,9 @@ std::vector<IntegratorRow> integrator_study(const model::Vehicle& vehicle) {
   for (const Candidate& c : candidates)
     for (const double us : {500, 200, 100, 50, 20, 10}) {
       const double step_s = us * 1e-6;
-      const Flight flight =
-          fly(vehicle, c.integrate, derive(vehicle, c.implicit_damping ? step_s : 0), step_s);
-      rows.push_back({c.name, step_s, static_cast<int>(std::lround(0.3 / step_s)) * c.evaluations,
-                      distance_m(flight, exact)});
+      const Flight flight = fly(vehicle, c.integrate, derive(vehicle, c.implicit_damping ? step_s : 0), step_s);
+      rows.push_back(
+          {c.name, step_s, static_cast<int>(std::lround(0.3 / step_s)) * c.evaluations, distance_m(flight, exact)});
     }
   return rows;
 }

@@ -9,7 +9,6 @@
 #include "flappy/vehicle_file.hpp"
 #include "hover.hpp"
 #include "io/program.hpp"
-#include "model/vehicle_file.hpp"
 #include "roof.hpp"
 #include "speed.hpp"
 #ifdef FLAPPY_HAVE_PEERS
@@ -40,8 +39,7 @@ void show_progress(int done, int total) {
 Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
   const SpeedReport report = measure_speed(vehicle, options, show_progress);
   const double best = *report.median("float");
-  std::printf("one core, median of %d [range], whole step, %s\n", options.rounds,
-              sim::best_instruction_set().c_str());
+  std::printf("one core, median of %d [range], whole step, %s\n", options.rounds, sim::best_instruction_set().c_str());
   std::printf("  %-20s %12s %20s %14s\n", "", "M steps/s", "", "float is x");
   for (const auto& row : report.rows)
     std::printf("  %-20s %12.3f  [%7.3f .. %7.3f] %12.2f\n", row.name.c_str(), row.steps_per_s.median / 1e6,
@@ -59,15 +57,14 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
       "a step is %ld flops: %ld multiplies, %ld fused multiply-adds, %ld adds, %ld divisions and roots, %ld "
       "others\n",
       ops.flops(), ops.multiply, ops.fused, ops.add, ops.divide + ops.root, ops.other);
-  std::printf("this core does %.0f G multiply-adds/s: roof %.0f M steps/s in float, reached %.0f %%\n",
-              peak / 1e9, roof / 1e6, 100 * best / roof);
+  std::printf("this core does %.0f G multiply-adds/s: roof %.0f M steps/s in float, reached %.0f %%\n", peak / 1e9,
+              roof / 1e6, 100 * best / roof);
 
   const double thrust_error = mean_thrust_N(vehicle, 1e-4) / kConvergedThrust_N - 1;
   const double position_error = distance_m(free_flight(vehicle, 1e-4), free_flight(vehicle, 5e-6));
   const std::size_t bytes = sim::Batch<float>::bytes_per_flapper();
-  std::printf(
-      "at 100 us: mean thrust at 10 V %+.3f %% from converged, %.2f mm from the 5 us run after 0.3 s\n",
-      100 * thrust_error, 1e3 * position_error);
+  std::printf("at 100 us: mean thrust at 10 V %+.3f %% from converged, %.2f mm from the 5 us run after 0.3 s\n",
+              100 * thrust_error, 1e3 * position_error);
   std::printf("%zu bytes per float flapper\n", bytes);
 
   const auto or_null = [&](const char* name) {
@@ -96,8 +93,7 @@ Json convergence(const model::Vehicle& vehicle) {
     const double error = r.thrust_N / kConvergedThrust_N - 1;
     std::printf("  %8.0f %14.3f %12.6f %+16.3f %%\n", r.step_s * 1e6, r.position_error_m * 1e3, r.thrust_N,
                 100 * error);
-    steps.push_back(
-        {{"step_s", r.step_s}, {"position_error_m", r.position_error_m}, {"thrust_N", r.thrust_N}});
+    steps.push_back({{"step_s", r.step_s}, {"position_error_m", r.position_error_m}, {"thrust_N", r.thrust_N}});
   }
   std::printf("integrators on the same equations, free flight against our 1 us run\n");
   std::printf("  %-10s %8s %14s %14s\n", "", "step us", "evaluations", "error mm");
@@ -117,8 +113,7 @@ Json convergence(const model::Vehicle& vehicle) {
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  io::Program program("flappy-bench",
-                      "Speed and accuracy of the simulator, side by side with DART and MuJoCo.",
+  io::Program program("flappy-bench", "Speed and accuracy of the simulator, side by side with DART and MuJoCo.",
                       bench::facts());
   CLI::App& app = program.app();
   std::string vehicle = FLAPPY_CONFIGS "/vehicles/hummingbird_nominal.toml";

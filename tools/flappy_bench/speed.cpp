@@ -115,14 +115,12 @@ SpeedReport measure_speed(const model::Vehicle& vehicle, const SpeedOptions& opt
     const std::string suffix = set == sets.rbegin() ? "" : ", " + *set;
     single.push_back(std::make_shared<Flock<float>>(vehicles, 4096, 1, *set));
     twice.push_back(std::make_shared<Flock<double>>(vehicles, 4096, 1, *set));
-    candidates.push_back(
-        {"float" + suffix,
-         [f = single.back(), &options] { return 1 / f->run(options.seconds, processor_seconds); },
-         {}});
-    candidates.push_back(
-        {"double" + suffix,
-         [f = twice.back(), &options] { return 1 / f->run(options.seconds, processor_seconds); },
-         {}});
+    candidates.push_back({"float" + suffix,
+                          [f = single.back(), &options] { return 1 / f->run(options.seconds, processor_seconds); },
+                          {}});
+    candidates.push_back({"double" + suffix,
+                          [f = twice.back(), &options] { return 1 / f->run(options.seconds, processor_seconds); },
+                          {}});
   }
 #ifdef FLAPPY_HAVE_PEERS
   if (options.peers) {
@@ -159,8 +157,7 @@ SpeedReport measure_speed(const model::Vehicle& vehicle, const SpeedOptions& opt
   SpeedReport report;
   for (Candidate& c : candidates) report.rows.push_back({c.name, summary(std::move(c.values))});
   report.two_thread_scaling = summary(std::move(scaling));
-  for (std::size_t i = 0; i < sizes.size(); ++i)
-    report.sizes.push_back({sizes[i], summary(std::move(size_values[i]))});
+  for (std::size_t i = 0; i < sizes.size(); ++i) report.sizes.push_back({sizes[i], summary(std::move(size_values[i]))});
   for (const auto& f : single) report.frozen += f->frozen();
   for (const auto& f : flocks) report.frozen += f->frozen();
   return report;

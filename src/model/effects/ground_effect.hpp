@@ -14,8 +14,7 @@ inline namespace FLAPPY_ISA {
 
 struct GroundEffect {
   static constexpr EffectInfo kInfo{"ground_effect", Stage::air, 0, 0.0, "He, Leang et al. 2019"};
-  static constexpr std::array<EffectParameter, 2> kParameters{
-      {{"gain", 0, 1, 0.15}, {"length_m", 0.005, 0.5, 0.06}}};
+  static constexpr std::array<EffectParameter, 2> kParameters{{{"gain", 0, 1, 0.15}, {"length_m", 0.005, 0.5, 0.06}}};
 
   template <class T>
   static FLAPPY_INLINE void air(const T (&parameter)[2], const Surroundings<T>& s, AirFactor<T>& factor) {

@@ -7,10 +7,10 @@ namespace {
 
 template <int... I>
 std::vector<EffectEntry> list(std::integer_sequence<int, I...>) {
-  return {EffectEntry{std::tuple_element_t<I, Effects>::kInfo,
-                      {std::tuple_element_t<I, Effects>::kParameters.begin(),
-                       std::tuple_element_t<I, Effects>::kParameters.end()},
-                      effect_rows_before<I>()}...};
+  return {EffectEntry{
+      std::tuple_element_t<I, Effects>::kInfo,
+      {std::tuple_element_t<I, Effects>::kParameters.begin(), std::tuple_element_t<I, Effects>::kParameters.end()},
+      effect_rows_before<I>()}...};
 }
 
 }  // namespace

@@ -18,11 +18,8 @@ inline constexpr int kEffects = std::tuple_size_v<Effects>;
 /// Rows of parameters before those of effect `I`; of all effects for I = kEffects.
 template <int I>
 constexpr int effect_rows_before() {
-  if constexpr (I == 0)
-    return 0;
-  else
-    return effect_rows_before<I - 1>() +
-           static_cast<int>(std::tuple_element_t<I - 1, Effects>::kParameters.size());
+  if constexpr (I == 0) return 0;
+  else return effect_rows_before<I - 1>() + static_cast<int>(std::tuple_element_t<I - 1, Effects>::kParameters.size());
 }
 inline constexpr int kEffectRows = effect_rows_before<kEffects>();
 
