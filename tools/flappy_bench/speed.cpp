@@ -20,6 +20,9 @@ namespace {
 constexpr double kStep_s = 1e-4;
 constexpr int kPeriod = 20;  // physics steps in a control period of 2 ms
 constexpr std::size_t kDistinctVehicles = 1024;
+/// Flights are this long: without a controller a flapper then tumbles, which is not what anyone simulates.
+constexpr double kFlight_s = 0.2;
+constexpr int kFlightPeriods = static_cast<int>(kFlight_s / (kPeriod * kStep_s));
 
 double processor_seconds() {
   timespec t;
@@ -40,22 +43,22 @@ class Flock {
     for (std::size_t i = 0; i < count; ++i) batch_.set_vehicle(i, vehicles[i % vehicles.size()]);
   }
 
-  /// Steps for about `seconds` from a fresh start; seconds per flapper and step on the given clock.
-  double run(double seconds, double (*clock)(), int least_periods = 2) {
-    for (std::size_t i = 0; i < batch_.size(); ++i) {
-      batch_.reset(i, {});
-      batch_.set_input(i, {9 + 0.002 * static_cast<double>(i % 1000), 0, 0, 0});
-    }
-    batch_.step(kPeriod);
-    int periods = 0;
-    const double start = clock();
-    double end = start;
-    while (end - start < seconds || periods < least_periods) {
+  /// Flies for about `seconds`, from a fresh start every kFlight_s; seconds per flapper and step on the given clock.
+  double run(double seconds, double (*clock)()) {
+    double spent = 0;
+    std::int64_t periods = 0;
+    while (spent < seconds) {
+      for (std::size_t i = 0; i < batch_.size(); ++i) {
+        batch_.reset(i, {});
+        batch_.set_input(i, {9 + 0.002 * static_cast<double>(i % 1000), 0, 0, 0});
+      }
       batch_.step(kPeriod);
-      ++periods;
-      end = clock();
+      const double start = clock();
+      for (int i = 0; i < kFlightPeriods; ++i) batch_.step(kPeriod);
+      spent += clock() - start;
+      periods += kFlightPeriods;
     }
-    return (end - start) / (static_cast<double>(periods) * kPeriod * static_cast<double>(batch_.size()));
+    return spent / (static_cast<double>(periods) * kPeriod * static_cast<double>(batch_.size()));
   }
   std::size_t frozen() const { return batch_.count_status(sim::kFrozen); }
 
@@ -64,19 +67,22 @@ class Flock {
 };
 
 #ifdef FLAPPY_HAVE_PEERS
-/// Steps per second of one peer in free flight at 10 V, voltage held for 1 ms.
+/// Steps per second of one peer in the same flights at 10 V, voltage held for 1 ms.
 template <class Peer>
 double peer_steps_per_s(Peer& peer, double flapping_Hz, double seconds) {
+  double spent = 0;
   int steps = 0;
-  const double start = processor_seconds();
-  double end = start;
-  while (end - start < seconds) {
-    const double volts = 10 * std::cos(2 * std::numbers::pi * flapping_Hz * peer.time_s());
-    for (int i = 0; i < 10; ++i) peer.step(volts, volts);
-    steps += 10;
-    end = processor_seconds();
+  while (spent < seconds) {
+    peer.set_state({});
+    const double start = processor_seconds();
+    for (int hold = 0; hold < kFlightPeriods * kPeriod / 10; ++hold) {
+      const double volts = 10 * std::cos(2 * std::numbers::pi * flapping_Hz * 1e-3 * hold);
+      for (int i = 0; i < 10; ++i) peer.step(volts, volts);
+    }
+    spent += processor_seconds() - start;
+    steps += kFlightPeriods * kPeriod;
   }
-  return steps / (end - start);
+  return steps / spent;
 }
 #endif
 
