@@ -174,9 +174,8 @@ TEST(Sample, KeepsItsDrawsWhenOthersAreAppendedOrChanged) {
 
 TEST(Sample, SharesNoRandomNumberBetweenDrawsThatAreDrawnAgain) {
   const std::string cut = "\nsd = 0.1\ncut_sd = 1.0";  // a third of them
-  const auto r =
-      randomisation(table("\"torso.mass_kg\"", "law = \"scale_normal\"" + cut) +
-                    table("\"right.spring.rest_angle_rad\"", "law = \"replace_normal\"\nmean = 0.0" + cut));
+  const auto r = randomisation(table("\"torso.mass_kg\"", "law = \"scale_normal\"" + cut) +
+                               table("\"right.spring.rest_angle_rad\"", "law = \"replace_normal\"\nmean = 0.0" + cut));
   EXPECT_LT(std::abs(correlation(draw(r, torso_mass), draw(r, rest_angle))), kErrors / std::sqrt(kDraws));
 }
 
