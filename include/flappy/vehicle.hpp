@@ -103,7 +103,8 @@ struct Parameter {
   double low, high;
 };
 
-/// All parameters of `vehicle`, in the order of the vehicle file. Pointers live as long as the vehicle.
+/// All parameters of `vehicle`, in the order of the vehicle file, those of its effects last. Pointers live as long as the
+/// vehicle.
 std::vector<Parameter> parameters(Vehicle& vehicle);
 
 /// What no real vehicle has, though each number alone is accepted.

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 
+#include "model/effects/registry.hpp"
 #include "model/math.hpp"
 
 namespace flappy::model {
@@ -109,6 +110,11 @@ std::vector<Parameter> parameters(Vehicle& v) {
   l.add("torso", v.torso);
   l.add("left", v.left);
   l.add("right", v.right);
+  for (const EffectEntry& e : effects())
+    if (const auto own = v.effects.find(e.info.id); own != v.effects.end())
+      for (const EffectParameter& p : e.parameters)
+        if (const auto value = own->second.find(p.name); value != own->second.end())
+          l.add("effects." + own->first + "." + p.name, value->second, p.low, p.high);
   return list;
 }
 

@@ -70,10 +70,8 @@ std::string vehicle_text(const Vehicle& vehicle) {
   std::string text = "schema = 1\nname = " + string_text(vehicle.name) + "\n";
   Vehicle copy = vehicle;
   for (const Parameter& p : parameters(copy)) text += p.path + " = " + number_text(*p.value) + "\n";
-  for (const auto& [id, values] : vehicle.effects) {
+  for (const auto& [id, values] : vehicle.effects)
     if (values.empty()) text += "effects." + id + " = {}\n";  // in force at its typical size
-    for (const auto& [name, value] : values) text += "effects." + id + "." + name + " = " + number_text(value) + "\n";
-  }
   return text;
 }
 

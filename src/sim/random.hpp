@@ -31,7 +31,7 @@ inline UniformPair uniform_pair(const RandomKey& key, std::uint32_t index) {
   const Philox::ctr_type r = Philox()(counter, k);
   const auto unit = [](std::uint32_t high, std::uint32_t low) {
     const std::uint64_t bits = (std::uint64_t{high} << 21) ^ (low >> 11);
-    return (static_cast<double>(bits) + 0.5) * 0x1p-53;
+    return model::min((static_cast<double>(bits) + 0.5) * 0x1p-53, 1 - 0x1p-53);  // the largest would round to 1
   };
   return {unit(r[0], r[1]), unit(r[2], r[3])};
 }
