@@ -56,7 +56,7 @@ class Batch {
   /// `count` copies of `vehicle`, flying at the origin with wings at rest and no voltage.
   /// Throws std::invalid_argument where an option makes no sense or the driver's hold is no whole number of
   /// steps.
-  Batch(std::size_t count, const model::Vehicle& vehicle, BatchOptions options = {});
+  Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOptions& options = {});
   ~Batch();
   Batch(Batch&&) noexcept;
   Batch& operator=(Batch&&) noexcept;

@@ -213,7 +213,7 @@ Entry find(Section& top, std::string_view key) {
 }
 
 Entry find_required(Section& top, std::string_view key, std::string_view accepted) {
-  const Entry entry = find(top, key);
+  Entry entry = find(top, key);
   if (!entry.node) refuse_missing(entry, accepted);
   return entry;
 }

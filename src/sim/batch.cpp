@@ -48,7 +48,7 @@ std::uint64_t mixed(std::uint64_t h, std::uint64_t word) {  // splitmix64's fina
 }
 
 template <class T>
-std::uint64_t bits(T value) {
+std::uint64_t bits_of(T value) {
   if constexpr (sizeof(T) == 4) return std::bit_cast<std::uint32_t>(value);
   else return std::bit_cast<std::uint64_t>(value);
 }
@@ -126,7 +126,7 @@ struct Batch<T>::Storage {
 };
 
 template <class T>
-Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, BatchOptions options)
+Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOptions& options)
     : storage_(std::make_unique<Storage>()) {
   Storage& s = *storage_;
   const double steps = vehicle.driver.hold_s / options.step_s;
@@ -137,7 +137,7 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, BatchOptions o
   s.threads = options.threads > 0 ? options.threads : omp_get_num_procs();
   s.step_s = options.step_s;
   s.steps_per_update = static_cast<int>(std::llround(steps));
-  s.world = std::move(options.world);
+  s.world = options.world;
   s.hold_s = vehicle.driver.hold_s;
   s.kernel = kernel_named(options.instruction_set).template of<T>().step;
   s.blocks.resize((count + kLanes<T> - 1) / kLanes<T>);
@@ -175,15 +175,15 @@ void Batch<T>::set_vehicle(std::size_t i, const model::Vehicle& vehicle) {
 }
 
 template <class T>
-void Batch<T>::reset(std::size_t i, const FlapperState& f, Start start) {
+void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   const auto [block, lane] = storage_->at(i);
   State<double> x{};
-  x.position_m = {f.position_m[0], f.position_m[1], f.position_m[2]};
-  x.attitude = {f.attitude[0], f.attitude[1], f.attitude[2], f.attitude[3]};
-  x.body_rate_rad_s = {f.body_rate_rad_s[0], f.body_rate_rad_s[1], f.body_rate_rad_s[2]};
-  x.left = {f.stroke_rad[0], f.rotation_rad[0], f.stroke_rate_rad_s[0], f.rotation_rate_rad_s[0]};
-  x.right = {f.stroke_rad[1], f.rotation_rad[1], f.stroke_rate_rad_s[1], f.rotation_rate_rad_s[1]};
-  const Vec3<double> velocity{f.velocity_m_s[0], f.velocity_m_s[1], f.velocity_m_s[2]};
+  x.position_m = {state.position_m[0], state.position_m[1], state.position_m[2]};
+  x.attitude = {state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3]};
+  x.body_rate_rad_s = {state.body_rate_rad_s[0], state.body_rate_rad_s[1], state.body_rate_rad_s[2]};
+  x.left = {state.stroke_rad[0], state.rotation_rad[0], state.stroke_rate_rad_s[0], state.rotation_rate_rad_s[0]};
+  x.right = {state.stroke_rad[1], state.rotation_rad[1], state.stroke_rate_rad_s[1], state.rotation_rate_rad_s[1]};
+  const Vec3<double> velocity{state.velocity_m_s[0], state.velocity_m_s[1], state.velocity_m_s[2]};
   x.com_velocity_m_s = velocity + com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
   if (start == Start::standing) x.support = static_cast<double>(model::Support::standing);
   if (start == Start::welded) x.support = static_cast<double>(model::Support::welded);
@@ -197,10 +197,10 @@ void Batch<T>::reset(std::size_t i, const FlapperState& f, Start start) {
 }
 
 template <class T>
-void Batch<T>::set_input(std::size_t i, const Input& u) {
+void Batch<T>::set_input(std::size_t i, const Input& input) {
   const auto [block, lane] = storage_->at(i);
   auto drive = get<Drive<double>>(block.drive, lane);
-  drive.input = {u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle};
+  drive.input = {input.amplitude_V, input.difference_V, input.bias_V, input.split_cycle};
   put(drive, block.drive, lane);
 }
 
@@ -264,9 +264,9 @@ std::uint32_t Batch<T>::status(std::size_t i) const {
 }
 
 template <class T>
-std::size_t Batch<T>::count_status(std::uint32_t mask) const {
+std::size_t Batch<T>::count_status(std::uint32_t bits) const {
   std::size_t n = 0;
-  for (std::size_t i = 0; i < size(); ++i) n += (status(i) & mask) != 0;
+  for (std::size_t i = 0; i < size(); ++i) n += (status(i) & bits) != 0;
   return n;
 }
 
@@ -276,8 +276,8 @@ std::uint64_t Batch<T>::hash(std::size_t first, std::size_t last) const {
   for (std::size_t i = first; i < last; ++i) {
     const auto [block, lane] = storage_->at(i);
     std::uint64_t h = 0;
-    for (const auto& row : block.state) h = mixed(h, bits(row[lane]));
-    for (const auto& row : block.drive) h = mixed(h, bits(row[lane]));
+    for (const auto& row : block.state) h = mixed(h, bits_of(row[lane]));
+    for (const auto& row : block.drive) h = mixed(h, bits_of(row[lane]));
     h = mixed(mixed(h, block.phase[lane]), block.status[lane]);
     all = mixed(all, h);
   }

@@ -6,6 +6,7 @@
 // beyond its stop is put back and its rate taken away with the impulse that the coupled bodies feel. So an impact is up to
 // a step late, and no order shows there. Dry friction is that of an infinitesimal step.
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 
 #include "accuracy.hpp"
@@ -183,7 +184,8 @@ Flight fly(const model::Vehicle& vehicle, const Integrator& integrate, const Par
   double volts = 0;
   for (int i = 0; i < static_cast<int>(std::lround(0.3 / step_s)); ++i) {
     if (i % per_hold == 0) {
-      const double beats = vehicle.driver.flapping_Hz * vehicle.driver.hold_s * (i / per_hold);
+      const double beats =
+          vehicle.driver.flapping_Hz * vehicle.driver.hold_s * static_cast<double>(std::div(i, per_hold).quot);
       volts =
           wing_beat_voltage<+1>(WingBeat<double>{10, 0, 0, 0}, beats - std::floor(beats + 0.5), p.left.voltage_limit_V);
     }
