@@ -10,8 +10,7 @@ namespace {
 typedef float Wide __attribute__((vector_size(64)));
 constexpr int kLanes = 16, kChains = 12;  // enough independent chains to fill two pipes of latency 4
 
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) float multiply_add(float seed,
-                                                                                                 int times) {
+__attribute__((target_clones("avx512f", "fma", "default"))) float multiply_add(float seed, int times) {
   const Wide a = Wide{} + 0.999999f, b = Wide{} + 1e-6f;
   Wide c0 = b * seed, c1 = c0 + 1, c2 = c0 + 2, c3 = c0 + 3, c4 = c0 + 4, c5 = c0 + 5, c6 = c0 + 6, c7 = c0 + 7,
        c8 = c0 + 8, c9 = c0 + 9, c10 = c0 + 10,
