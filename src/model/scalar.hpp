@@ -32,10 +32,31 @@ FLAPPY_INLINE double sqrt(double a) { return __builtin_sqrt(a); }
 FLAPPY_INLINE float abs(float a) { return __builtin_fabsf(a); }
 FLAPPY_INLINE double abs(double a) { return __builtin_fabs(a); }
 
+/// The magnitude of one number with the sign of another.
+FLAPPY_INLINE float copysign(float magnitude, float sign) { return __builtin_copysignf(magnitude, sign); }
+FLAPPY_INLINE double copysign(double magnitude, double sign) { return __builtin_copysign(magnitude, sign); }
+
+// The words below read and write the bits of numbers. Adding 1.5 x 2^23 (in double 2^52) puts a whole number into the
+// lowest bits, without a conversion, which not every instruction set has.
+
 /// 2^-k for a whole number k within the normal range.
-FLAPPY_INLINE float half_to(float k) { return std::bit_cast<float>((127 - static_cast<std::int32_t>(k)) << 23); }
+FLAPPY_INLINE float half_to(float k) { return std::bit_cast<float>(std::bit_cast<std::uint32_t>(12583039 - k) << 23); }
 FLAPPY_INLINE double half_to(double k) {
-  return std::bit_cast<double>((std::int64_t{1023} - static_cast<std::int64_t>(k)) << 52);
+  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(6755399441056767 - k) << 52);
+}
+
+/// x = mantissa(x) 2^exponent(x) with 1 <= mantissa(x) < 2, for a positive normal x.
+FLAPPY_INLINE float exponent(float x) {
+  return std::bit_cast<float>(std::bit_cast<std::uint32_t>(x) >> 23 | 0x4b000000U) - (0x1p23f + 127);
+}
+FLAPPY_INLINE double exponent(double x) {
+  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(x) >> 52 | 0x4330000000000000ULL) - (0x1p52 + 1023);
+}
+FLAPPY_INLINE float mantissa(float x) {
+  return std::bit_cast<float>((std::bit_cast<std::uint32_t>(x) & 0x007fffffU) | 0x3f800000U);
+}
+FLAPPY_INLINE double mantissa(double x) {
+  return std::bit_cast<double>((std::bit_cast<std::uint64_t>(x) & 0x000fffffffffffffULL) | 0x3ff0000000000000ULL);
 }
 
 template <class T>
@@ -50,6 +71,14 @@ struct ElementOf {
 };
 template <class T>
 using Element = typename ElementOf<T>::type;
+
+/// Adding it rounds to a whole number, ties to even, up to 2^22 in float and 2^51 in double.
+template <class T>
+inline constexpr double kToWhole = sizeof(Element<T>) == 4 ? 0x1.8p23 : 0x1.8p52;
+template <class T>
+FLAPPY_INLINE T nearest(T a) {
+  return T(a + T(kToWhole<T>)) - T(kToWhole<T>);
+}
 
 }  // namespace FLAPPY_ISA
 }  // namespace flappy::model

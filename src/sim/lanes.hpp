@@ -156,17 +156,29 @@ struct Lanes {
     return select(Mask{a.raw > b.raw}, a, b);
   }
   friend FLAPPY_INLINE Lanes select(Mask m, Lanes yes, Lanes no) { return Lanes(m.raw ? yes.raw : no.raw); }
+  // What scalar.hpp says about bits, in every lane.
+  using Unsigned = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
+  using Bits __attribute__((vector_size(N * sizeof(T)))) = Unsigned;
+  static constexpr int kMantissaBits = sizeof(T) == 4 ? 23 : 52;
+  static constexpr Unsigned kBias = sizeof(T) == 4 ? 127 : 1023;
+  static constexpr Unsigned kMantissa = (Unsigned(1) << kMantissaBits) - 1;
+  static constexpr Unsigned kAllButSign = ~Unsigned(0) >> 1;
+
   friend FLAPPY_INLINE Lanes half_to(Lanes k) {
-    using Bits = typename Mask::Raw;
-    constexpr int kBias = sizeof(T) == 4 ? 127 : 1023, kMantissa = sizeof(T) == 4 ? 23 : 52;
-    return Lanes((Raw)((kBias - __builtin_convertvector(k.raw, Bits)) << kMantissa));
+    return Lanes((Raw)((Bits)(Lanes(kToWhole<T> + kBias) - k).raw << kMantissaBits));
   }
-  friend FLAPPY_INLINE Lanes abs(Lanes a) {
-    using Bits = typename Mask::Raw;
-    using Integer = typename Mask::Integer;
-    constexpr Integer kAllButSign = sizeof(T) == 4 ? Integer(0x7fffffff) : Integer(0x7fffffffffffffffLL);
-    return Lanes((Raw)((Bits)a.raw & (Bits{} + kAllButSign)));
+  friend FLAPPY_INLINE Lanes exponent(Lanes a) {
+    constexpr T kWhole = T(kMantissa) + 1;  // whose lowest bits are whole numbers
+    constexpr Unsigned kWholeBits = (kBias + kMantissaBits) << kMantissaBits;
+    return Lanes((Raw)((Bits)a.raw >> kMantissaBits | kWholeBits)) - Lanes(kWhole + T(kBias));
   }
+  friend FLAPPY_INLINE Lanes mantissa(Lanes a) {
+    return Lanes((Raw)(((Bits)a.raw & kMantissa) | kBias << kMantissaBits));
+  }
+  friend FLAPPY_INLINE Lanes copysign(Lanes magnitude, Lanes sign) {
+    return Lanes((Raw)(((Bits)magnitude.raw & kAllButSign) | ((Bits)sign.raw & ~kAllButSign)));
+  }
+  friend FLAPPY_INLINE Lanes abs(Lanes a) { return Lanes((Raw)((Bits)a.raw & kAllButSign)); }
 };
 
 template <class T, int N>
