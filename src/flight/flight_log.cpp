@@ -1,12 +1,9 @@
 #include "flight/flight_log.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 #include "io/config.hpp"
@@ -17,13 +14,10 @@ namespace flappy::flight {
 namespace {
 
 namespace fs = std::filesystem;
-using io::InputError;
+using namespace log_file;
 using io::non_negative;
 using io::positive;
 using io::shortest_digits;
-
-const std::string kHeader = "flight.toml", kCommand = "command.csv", kMocap = "mocap.csv", kImu = "imu.csv",
-                  kPower = "power.csv", kWings = "wings.csv", kTruth = "truth.csv";
 
 constexpr double kUnitTolerance = 1e-3;
 constexpr std::string_view kBothOrNeither = "both or neither";
@@ -68,7 +62,7 @@ const std::vector<Field<WingsStream>> kWingsFields = {{"t_s", &WingsStream::t_s,
                                                       {"right_rotation_rad", &WingsStream::right_rotation_rad, 1e3}};
 
 [[noreturn]] void refuse(const std::string& place, const std::string& what, std::string_view accepted) {
-  throw InputError(place + ": " + what + (accepted.empty() ? "" : "; accepted: " + std::string(accepted)));
+  throw io::InputError(place + ": " + what + (accepted.empty() ? "" : "; accepted: " + std::string(accepted)));
 }
 
 /// Length 1 to the last digits, so that what was written reads back exactly.
@@ -365,41 +359,6 @@ std::optional<Stream> parse_optional(const LogFiles& files, const std::string& n
   return parse_stream(found->second, folder / name, fields);
 }
 
-/// Refuses a place that holds something other than a flight log.
-void require_replaceable(const fs::path& folder) {
-  std::error_code error;
-  const fs::file_status status = fs::status(folder, error);
-  if (!fs::exists(status)) return;
-  constexpr std::string_view kAccepted = "a new folder, an empty one, or a flight log to replace";
-  if (!fs::is_directory(status)) refuse(folder.string(), "is no folder", kAccepted);
-  const std::vector<std::string> known = {kHeader, kCommand, kMocap, kImu, kPower, kWings, kTruth};
-  bool empty = true, has_header = false;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (std::ranges::find(known, name) == known.end() || !entry.is_regular_file(error))
-      refuse(folder.string(), "holds " + name + ", which is no part of a flight log", kAccepted);
-    empty = false;
-    has_header |= name == kHeader;
-  }
-  if (error) refuse(folder.string(), "cannot be written: " + error.message(), "");
-  if (!empty && !has_header) refuse(folder.string(), "holds files, but no " + kHeader, kAccepted);
-}
-
-/// A folder beside another, gone at the end.
-struct TemporaryFolder {
-  explicit TemporaryFolder(const fs::path& beside) : path(beside.string() + ".tmp" + std::to_string(getpid())) {
-    fs::create_directories(path);
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  fs::path path;
-};
-
 }  // namespace
 
 FlightLog parse_flight_log(const LogFiles& files, const fs::path& folder) {
@@ -415,25 +374,6 @@ FlightLog parse_flight_log(const LogFiles& files, const fs::path& folder) {
   return log;
 }
 
-FlightLog read_flight_log(const fs::path& folder) {
-  std::error_code error;
-  LogFiles files;
-  const std::vector<std::string> optional = {kPower, kWings};
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.ends_with(".csv") || name == kTruth) continue;
-    // An optional stream under a wrong name would be left out in silence.
-    const std::string nearest = io::nearest_name(name, optional);
-    if (!nearest.empty() && nearest != name)
-      refuse(entry.path().string(), "is no stream of a flight log",
-             kPower + " or " + kWings + io::did_you_mean(name, optional));
-    if (!nearest.empty()) files[name] = io::read_text(entry.path());
-  }
-  if (error) refuse(folder.string(), "cannot be read: " + error.message(), "");
-  for (const auto& name : {kHeader, kCommand, kMocap, kImu}) files[name] = io::read_text(folder / name);
-  return parse_flight_log(files, folder);
-}
-
 LogFiles flight_log_files(const FlightLog& log) {
   LogFiles files = {{kHeader, header_text(log.header)},
                     {kCommand, command_text(log.command)},
@@ -442,38 +382,6 @@ LogFiles flight_log_files(const FlightLog& log) {
   if (log.power) files[kPower] = stream_text(*log.power, kPowerFields);
   if (log.wings) files[kWings] = stream_text(*log.wings, kWingsFields);
   return files;
-}
-
-void write_flight_log(const fs::path& folder, const FlightLog& log) {
-  const LogFiles files = flight_log_files(log);
-  parse_flight_log(files, folder);
-  require_replaceable(folder);
-  try {
-    const fs::path named = folder.has_filename() ? folder : folder.parent_path();
-    const fs::path target = fs::weakly_canonical(named);  // or a link would be replaced instead of the folder
-    const TemporaryFolder fresh(target);
-    for (const auto& [name, text] : files) io::write_atomically(fresh.path / name, text);
-    if (fs::exists(target)) {
-      const TemporaryFolder old(fresh.path);
-      fs::rename(target, old.path / "log");
-      std::error_code failed;
-      fs::rename(fresh.path, target, failed);
-      if (failed) {
-        fs::rename(old.path / "log", target);
-        throw fs::filesystem_error("", failed);
-      }
-    } else {
-      fs::rename(fresh.path, target);
-    }
-  } catch (const fs::filesystem_error& error) {
-    refuse(folder.string(), "cannot be written: " + error.code().message(), "");
-  }
-}
-
-void write_truth(const fs::path& folder, const std::vector<std::string>& names, const std::vector<Column>& columns) {
-  std::error_code ignored;
-  if (!fs::exists(folder / kHeader, ignored)) refuse(folder.string(), "is no flight log", "a folder with " + kHeader);
-  io::write_atomically(folder / kTruth, io::csv_text(names, columns));
 }
 
 }  // namespace flappy::flight

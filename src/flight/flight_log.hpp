@@ -124,6 +124,12 @@ struct FlightLog {
   bool operator==(const FlightLog&) const = default;
 };
 
+/// The names of the files.
+namespace log_file {
+inline const std::string kHeader = "flight.toml", kCommand = "command.csv", kMocap = "mocap.csv", kImu = "imu.csv",
+                         kPower = "power.csv", kWings = "wings.csv", kTruth = "truth.csv";
+}
+
 /// Texts of the files of a log by name, truth.csv left out.
 using LogFiles = std::map<std::string, std::string>;
 
