@@ -52,6 +52,10 @@ class Table {
   std::string string_or(std::string_view key, std::string_view fallback) const;
   std::string choice(std::string_view key, const std::vector<std::string>& accepted) const;
   std::vector<double> numbers(std::string_view key, Range each = {}) const;
+  /// Exactly `length` numbers.
+  std::vector<double> numbers(std::string_view key, std::size_t length, Range each = {}) const;
+  /// Any number of arrays of exactly `width` numbers.
+  std::vector<std::vector<double>> rows(std::string_view key, std::size_t width, Range each = {}) const;
   std::vector<std::string> strings(std::string_view key) const;
   /// A file name; a relative one starts at the folder of the configuration file. The file need not exist.
   std::filesystem::path file(std::string_view key) const;

@@ -90,6 +90,17 @@ void add_row(const Line& line, const std::vector<Cell>& cells, CsvTable& table) 
   }
 }
 
+std::string header_text(const std::vector<std::string>& names) {
+  std::string line;
+  for (const auto& name : names) line += (line.empty() ? "" : ",") + name;
+  return line + '\n';
+}
+
+void append_number(std::string& text, double value) {
+  std::array<char, 32> digits;
+  text.append(digits.data(), std::to_chars(digits.begin(), digits.end(), value).ptr);
+}
+
 }  // namespace
 
 const std::vector<double>& CsvTable::column(std::string_view column_name) const {
@@ -124,19 +135,32 @@ CsvTable parse_csv(std::string_view text, const std::string& name) {
   return table;
 }
 
+std::string csv_text(const std::vector<std::string>& names, const std::vector<std::vector<double>>& columns) {
+  const std::size_t rows = columns.empty() ? 0 : columns.front().size();
+  const bool even = std::ranges::all_of(columns, [&](const auto& column) { return column.size() == rows; });
+  if (columns.size() != names.size() || !even) throw std::invalid_argument("csv_text: columns must have one length");
+  std::string text = header_text(names);
+  for (std::size_t i = 0; i < rows; ++i) {
+    for (std::size_t j = 0; j < columns.size(); ++j) {
+      if (j > 0) text += ',';
+      append_number(text, columns[j][i]);
+    }
+    text += '\n';
+  }
+  return text;
+}
+
 CsvWriter::CsvWriter(const std::filesystem::path& path, const std::vector<std::string>& names)
     : file_(path), width_(names.size()) {
-  for (const auto& name : names) line_ += (line_.empty() ? "" : ",") + name;
-  file_.write(line_ + "\n");
+  file_.write(header_text(names));
 }
 
 void CsvWriter::row(std::span<const double> values) {
   if (values.size() != width_) throw std::invalid_argument("CsvWriter: a row must have one value for each column");
   line_.clear();
-  std::array<char, 32> digits;
   for (const double value : values) {
     if (!line_.empty()) line_ += ',';
-    line_.append(digits.data(), std::to_chars(digits.begin(), digits.end(), value).ptr);
+    append_number(line_, value);
   }
   line_ += '\n';
   file_.write(line_);

@@ -27,6 +27,9 @@ CsvTable read_csv(const std::filesystem::path& path);
 /// The same from text; `name` stands for the file in messages.
 CsvTable parse_csv(std::string_view text, const std::string& name);
 
+/// The text that reads back to the same table. std::invalid_argument unless all columns have one length.
+std::string csv_text(const std::vector<std::string>& names, const std::vector<std::vector<double>>& columns);
+
 /// Writes rows in the shortest digits that read back to the same doubles. The file appears on close().
 class CsvWriter {
  public:

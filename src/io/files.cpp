@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cctype>
 #include <cerrno>
+#include <charconv>
 #include <map>
 #include <memory>
 #include <system_error>
@@ -120,6 +121,11 @@ std::string in_another_unit(std::string_view wrong, const std::vector<std::strin
 std::string did_you_mean(std::string_view wrong, const std::vector<std::string>& names) {
   const std::string name = nearest_name(wrong, names);
   return name.empty() ? "" : "; did you mean \"" + name + "\"?";
+}
+
+std::string shortest_digits(double value) {
+  std::array<char, 32> digits;
+  return {digits.data(), std::to_chars(digits.begin(), digits.end(), value).ptr};
 }
 
 std::string read_text(const std::filesystem::path& path) {

@@ -27,6 +27,9 @@ std::string in_another_unit(std::string_view wrong, const std::vector<std::strin
 /// `; did you mean "x"?` with the nearest name, or nothing.
 std::string did_you_mean(std::string_view wrong, const std::vector<std::string>& names);
 
+/// A number in the shortest digits that read back to the same double.
+std::string shortest_digits(double value);
+
 /// The bytes of a file. InputError when it cannot be read.
 std::string read_text(const std::filesystem::path& path);
 

@@ -34,6 +34,10 @@ const std::vector<Read> kReads = {
       t.choice("task", {"hover", "landing"});
     },
     [](const Table& t) { t.numbers("gains", flappy::io::non_negative()); },
+    [](const Table& t) { t.numbers("gains", 3); },
+    [](const Table& t) {
+      t.rows("walls", 2, {-9, 9});
+    },
     [](const Table& t) { t.strings("axes"); },
     [](const Table& t) { t.file("vehicle"); },
     [](const Table& t) { t.table("torso"); },

@@ -225,6 +225,43 @@ TEST(Config, RefusesWrongTypes) {
             "v.toml:1:10: k[1]: is an integer; accepted: a table");
 }
 
+TEST(Config, ReadsArraysOfOneLength) {
+  const Table root = Config::parse("a = [1, 2.5]\nnone = []\nwalls = [[0, 1.5], [-2, 3e-4]]\n", "v.toml").root();
+  EXPECT_EQ(root.numbers("a", 2), (std::vector<double>{1, 2.5}));
+  EXPECT_EQ(root.rows("walls", 2), (std::vector<std::vector<double>>{{0, 1.5}, {-2, 3e-4}}));
+  EXPECT_TRUE(root.rows("none", 2).empty());
+  EXPECT_NO_THROW(root.finish());
+
+  const auto three = [](const std::string& value) {
+    return message("k = " + value, [](const Table& t) { t.numbers("k", 3, non_negative(1)); });
+  };
+  EXPECT_EQ(three("[0, 1, 0.5]"), "accepted");
+  EXPECT_EQ(three("[0, 1]"), "v.toml:1:5: k: has 2 elements; accepted: an array of 3, each a number from 0 to 1");
+  EXPECT_EQ(three("[0, 1, 1, 0]"), "v.toml:1:5: k: has 4 elements; accepted: an array of 3, each a number from 0 to 1");
+  EXPECT_EQ(three("[0, 2, 1]"), "v.toml:1:9: k[1]: 2 is out of range; accepted: a number from 0 to 1");
+  EXPECT_EQ(three("7"), "v.toml:1:5: k: is an integer; accepted: an array of 3, each a number from 0 to 1");
+  EXPECT_EQ(message("", [](const Table& t) { t.numbers("k", 3); }),
+            "v.toml: k: is missing; accepted: an array of 3, each a number");
+}
+
+TEST(Config, RefusesFaultyRows) {
+  const auto rows = [](const std::string& value) {
+    return message("k = " + value, [](const Table& t) { t.rows("k", 2, {-9, 9}); });
+  };
+  EXPECT_EQ(rows("[[1, 2],\n  [3, 4]]"), "accepted");
+  EXPECT_EQ(rows("[[1, 2],\n  [3, 'a']]"), "v.toml:2:7: k[1][1]: is a string; accepted: a number from -9 to 9");
+  EXPECT_EQ(rows("[[1, 2],\n  [3, 10]]"), "v.toml:2:7: k[1][1]: 10 is out of range; accepted: a number from -9 to 9");
+  EXPECT_EQ(rows("[[1, nan]]"), "v.toml:1:10: k[0][1]: nan is not finite; accepted: a number from -9 to 9");
+  EXPECT_EQ(rows("[[1, 2],\n  [3]]"),
+            "v.toml:2:3: k[1]: has 1 elements; accepted: an array of 2, each a number from -9 to 9");
+  EXPECT_EQ(rows("[[1, 2], 3]"),
+            "v.toml:1:14: k[1]: is an integer; accepted: an array of 2, each a number from -9 to 9");
+  EXPECT_EQ(rows("true"),
+            "v.toml:1:5: k: is a boolean; accepted: an array, each an array of 2, each a number from -9 to 9");
+  EXPECT_EQ(message("", [](const Table& t) { t.rows("k", 2); }),
+            "v.toml: k: is missing; accepted: an array, each an array of 2, each a number");
+}
+
 TEST(Config, RefusesNumbersOutOfRange) {
   const auto at = [](const std::string& value, Range range) {
     return message("[torso]\n\nmass_kg = " + value, [&](const Table& root) { root.number("torso.mass_kg", range); });
@@ -440,6 +477,14 @@ TEST(Resolved, LeavesOutFallbacksThatMeanNotSet) {
   EXPECT_EQ(config.root().number_or("height_m", -1, positive()), -1);
   EXPECT_EQ(config.root().integer_or("count", -1, 0, 9), -1);
   EXPECT_EQ(config.resolved(), "");
+}
+
+TEST(Resolved, KeepsRows) {
+  const std::string text = "k = [[0.1, -2], [1e-300, 3]]\n";
+  const Config first = Config::parse("", "v.toml", {text.substr(0, text.size() - 1)});
+  const Config second = Config::parse(first.resolved(), "v.toml");
+  EXPECT_EQ(first.resolved(), text);
+  EXPECT_EQ(second.root().rows("k", 2), (std::vector<std::vector<double>>{{0.1, -2}, {1e-300, 3}}));
 }
 
 TEST(Resolved, ReadsIdenticallyWhenParsedAgain) {

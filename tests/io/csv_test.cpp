@@ -97,6 +97,15 @@ TEST_F(CsvWriterTest, WritesDigitsThatReadBackToTheSameDoubles) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(table.columns[i], (std::vector<double>{first[i], second[i]}));
 }
 
+TEST(Csv, TextReadsBackToTheSameTable) {
+  const std::vector<std::vector<double>> columns = {{0.1, 1.0 / 3}, {-5e-324, 2}};
+  const std::string text = csv_text({"a_m", "b_m"}, columns);
+  EXPECT_EQ(text, "a_m,b_m\n0.1,-5e-324\n0.3333333333333333,2\n");
+  EXPECT_EQ(parse_csv(text, "log.csv").columns, columns);
+  EXPECT_THROW(csv_text({"a_m", "b_m"}, {{1}, {}}), std::invalid_argument);
+  EXPECT_THROW(csv_text({"a_m", "b_m"}, {{1}}), std::invalid_argument);
+}
+
 TEST_F(CsvWriterTest, LeavesNoFileUnlessClosed) {
   { CsvWriter(path_, {"a_m"}).row(std::vector<double>{1}); }
   EXPECT_TRUE(std::filesystem::is_empty(folder_));

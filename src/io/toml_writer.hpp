@@ -1,0 +1,21 @@
+// TOML as text.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace flappy::io {
+
+/// A string in double quotes, escaped; UTF-8 stays as it is.
+std::string toml_string(std::string_view text);
+
+/// A floating-point number in the shortest digits that read back to the same double.
+std::string toml_number(double value);
+
+/// Whether a key needs no quotes.
+bool is_bare(std::string_view key);
+
+/// The dotted path of a key below `path`, quoted where it must be.
+std::string toml_path(const std::string& path, std::string_view key);
+
+}  // namespace flappy::io
