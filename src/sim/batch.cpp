@@ -2,7 +2,6 @@
 
 #include <omp.h>
 
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
@@ -11,6 +10,7 @@
 #include "model/effects/registry.hpp"
 #include "model/vehicle_dynamics.hpp"
 #include "sim/kernels.hpp"
+#include "sim/storage.hpp"
 
 namespace flappy::sim {
 namespace {
@@ -19,20 +19,6 @@ using model::Parameters;
 using model::State;
 using model::Vec3;
 
-/// Copies a struct of numbers into one lane of its rows, or back.
-template <class S, class T, int lanes>
-void put(const S& s, T (*rows)[lanes], int lane) {
-  const double* from = reinterpret_cast<const double*>(&s);
-  for (std::size_t i = 0; i < sizeof(S) / sizeof(double); ++i) rows[i][lane] = static_cast<T>(from[i]);
-}
-template <class S, class T, int lanes>
-S get(const T (*rows)[lanes], int lane) {
-  S s;
-  double* to = reinterpret_cast<double*>(&s);
-  for (std::size_t i = 0; i < sizeof(S) / sizeof(double); ++i) to[i] = rows[i][lane];
-  return s;
-}
-
 /// How the centre of mass moves relative to the torso origin, in W.
 Vec3<double> com_minus_origin_velocity(const Parameters<double>& p, const State<double>& x) {
   const auto whole = model::whole_vehicle<double>(p, {model::place_wing<+1>(p.left, x.left, x.body_rate_rad_s),
@@ -40,90 +26,55 @@ Vec3<double> com_minus_origin_velocity(const Parameters<double>& p, const State<
   return model::rotation_matrix(x.attitude) * (model::cross(x.body_rate_rad_s, whole.com) + whole.com_rate);
 }
 
-std::uint64_t mixed(std::uint64_t h, std::uint64_t word) {  // splitmix64's finaliser
-  h = (h ^ word) * 0x9e3779b97f4a7c15ULL;
-  h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  h = (h ^ (h >> 27)) * 0x94d049bb133111ebULL;
-  return h ^ (h >> 31);
-}
-
-template <class T>
-std::uint64_t bits_of(T value) {
-  if constexpr (sizeof(T) == 4) return std::bit_cast<std::uint32_t>(value);
-  else return std::bit_cast<std::uint64_t>(value);
-}
-
 }  // namespace
 
 template <class T>
-struct Batch<T>::Storage {
-  std::size_t count = 0;
-  int threads = 1;
-  double step_s = 0;
-  int steps_per_update = 1;
-  World world;
-  double hold_s = 0;
-  std::int64_t steps = 0;
-  StepBlock<T> kernel = nullptr;
-  std::vector<Block<T>> blocks;
-  std::vector<std::uint64_t> lane_effects;   // set of each lane; empty while no flapper has an effect
-  std::vector<std::uint64_t> block_effects;  // their union
-  std::vector<T> effect_rows;                // [block][row][lane]
+void Batch<T>::Storage::put_vehicle(Block<T>& block, int lane, const model::Vehicle& v) {
+  put(model::derive(v, step_s), block.parameters, lane);
+  auto drive = get<Drive<double>>(block.drive, lane);
+  drive.limit = {v.driver.amplitude_limit_V, v.driver.difference_limit_V, v.driver.bias_limit_V,
+                 v.driver.split_cycle_limit};
+  put(drive, block.drive, lane);
+  block.phase_per_update[lane] =
+      static_cast<std::uint32_t>(std::llround(v.driver.flapping_Hz * v.driver.hold_s * 0x1p32));
+}
 
-  struct Place {
-    Block<T>& block;
-    int lane;
-  };
-  Place at(std::size_t i) {
-    if (i >= count)
-      throw std::out_of_range("no flapper " + std::to_string(i) + " in a batch of " + std::to_string(count));
-    return {blocks[i / kLanes<T>], static_cast<int>(i % kLanes<T>)};
+/// A lane without an effect that its block has gets the value at which the effect vanishes.
+template <class T>
+void Batch<T>::Storage::put_effects(std::size_t i, const model::Vehicle& v) {
+  if (v.effects.empty() && lane_effects.empty()) return;
+  if (lane_effects.empty()) {
+    lane_effects.assign(blocks.size() * kLanes<T>, 0);
+    block_effects.assign(blocks.size(), 0);
+    effect_rows.assign(blocks.size() * model::kEffectRows * kLanes<T>, T(0));
+    for (std::size_t j = 0; j < lane_effects.size(); ++j) put_effect_rows(j, model::Vehicle{});
   }
+  put_effect_rows(i, v);
+  const std::size_t b = i / kLanes<T>;
+  block_effects[b] = 0;
+  for (int lane = 0; lane < kLanes<T>; ++lane)
+    block_effects[b] |= lane_effects[b * kLanes<T> + static_cast<std::size_t>(lane)];
+}
 
-  void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v) {
-    put(model::derive(v, step_s), block.parameters, lane);
-    auto drive = get<Drive<double>>(block.drive, lane);
-    drive.limit = {v.driver.amplitude_limit_V, v.driver.difference_limit_V, v.driver.bias_limit_V,
-                   v.driver.split_cycle_limit};
-    put(drive, block.drive, lane);
-    block.phase_per_update[lane] =
-        static_cast<std::uint32_t>(std::llround(v.driver.flapping_Hz * v.driver.hold_s * 0x1p32));
-  }
-
-  /// A lane without an effect that its block has gets the value at which the effect vanishes.
-  void put_effects(std::size_t i, const model::Vehicle& v) {
-    if (v.effects.empty() && lane_effects.empty()) return;
-    if (lane_effects.empty()) {
-      lane_effects.assign(blocks.size() * kLanes<T>, 0);
-      block_effects.assign(blocks.size(), 0);
-      effect_rows.assign(blocks.size() * model::kEffectRows * kLanes<T>, T(0));
-      for (std::size_t j = 0; j < lane_effects.size(); ++j) put_effect_rows(j, model::Vehicle{});
-    }
-    put_effect_rows(i, v);
-    const std::size_t b = i / kLanes<T>;
-    block_effects[b] = 0;
-    for (int lane = 0; lane < kLanes<T>; ++lane)
-      block_effects[b] |= lane_effects[b * kLanes<T> + static_cast<std::size_t>(lane)];
-  }
-  void put_effect_rows(std::size_t i, const model::Vehicle& v) {
-    T* rows = &effect_rows[i / kLanes<T> * model::kEffectRows * kLanes<T> + i % kLanes<T>];
-    lane_effects[i] = 0;
-    for (std::size_t e = 0; e < model::effects().size(); ++e) {
-      const model::EffectEntry& entry = model::effects()[e];
-      const auto own = v.effects.find(entry.info.id);
-      if (own != v.effects.end()) lane_effects[i] |= std::uint64_t{1} << e;
-      for (std::size_t k = 0; k < entry.parameters.size(); ++k) {
-        const model::EffectParameter& parameter = entry.parameters[k];
-        double value = static_cast<int>(k) == entry.info.vanishing ? entry.info.vanishing_value : parameter.typical;
-        if (own != v.effects.end()) {
-          const auto given = own->second.find(parameter.name);
-          value = given != own->second.end() ? given->second : parameter.typical;
-        }
-        rows[(static_cast<std::size_t>(entry.first_row) + k) * kLanes<T>] = static_cast<T>(value);
+template <class T>
+void Batch<T>::Storage::put_effect_rows(std::size_t i, const model::Vehicle& v) {
+  T* rows = &effect_rows[i / kLanes<T> * model::kEffectRows * kLanes<T> + i % kLanes<T>];
+  lane_effects[i] = 0;
+  for (std::size_t e = 0; e < model::effects().size(); ++e) {
+    const model::EffectEntry& entry = model::effects()[e];
+    const auto own = v.effects.find(entry.info.id);
+    if (own != v.effects.end()) lane_effects[i] |= std::uint64_t{1} << e;
+    for (std::size_t k = 0; k < entry.parameters.size(); ++k) {
+      const model::EffectParameter& parameter = entry.parameters[k];
+      double value = static_cast<int>(k) == entry.info.vanishing ? entry.info.vanishing_value : parameter.typical;
+      if (own != v.effects.end()) {
+        const auto given = own->second.find(parameter.name);
+        value = given != own->second.end() ? given->second : parameter.typical;
       }
+      rows[(static_cast<std::size_t>(entry.first_row) + k) * kLanes<T>] = static_cast<T>(value);
     }
   }
-};
+}
 
 template <class T>
 Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOptions& options)
@@ -207,21 +158,12 @@ void Batch<T>::set_input(std::size_t i, const Input& input) {
 template <class T>
 void Batch<T>::step(int steps) {
   Storage& s = *storage_;
-  const StepPlan plan{s.step_s,
-                      s.steps_per_update,
-                      s.world.gravity_m_s2,
-                      s.world.ground_z_m,
-                      s.world.ceiling_z_m,
-                      s.world.walls.data(),
-                      s.world.walls.size()};
+  const StepPlan plan = s.plan();
   const auto blocks = static_cast<std::ptrdiff_t>(s.blocks.size());
 #pragma omp parallel for schedule(static) num_threads(s.threads)
   for (std::ptrdiff_t b = 0; b < blocks; ++b) {
-    BlockEffects<T> effects;
     const auto i = static_cast<std::size_t>(b);
-    if (!s.block_effects.empty()) effects = {s.block_effects[i], &s.effect_rows[i * model::kEffectRows * kLanes<T>]};
-    const Block<T>* next = i + 1 < s.blocks.size() ? &s.blocks[i + 1] : nullptr;
-    s.kernel(s.blocks[i], effects, plan, s.steps, steps, next);
+    s.kernel(s.blocks[i], s.effects_of(i), plan, s.steps, steps, s.block_after(i));
   }
   s.steps += steps;
 }

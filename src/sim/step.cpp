@@ -2,28 +2,14 @@
 // Compiled once for each instruction set (FLAPPY_ISA); the bits are the same on all of them.
 #include "sim/step.hpp"
 
-#include "sim/lanes.hpp"
 #include "sim/physics_step.hpp"
+#include "sim/rows.hpp"
 
 namespace flappy::sim {
 inline namespace FLAPPY_ISA {
 namespace {
 
 using namespace model;
-
-#if defined(FLAPPY_SCALAR)
-template <class T>
-constexpr int kWidth = 1;
-#elif defined(__AVX512F__)
-template <class T>
-constexpr int kWidth = 64 / sizeof(T);
-#elif defined(__AVX2__)
-template <class T>
-constexpr int kWidth = 32 / sizeof(T);
-#else
-template <class T>
-constexpr int kWidth = 16 / sizeof(T);
-#endif
 
 /// A flapper that goes faster than this is not flying but diverging.
 constexpr double kPlausibleSpeed_m_s = 100;
@@ -32,31 +18,6 @@ constexpr double kPlausibleHingeRate_rad_s = 20000;  // the published limit of t
 constexpr double kPlausiblePosition_m = 10000;
 /// A flapper that rose this far has left its support: touching the ground is an event from then on.
 constexpr double kTakeOffClearance_m = 0.005;
-
-template <class S, class T, int lanes>
-FLAPPY_INLINE S load_rows(const T (*rows)[lanes], int first) {
-  S s;
-  using L = Lanes<T, kWidth<T>>;
-  static_assert(sizeof(S) % sizeof(L) == 0);
-  L* to = reinterpret_cast<L*>(&s);
-  for (std::size_t i = 0; i < sizeof(S) / sizeof(L); ++i) to[i] = L::load(rows[i] + first);
-  return s;
-}
-
-/// Rows to read from again and again: in place where lanes fill a row, a copy where they are part of one. In place they
-/// leave the stack, whose spills would otherwise collide with them in the cache: 4 % of the step.
-template <class S, class T, int lanes>
-FLAPPY_INLINE decltype(auto) view_rows(const T (*rows)[lanes], int first) {
-  if constexpr (kWidth<T> == lanes) return (*reinterpret_cast<const S*>(rows));
-  else return load_rows<S>(rows, first);
-}
-
-template <class S, class T, int lanes>
-FLAPPY_INLINE void store_rows(const S& s, T (*rows)[lanes], int first) {
-  using L = Lanes<T, kWidth<T>>;
-  const L* from = reinterpret_cast<const L*>(&s);
-  for (std::size_t i = 0; i < sizeof(S) / sizeof(L); ++i) from[i].store(rows[i] + first);
-}
 
 /// Driver: new voltages from the wing-beat signal, held until the next update.
 template <class T, class L>

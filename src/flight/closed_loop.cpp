@@ -1,0 +1,198 @@
+// The closed loop: what a block of flappers does in one control period, stage by stage. Compiled once for each
+// instruction set (FLAPPY_ISA); the bits are the same on all of them.
+#include "flight/flight_block.hpp"
+
+#include "sim/rows.hpp"
+
+namespace flappy::flight {
+inline namespace FLAPPY_ISA {
+namespace {
+
+using sim::kWidth;
+using sim::load_rows;
+using sim::store_rows;
+using sim::view_rows;
+
+template <class T>
+using L = Lanes<T, kWidth<T>>;
+
+/// Calls `stage(first lane)` for every register of lanes in a block.
+template <class T, class Stage>
+FLAPPY_INLINE void for_lanes(const Stage& stage) {
+  for (int first = 0; first < kLanes<T>; first += kWidth<T>) stage(first);
+}
+
+template <class T>
+FLAPPY_INLINE T (*slot(T* rows, int index, int rows_in_slot))[kLanes<T>] {
+  return reinterpret_cast<T(*)[kLanes<T>]>(rows) + static_cast<std::ptrdiff_t>(index) * rows_in_slot;
+}
+
+template <class T>
+FLAPPY_INLINE Setpoint<L<T>> setpoint(FlightBlock<T>& f, const FlightPlan<T>& plan, int first) {
+  return setpoint_at<L<T>>(plan.path, f.tick + first, f.segment + first);
+}
+
+/// Policy and controller set the inputs of the wing beat.
+template <class T>
+FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
+  FlightBlock<T>& f = s.flight;
+  auto episode = load_rows<Episode<L<T>>>(f.episode, first);
+  if (plan.actor.layers > 0) {
+    L<T> observation[kMaxObservation];
+    for (int i = 0; i < plan.actor.widths[0]; ++i) observation[i] = L<T>::load(f.observation[i] + first);
+    evaluate(plan.actor, observation, episode.action);
+    store_rows(episode, f.episode, first);
+  }
+  const auto estimate = load_rows<Estimate<L<T>>>(f.estimate, first);
+  const auto ref = setpoint(f, plan, first);
+  const L<T> zero(0);
+  WingBeat<L<T>> base{zero, zero, zero, zero};
+  if (plan.controller == static_cast<int>(Controller::Kind::pid)) {
+    auto memory = load_rows<Pid<L<T>>>(f.controller, first);
+    base = control(plan.pid, memory, estimate, ref);
+    store_rows(memory, f.controller, first);
+  } else if (plan.controller == static_cast<int>(Controller::Kind::arc)) {
+    auto memory = load_rows<Arc<L<T>>>(f.controller, first);
+    base = control(plan.arc, memory, estimate, ref);
+    store_rows(memory, f.controller, first);
+  }
+  auto drive = load_rows<sim::Drive<L<T>>>(s.body.drive, first);
+  drive.input = add_action(plan.task, episode, base);
+  store_rows(drive, s.body.drive, first);
+}
+
+/// Sensors sample the true state at the end of a slice.
+template <class T>
+FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Slice& slice, int imu_samples,
+                         int mocap_samples, int first) {
+  FlightBlock<T>& f = s.flight;
+  const auto truth = truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first),
+                              load_rows<State<L<T>>>(s.body.state, first));
+  const auto draw = [&](sim::Stream stream, std::uint32_t index) {
+    return sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(stream), index, f.flapper + first, f.flight + first);
+  };
+  if (slice.imu) {
+    auto imu = load_rows<Imu<L<T>>>(f.imu, first);
+    const L<T> interval(slice.imu_interval_s);
+    const auto sample = sample_imu(plan.imu, L<T>(L<T>(1) / interval), truth, imu, draw(sim::Stream::imu, 2 * slice.imu_index),
+                                   draw(sim::Stream::imu, 2 * slice.imu_index + 1));
+    store_rows(imu, f.imu, first);
+    auto fusion = load_rows<Fusion<L<T>>>(f.fusion, first);
+    gather(fusion.gathered, sample, interval);
+    store_rows(fusion, f.fusion, first);
+    if (s.tap.imu != nullptr) store_rows(sample, slot(s.tap.imu, imu_samples, kImuSampleRows), first);
+  }
+  if (slice.mocap) {
+    const std::uint32_t index = 3 * slice.mocap_index;
+    L<T> seen = L<T>::load(f.seen[0] + first), chance(1);
+    if (plan.losses)
+      chance = sim::uniforms<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap), index + 2, f.flapper + first,
+                                   f.flight + first).u[0];
+    const auto sample = sample_mocap(plan.mocap, truth, seen, draw(sim::Stream::mocap, index),
+                                     draw(sim::Stream::mocap, index + 1), chance);
+    seen.store(f.seen[0] + first);
+    store_rows(sample, slot(s.queue, slice.mocap_slot, kMocapRows), first);
+    if (s.tap.mocap != nullptr) store_rows(sample, slot(s.tap.mocap, mocap_samples, kMocapRows), first);
+  }
+}
+
+/// The estimate at the end of the period, from all that has arrived by then.
+template <class T>
+FLAPPY_INLINE void fuse(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
+  FlightBlock<T>& f = s.flight;
+  auto fusion = load_rows<Fusion<L<T>>>(f.fusion, first);
+  const L<T> zero(0), gravity(plan.fusion.gravity_m_s2);
+  const auto increment = [&](int index) { return load_rows<Increment<L<T>>>(slot(s.ring, index, kIncrementRows), first); };
+  const auto move = [&](Pose<L<T>>& pose, const Advance& a) {
+    advance(pose, increment(a.slot), fusion.gyro_bias_rad_s, fusion.accel_bias_m_s2, L<T>(a.share), L<T>(a.duration_s), gravity);
+  };
+  if (plan.push_slot >= 0) {
+    store_rows(fusion.gathered, slot(s.ring, plan.push_slot, kIncrementRows), first);
+    fusion.gathered = {{zero, zero, zero}, {zero, zero, zero}};
+  }
+  for (int i = 0; i < plan.fuse_count; ++i) {
+    const Fuse& pose = plan.fuse[i];
+    for (const Advance* a = plan.advance + pose.first; a != plan.advance + pose.first + pose.count; ++a) {
+      move(fusion.horizon, *a);
+      spread(fusion.covariance, plan.fusion, L<T>(a->share * a->duration_s));
+    }
+    correct(fusion, plan.fusion, load_rows<MocapSample<L<T>>>(slot(s.queue, pose.slot, kMocapRows), first));
+  }
+  if (plan.fuse_count > 0) fusion.now = fusion.horizon;
+  for (int i = 0; i < plan.replay_count; ++i) move(fusion.now, plan.replay[i]);
+
+  Pose<L<T>> ahead = fusion.now;
+  if (plan.newest.slot >= 0) {
+    const L<T> per_duration(1 / plan.newest.duration_s);
+    fusion.body_rate_rad_s = per_duration * increment(plan.newest.slot).turn_rad - fusion.gyro_bias_rad_s;
+    if (plan.ahead_s > 0) move(ahead, {plan.newest.slot, plan.ahead_s / plan.newest.duration_s, plan.newest.duration_s});
+  }
+  store_rows(Estimate<L<T>>{ahead.position_m, ahead.attitude, ahead.velocity_m_s, fusion.body_rate_rad_s}, f.estimate, first);
+  store_rows(fusion, f.fusion, first);
+}
+
+/// Scores the period, looks whether the episode is over, and shows the policy what it may know.
+template <class T>
+FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
+  FlightBlock<T>& f = s.flight;
+  const auto truth = truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first),
+                              load_rows<State<L<T>>>(s.body.state, first));
+  store_rows(truth, f.truth, first);
+  auto episode = load_rows<Episode<L<T>>>(f.episode, first);
+  T time[kWidth<T>], fraction[kWidth<T>];
+  for (int i = 0; i < kWidth<T>; ++i) {
+    time[i] = static_cast<T>(++f.tick[first + i]) * plan.task.tick_s;
+    fraction[i] = static_cast<T>(static_cast<std::int32_t>(s.body.phase[first + i])) * static_cast<T>(0x1p-32);
+  }
+  const auto ref = setpoint(f, plan, first);
+  const auto score = score_of(truth, ref);
+  episode.reward = reward_of(plan.task.reward, score, truth, episode);
+  episode.handed_back = where(arrived(plan.task.hand_back, score, truth), L<T>(1), episode.handed_back);
+  for (int i = 0; i < kActions; ++i) episode.previous[i] = episode.action[i];
+
+  look_for_ends(plan.task.limits, score, L<T>::load(time), [&](typename L<T>::Mask mask, std::uint32_t bit) {
+    if (!rarely(mask)) return;
+    for (int i = 0; i < kWidth<T>; ++i)
+      if (mask.raw[i]) f.ended[first + i] |= bit;
+  });
+  for (int i = 0; i < kWidth<T>; ++i) {
+    const std::uint32_t status = s.body.status[first + i];
+    if (status & sim::kFrozen) f.ended[first + i] |= kNotFinite;
+    if (plan.task.contact_ends > 0 && (status & ~std::uint32_t{sim::kFrozen})) f.ended[first + i] |= kContact;
+  }
+  L<T> row[kMaxObservation];
+  const int rows = observe(plan.parts, load_rows<Estimate<L<T>>>(f.estimate, first), ref, episode,
+                           L<T>::load(fraction), row);
+  for (int i = 0; i < rows; ++i) row[i].store(f.observation[i] + first);
+  store_rows(episode, f.episode, first);
+}
+
+template <class T>
+void fly_block(const FlightSpace<T>& s, const FlightPlan<T>& plan) {
+  for_lanes<T>([&](int first) { steer(s, plan, first); });
+  std::int64_t step = plan.first_step;
+  int imu_samples = 0, mocap_samples = 0;
+  for (int i = 0; i < plan.slice_count; ++i) {
+    const Slice& slice = plan.slices[i];
+    plan.step(s.body, s.effects, *plan.physics, step, slice.steps, i == 0 ? s.next : nullptr);
+    step += slice.steps;
+    if (slice.imu || slice.mocap)
+      for_lanes<T>([&](int first) { sense(s, plan, slice, imu_samples, mocap_samples, first); });
+    imu_samples += slice.imu;
+    mocap_samples += slice.mocap;
+  }
+  for_lanes<T>([&](int first) {
+    fuse(s, plan, first);
+    judge(s, plan, first);
+  });
+}
+
+}  // namespace
+
+extern const FlyBlock<float> fly_float;
+extern const FlyBlock<double> fly_double;
+const FlyBlock<float> fly_float = fly_block<float>;
+const FlyBlock<double> fly_double = fly_block<double>;
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::flight

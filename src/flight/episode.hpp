@@ -1,0 +1,115 @@
+// The course of an episode, lane by lane: what a policy sees, what it adds, what that earned, and whether it is over.
+#pragma once
+
+#include "flight/pid.hpp"
+#include "flight/task.hpp"
+
+namespace flappy::flight {
+inline namespace FLAPPY_ISA {
+
+/// What an episode remembers, as rows.
+template <class T>
+struct Episode {
+  T action[kActions];    // of the policy, in [-1, 1]
+  T previous[kActions];  // the one before
+  T added[kActions];     // besides: V, V, V, split cycle
+  T handed_back;         // 0 or 1
+  T reward;              // of the last control period
+};
+
+/// What a policy and whoever else may add do to the controller's output.
+template <class T>
+FLAPPY_INLINE WingBeat<T> add_action(const TaskConstants<Element<T>>& k, const Episode<T>& e, const WingBeat<T>& base) {
+  T sum[kActions] = {base.amplitude_V, base.difference_V, base.bias_V, base.split_cycle};
+  for (int i = 0; i < kActions; ++i) {
+    const T middle(0.5 * (k.action_low[i] + k.action_high[i])), half(0.5 * (k.action_high[i] - k.action_low[i]));
+    const T acts = middle + half * clamp(e.action[i], T(-1), T(1));
+    sum[i] = sum[i] + (e.added[i] + where(e.handed_back > T(0), T(0), acts));
+  }
+  return {sum[0], sum[1], sum[2], sum[3]};
+}
+
+/// The true state as scored: relative to the set point, axes of W, angles about its heading.
+template <class T>
+struct Score {
+  Vec3<T> position_m, velocity_m_s;
+  T roll_rad, pitch_rad, yaw_rad;
+  T facing, upright;  // cosines of heading error and tilt
+};
+
+template <class T>
+FLAPPY_INLINE Score<T> score_of(const Truth<T>& t, const Setpoint<T>& ref) {
+  const Matrix3<T> R = rotation_matrix(t.attitude);
+  const T facing = ref.heading.cos * R.row_x.x + ref.heading.sin * R.row_y.x;
+  const T aside = ref.heading.cos * R.row_y.x - ref.heading.sin * R.row_x.x;
+  return {t.position_m - ref.position_m, t.velocity_m_s - ref.velocity_m_s, atan2(R.row_z.y, R.row_z.z),
+          T(-asin(R.row_z.x)), atan2(aside, facing), facing, R.row_z.z};
+}
+
+template <class T>
+FLAPPY_INLINE T reward_of(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t, const Episode<T>& e) {
+  T effort(0), change(0);
+  for (int i = 0; i < kActions; ++i) {
+    const T step = e.action[i] - e.previous[i];
+    effort += e.action[i] * e.action[i];
+    change += step * step;
+  }
+  const auto length = [](const Vec3<T>& v) { return sqrt(dot(v, v)); };
+  const T angles = sqrt(T(s.roll_rad * s.roll_rad + (s.pitch_rad * s.pitch_rad + s.yaw_rad * s.yaw_rad)));
+  const T c = T(k.action) * effort + (T(k.action_change) * change + (T(k.position) * length(s.position_m) +
+              (T(k.angles) * angles + (T(k.velocity) * length(s.velocity_m_s) + T(k.body_rate) * length(t.body_rate_rad_s)))));
+  return T(k.inverse_square) / T(c * c + T(1e-6)) - T(k.cost) * c +
+         (T(k.facing) * s.facing + (T(k.upright) * min(T(0), s.upright) +
+          (T(k.behind) * min(T(0), T(s.position_m.x + T(k.behind_m))) + T(k.alive))));
+}
+
+/// Lanes where the policy's work is done.
+template <class T>
+FLAPPY_INLINE auto arrived(const HandBack<Element<T>>& k, const Score<T>& s, const Truth<T>& t) {
+  const auto below = [](const Vec3<T>& v, auto limit) { return dot(v, v) < T(limit) * T(limit); };
+  return (T(k.enabled) > T(0)) & (s.position_m.x > T(k.x_m)) & below(s.position_m, k.distance_m) &
+         (abs(s.velocity_m_s.x) < T(k.speed_x_m_s)) & below(s.velocity_m_s, k.speed_m_s) & (s.facing > T(k.heading_cos)) &
+         (s.upright > T(k.tilt_cos)) & below(t.body_rate_rad_s, k.body_rate_rad_s);
+}
+
+/// Calls mark(mask, bit) for each end.
+template <class T, class Mark>
+FLAPPY_INLINE void look_for_ends(const Limits<Element<T>>& k, const Score<T>& s, const T& time_s, const Mark& mark) {
+  const Vec3<T>& p = s.position_m;
+  const T far(k.distance_m);
+  mark((p.x < T(k.x_low_m)) | (p.x > T(k.x_high_m)) | (abs(p.y) > T(k.y_m)) | (abs(p.z) > T(k.z_m)) |
+           (dot(p, p) > T(far * far)),
+       kOutOfBounds);
+  mark((time_s > T(k.faced_by_s)) & (s.facing < T(0)), kHeadingLate);
+  mark((time_s > T(k.arrived_by_s)) & (p.x < T(k.arrived_x_m)), kArrivalLate);
+  mark(time_s >= T(k.time_s), kTimeOut);
+}
+
+/// Writes the observed parts; returns how many rows they are.
+template <class T>
+FLAPPY_INLINE int observe(std::uint32_t parts, const Estimate<T>& x, const Setpoint<T>& ref, const Episode<T>& e,
+                          const T& beat_fraction, T* row) {
+  int n = 0;
+  const auto observes = [&](Part part) { return (parts >> static_cast<int>(part) & 1) != 0; };
+  const auto add = [&](const Vec3<T>& v) { row[n++] = v.x, row[n++] = v.y, row[n++] = v.z; };
+  const Matrix3<T> R = rotation_matrix(x.attitude);
+  if (observes(Part::rotation_matrix)) add(R.row_x), add(R.row_y), add(R.row_z);
+  if (observes(Part::position_error)) add(x.position_m - ref.position_m);
+  if (observes(Part::velocity)) add(x.velocity_m_s - ref.velocity_m_s);
+  if (observes(Part::body_rate)) add(x.body_rate_rad_s);
+  if (observes(Part::beat_phase)) {
+    const SinCos<T> phase = sin_cos_pi(T(beat_fraction + beat_fraction));
+    row[n++] = phase.sin, row[n++] = phase.cos;
+  }
+  if (observes(Part::heading_error)) {
+    const SinCos<T> yaw = heading_of(R);
+    row[n++] = yaw.sin * ref.heading.cos - yaw.cos * ref.heading.sin;
+    row[n++] = yaw.cos * ref.heading.cos + yaw.sin * ref.heading.sin;
+  }
+  if (observes(Part::previous_action))
+    for (int i = 0; i < kActions; ++i) row[n++] = e.action[i];
+  return n;
+}
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::flight

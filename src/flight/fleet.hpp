@@ -1,0 +1,106 @@
+// Many flappers in closed loop: bodies, sensors, estimators, controllers and tasks, one control period at a time. The
+// bytes of a flapper depend on its vehicle, its task and its place in the random streams, as those of a Batch do.
+#pragma once
+
+#include <memory>
+
+#include "flight/actor_file.hpp"
+#include "flight/setup.hpp"
+#include "flight/task.hpp"
+
+namespace flappy::flight {
+
+template <class T>
+struct Tap;
+
+/// What is common to all flappers of a fleet.
+struct FleetOptions {
+  Sensors sensors;
+  Controller controller;
+  Task task;
+  double control_hz = 500;
+  std::uint64_t seed = 0;
+  std::uint32_t first_flapper = 0;  ///< number of the fleet's first flapper in the random streams
+  sim::BatchOptions batch;
+};
+
+/// A flapper's motion, true or estimated. SI units; attitude w, x, y, z, body to world.
+struct Motion {
+  double position_m[3], attitude[4], velocity_m_s[3], body_rate_rad_s[3];
+};
+
+/// Where a flapper is meant to be.
+struct Target {
+  double position_m[3], velocity_m_s[3], acceleration_m_s2[3];
+  double heading_cos, heading_sin, heading_rate_rad_s;
+};
+
+template <class T>
+class Fleet {
+ public:
+  /// `count` copies of `vehicle`, each at the start of its episode 0. std::invalid_argument where the control period is no
+  /// whole number of physics steps.
+  Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOptions& options);
+  ~Fleet();
+  Fleet(Fleet&&) noexcept;
+  Fleet& operator=(Fleet&&) noexcept;
+
+  std::size_t size() const;
+  const FleetOptions& options() const;
+
+  void set_vehicle(std::size_t i, const model::Vehicle& vehicle);
+  /// Starts flapper `i` anew where its task starts episode `episode`, or at `state`.
+  void start(std::size_t i, std::uint32_t episode);
+  void start(std::size_t i, std::uint32_t episode, const sim::FlapperState& state, sim::Start kind);
+
+  /// The actor that acts from now on, or none. It must fit the task's observation and action.
+  void set_actor(std::shared_ptr<const Actor> actor);
+  /// Action of flapper `i` for the next period, each in [-1, 1]; an actor would overwrite it.
+  void set_action(std::size_t i, const double (&action)[kActions]);
+  /// Adds to the controller's output from now on: open-loop flight, excitation.
+  void set_added(std::size_t i, const sim::Input& input);
+
+  /// One control period for all.
+  void step();
+
+  Motion truth(std::size_t i) const;
+  Motion estimate(std::size_t i) const;
+  Target target(std::size_t i) const;
+  sim::Input input(std::size_t i) const;  ///< as the controller and actor last set it, before the driver clips it
+  double reward(std::size_t i) const;
+  std::uint32_t ended(std::size_t i) const;  ///< bits of Ended, since the start
+  std::uint32_t tick(std::size_t i) const;   ///< control periods since the start
+  bool handed_back(std::size_t i) const;
+  std::vector<double> observation(std::size_t i) const;
+  /// Squared innovations of the last pose over their variance: angle and position, three degrees of freedom each.
+  std::pair<double, double> innovation(std::size_t i) const;
+
+  sim::Batch<T>& batch();
+  const sim::Batch<T>& batch() const;
+  double period_s() const;
+
+  /// What a recorder sees of the last period's samples; switched on by record(true).
+  struct ImuRecord {
+    double arrival_s, gyro_rad_s[3], accel_m_s2[3];
+  };
+  struct MocapRecord {
+    double arrival_s, position_m[3], attitude[4];
+  };
+  void record(bool on);
+  std::vector<ImuRecord> imu_samples(std::size_t i) const;
+  std::vector<MocapRecord> mocap_samples(std::size_t i) const;  ///< without the lost ones
+
+  std::uint64_t hash(std::size_t first, std::size_t last) const;
+  std::uint64_t hash() const { return hash(0, size()); }
+  /// Of sensors, estimator, controller and task, beyond Batch::bytes_per_flapper().
+  std::size_t bytes_per_flapper() const;
+
+ private:
+  struct Storage;
+  std::unique_ptr<Storage> storage_;
+};
+
+extern template class Fleet<float>;
+extern template class Fleet<double>;
+
+}  // namespace flappy::flight

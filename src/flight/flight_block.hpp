@@ -1,0 +1,86 @@
+// What flies a block of flappers: one row for each number, beside the block of their bodies.
+#pragma once
+
+#include "flight/actor.hpp"
+#include "flight/arc.hpp"
+#include "flight/episode.hpp"
+#include "flight/schedule.hpp"
+#include "sim/step.hpp"
+
+namespace flappy::flight {
+
+using sim::kLanes;
+
+inline constexpr int kImuRows = model::kRows<Imu>, kFusionRows = model::kRows<Fusion>, kTruthRows = model::kRows<Truth>;
+inline constexpr int kEstimateRows = model::kRows<Estimate>, kEpisodeRows = model::kRows<Episode>;
+inline constexpr int kPidRows = model::kRows<Pid>, kArcRows = model::kRows<Arc>;
+inline constexpr int kControllerRows = kPidRows > kArcRows ? kPidRows : kArcRows;
+inline constexpr int kIncrementRows = model::kRows<Increment>, kMocapRows = model::kRows<MocapSample>;
+inline constexpr int kImuSampleRows = model::kRows<ImuSample>;
+
+template <class T>
+struct alignas(64) FlightBlock {
+  T imu[kImuRows][kLanes<T>];
+  T seen[1][kLanes<T>];  // by motion capture
+  T fusion[kFusionRows][kLanes<T>];
+  T truth[kTruthRows][kLanes<T>];        // at the end of the last period
+  T estimate[kEstimateRows][kLanes<T>];  //   the same
+  T controller[kControllerRows][kLanes<T>];
+  T episode[kEpisodeRows][kLanes<T>];
+  T observation[kMaxObservation][kLanes<T>];
+  std::uint32_t flapper[kLanes<T>], flight[kLanes<T>];  // whose noise: part of the key of random numbers
+  std::uint32_t tick[kLanes<T>];                        // control periods since the start
+  std::uint32_t segment[kLanes<T>];                     // of the path
+  std::uint32_t ended[kLanes<T>];                       // bits of Ended
+};
+
+/// Samples of one control period, for whoever records them: [sample][row][lane].
+template <class T>
+struct Tap {
+  T* imu = nullptr;    // rows of ImuSample
+  T* mocap = nullptr;  // rows of MocapSample
+};
+
+/// One block and what belongs to it.
+template <class T>
+struct FlightSpace {
+  sim::Block<T>& body;
+  sim::BlockEffects<T> effects;
+  FlightBlock<T>& flight;
+  T* ring;   // [slot][row of Increment][lane]
+  T* queue;  // [slot][row of MocapSample][lane]
+  Tap<T> tap;
+  const sim::Block<T>* next;  // to be fetched from memory meanwhile
+};
+
+/// How all blocks fly through one control period.
+template <class T>
+struct FlightPlan {
+  sim::StepBlock<T> step;
+  const sim::StepPlan* physics;
+  std::int64_t first_step;
+  const Slice* slices;
+  const Fuse* fuse;
+  const Advance *advance, *replay;
+  int slice_count, fuse_count, replay_count, push_slot;
+  Advance newest;
+  double ahead_s;
+  std::uint64_t seed;
+  bool losses;
+  ImuConstants<T> imu;
+  MocapConstants<T> mocap;
+  FusionConstants<T> fusion;
+  int controller;  // a Controller::Kind
+  PidConstants<T> pid;
+  ArcConstants<T> arc;
+  TaskConstants<T> task;
+  std::uint32_t parts;  // observed
+  PathView<T> path;
+  ActorView<T> actor;
+};
+
+/// Flies a block through one control period.
+template <class T>
+using FlyBlock = void (*)(const FlightSpace<T>&, const FlightPlan<T>&);
+
+}  // namespace flappy::flight

@@ -1,0 +1,139 @@
+// Cascaded PID controller (Fei et al. 2019; structure of ArduPilot's): position P -> velocity PID -> lean angles ->
+// attitude PID -> wing-beat inputs. Index f: forward, l: left, in the heading frame (W turned by the yaw angle).
+//   v_sp = v_ref + k (p_ref - p)             e = v_sp - v        a_f,l = a_ref + PID(e)       V_z = PID(e_z)
+//   pitch_sp = atan(a_f / g)                 roll_sp = -atan(a_l cos(pitch_sp) / g)
+//   V_d = PID(roll_sp - roll)                V_0 = PID(pitch_sp - pitch)      d_sigma = PID(yaw_ref - yaw)
+//   V_amp = V_hover + V_z / (cos roll cos pitch)
+// The derivative of an attitude error is the negative of the low-passed body rate, that of a velocity error comes from
+// the low-passed velocity. Integrators are clamped, and stand still while what they drive is at its limit.
+#pragma once
+
+#include "flight/path.hpp"
+#include "model/wing_beat.hpp"
+
+namespace flappy::flight {
+
+template <class T>
+struct PidGains {
+  T p, i, d;
+  T integral_limit;  // |i * integral| is clamped to it, in the unit of the output
+};
+
+template <class T>
+struct PidConstants {
+  T position_xy_1_s, position_z_1_s, speed_limit_m_s, climb_limit_m_s;
+  PidGains<T> forward, left, up;  // m/s -> m/s^2, m/s^2, V
+  T acceleration_limit_m_s2, roll_limit_rad, pitch_limit_rad, yaw_error_limit_rad;
+  PidGains<T> roll, pitch, yaw;  // rad -> V, V, split cycle
+  T hover_V, lower_V, upper_V;   // V_amp = hover_V + clip(.., lower_V, upper_V)
+  T difference_limit_V, bias_limit_V, split_cycle_limit;
+  T velocity_share, rate_share;  // of a new value in the low-passed one
+  T period_s, per_period_Hz, gravity_m_s2;
+};
+
+inline namespace FLAPPY_ISA {
+
+/// What it remembers, as rows.
+template <class T>
+struct Pid {
+  T integral_x, integral_y;         // of the velocity error in W, m
+  T integral_z;                     // V
+  T integral_roll, integral_pitch;  // V
+  T integral_yaw;                   // split cycle
+  Vec3<T> velocity_m_s, body_rate_rad_s;  // low-passed
+};
+
+/// Where the nose points: cosine and sine of the yaw angle.
+template <class T>
+FLAPPY_INLINE SinCos<T> heading_of(const Matrix3<T>& R) {
+  const T c = R.row_x.x, s = R.row_y.x;
+  const T scale = T(1) / sqrt(T(max(T(c * c + s * s), T(1e-12))));
+  return {s * scale, c * scale};
+}
+
+/// Adds to an integral in the unit of the output, within its limit, and not further out while `blocked`.
+template <class T>
+FLAPPY_INLINE T integrated(const T& integral, const T& gain_and_time, const T& error, const T& limit,
+                           const T& blocked_towards) {
+  const T step = gain_and_time * error;
+  const T moved = clamp(T(integral + step), T(-limit), limit);
+  return where(step * blocked_towards > T(0), integral, moved);
+}
+
+/// +1 or -1 where `value` is at its limit, else 0.
+template <class T>
+FLAPPY_INLINE T saturation(const T& value, const T& low, const T& high) {
+  return where(value > high, T(1), where(value < low, T(-1), T(0)));
+}
+
+template <class T>
+FLAPPY_INLINE WingBeat<T> control(const PidConstants<Element<T>>& k, Pid<T>& m, const Estimate<T>& x,
+                                  const Setpoint<T>& ref) {
+  const T dt(k.period_s);
+  const Matrix3<T> R = rotation_matrix(x.attitude);
+  const SinCos<T> yaw = heading_of(R);
+
+  // position -> velocity -> acceleration
+  const auto toward = [](const T& want, const T& have, auto gain, const T& feed_forward, auto limit) {
+    return clamp(T(feed_forward + T(gain) * T(want - have)), T(-T(limit)), T(limit));
+  };
+  const Vec3<T> wanted{
+      toward(ref.position_m.x, x.position_m.x, k.position_xy_1_s, ref.velocity_m_s.x, k.speed_limit_m_s),
+      toward(ref.position_m.y, x.position_m.y, k.position_xy_1_s, ref.velocity_m_s.y, k.speed_limit_m_s),
+      toward(ref.position_m.z, x.position_m.z, k.position_z_1_s, ref.velocity_m_s.z, k.climb_limit_m_s)};
+  const Vec3<T> before = m.velocity_m_s;
+  m.velocity_m_s = add_scaled(before, T(k.velocity_share), x.velocity_m_s - before);
+  const Vec3<T> slope = T(k.per_period_Hz) * (before - m.velocity_m_s);  // of the error
+  const Vec3<T> error = wanted - m.velocity_m_s;
+  const auto forward = [&](const T& ex, const T& ey) { return T(yaw.cos * ex + yaw.sin * ey); };
+  const auto left = [&](const T& ex, const T& ey) { return T(yaw.cos * ey - yaw.sin * ex); };
+  const T limit(k.acceleration_limit_m_s2);
+  const T a_f = T(k.forward.p) * forward(error.x, error.y) +
+                (T(k.forward.i) * forward(m.integral_x, m.integral_y) +
+                 (T(k.forward.d) * forward(slope.x, slope.y) + forward(ref.acceleration_m_s2.x, ref.acceleration_m_s2.y)));
+  const T a_l = T(k.left.p) * left(error.x, error.y) +
+                (T(k.left.i) * left(m.integral_x, m.integral_y) +
+                 (T(k.left.d) * left(slope.x, slope.y) + left(ref.acceleration_m_s2.x, ref.acceleration_m_s2.y)));
+  const auto blocked = (abs(a_f) > limit) | (abs(a_l) > limit);
+  const T reach(k.forward.integral_limit);
+  m.integral_x = where(blocked, m.integral_x, clamp(T(m.integral_x + dt * error.x), T(-reach), reach));
+  m.integral_y = where(blocked, m.integral_y, clamp(T(m.integral_y + dt * error.y), T(-reach), reach));
+
+  // acceleration -> lean
+  const T g(k.gravity_m_s2);
+  const T pitch_wanted = clamp(atan2(clamp(a_f, T(-limit), limit), g), T(-T(k.pitch_limit_rad)), T(k.pitch_limit_rad));
+  const T pitch_cos = sin_cos(pitch_wanted).cos;
+  const T roll_wanted = clamp(T(-atan2(T(clamp(a_l, T(-limit), limit) * pitch_cos), g)), T(-T(k.roll_limit_rad)),
+                              T(k.roll_limit_rad));
+  const T roll = atan2(R.row_z.y, R.row_z.z), pitch = T(-asin(R.row_z.x));
+  const T yaw_error = atan2(T(ref.heading.sin * yaw.cos - ref.heading.cos * yaw.sin),
+                            T(ref.heading.cos * yaw.cos + ref.heading.sin * yaw.sin));
+
+  // lean -> wing beat
+  m.body_rate_rad_s = add_scaled(m.body_rate_rad_s, T(k.rate_share), x.body_rate_rad_s - m.body_rate_rad_s);
+  const auto attitude = [&](const PidGains<Element<T>>& gain, T& integral, const T& angle_error, const T& rate_error,
+                            auto most) {
+    const T out = T(gain.p) * angle_error + (T(gain.d) * rate_error + integral);
+    const T top(most);
+    integral = integrated(integral, T(T(gain.i) * dt), angle_error, T(gain.integral_limit), saturation(out, T(-top), top));
+    return clamp(out, T(-top), top);
+  };
+  const Vec3<T>& w = m.body_rate_rad_s;
+  const T yaw_reach(k.yaw_error_limit_rad);
+  WingBeat<T> u;
+  u.difference_V = attitude(k.roll, m.integral_roll, T(roll_wanted - roll), T(-w.x), k.difference_limit_V);
+  u.bias_V = attitude(k.pitch, m.integral_pitch, T(pitch_wanted - pitch), T(-w.y), k.bias_limit_V);
+  u.split_cycle = attitude(k.yaw, m.integral_yaw, clamp(yaw_error, T(-yaw_reach), yaw_reach),
+                           T(ref.heading_rate_rad_s - w.z), k.split_cycle_limit);
+
+  // climb
+  const T climb = T(k.up.p) * error.z + (T(k.up.d) * slope.z + m.integral_z);
+  const T lift = climb / max(R.row_z.z, T(0.5));  // cos roll cos pitch
+  m.integral_z = integrated(m.integral_z, T(T(k.up.i) * dt), error.z, T(k.up.integral_limit),
+                            saturation(lift, T(k.lower_V), T(k.upper_V)));
+  u.amplitude_V = T(k.hover_V) + clamp(lift, T(k.lower_V), T(k.upper_V));
+  return u;
+}
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::flight

@@ -1,0 +1,126 @@
+// What a flapper's sensors see of its true motion.
+//
+// IMU: every sample is the mean over the interval since the one before, as an integrating IMU or a decimating filter
+// delivers it, then a first-order low-pass:
+//   gyro   rotation between the two attitudes / interval + constant bias + noise
+//   accel  specific force R^T (dv/dt + g z), of the point where the IMU sits, R half-way + noise
+// A mean leaves nothing of the wing beat to alias. Gravity is in it: an IMU at rest reads +g upward.
+// Motion capture: pose of the torso origin, with white noise; it arrives late, and bursts of samples are lost
+// (Gilbert 1960: a loss begins with one probability and ends with another).
+#pragma once
+
+#include "model/vehicle_dynamics.hpp"
+#include "sim/noise.hpp"
+
+namespace flappy::flight {
+
+template <class T>
+struct ImuConstants {
+  T position_m[3];  // in B
+  T gyro_noise_rad_s, accel_noise_m_s2;
+  T low_pass_share;  // of a new value in the low-passed one
+  T gravity_m_s2;
+};
+
+template <class T>
+struct MocapConstants {
+  T position_noise_m, attitude_noise_rad;
+  T loss_begins, loss_ends;  // probabilities at each sample
+};
+
+inline namespace FLAPPY_ISA {
+
+using namespace model;
+
+/// What is true of the torso.
+template <class T>
+struct Truth {
+  Vec3<T> position_m;  // origin, in W
+  Quaternion<T> attitude;
+  Vec3<T> velocity_m_s;     // of the origin, in W
+  Vec3<T> body_rate_rad_s;  // in B
+};
+
+template <class T>
+FLAPPY_INLINE Truth<T> truth_of(const Parameters<T>& p, const State<T>& x) {
+  const auto whole = whole_vehicle<T>(p, {place_wing<+1>(p.left, x.left, x.body_rate_rad_s),
+                                          place_wing<-1>(p.right, x.right, x.body_rate_rad_s)});
+  const Vec3<T> of_com = cross(x.body_rate_rad_s, whole.com) + whole.com_rate;
+  const Vec3<T> velocity = x.com_velocity_m_s - rotation_matrix(x.attitude) * of_com;
+  const Vec3<T> none{T(0), T(0), T(0)};
+  return {x.position_m, x.attitude, where(x.support > T(0), none, velocity), x.body_rate_rad_s};
+}
+
+template <class T>
+struct ImuSample {
+  Vec3<T> gyro_rad_s, accel_m_s2;
+};
+
+/// The IMU's own state, as rows.
+template <class T>
+struct Imu {
+  Quaternion<T> attitude;  // at the last sample
+  Vec3<T> velocity_m_s;    //   of the IMU, in W
+  ImuSample<T> low_passed;
+  Vec3<T> gyro_bias_rad_s;
+};
+
+/// conj(a) b.
+template <class T>
+FLAPPY_INLINE Quaternion<T> from_to(const Quaternion<T>& a, const Quaternion<T>& b) {
+  return {a.w * b.w + (a.x * b.x + (a.y * b.y + a.z * b.z)), a.w * b.x - (a.x * b.w + (a.y * b.z - a.z * b.y)),
+          a.w * b.y - (a.y * b.w + (a.z * b.x - a.x * b.z)), a.w * b.z - (a.z * b.w + (a.x * b.y - a.y * b.x))};
+}
+
+/// Rotation vector of a small turn, of either sign of the quaternion: 2 asin(n)/n e for e of length n, exact to n^4.
+template <class T>
+FLAPPY_INLINE Vec3<T> rotation_vector(const Quaternion<T>& q) {
+  const Vec3<T> e{q.x, q.y, q.z};
+  const T scale = T(2) + T(1.0 / 3) * dot(e, e);
+  return where(q.w < T(0), T(-scale), scale) * e;
+}
+
+/// Velocity in W of a point fixed in B.
+template <class T>
+FLAPPY_INLINE Vec3<T> point_velocity(const Truth<T>& t, const Vec3<T>& point_m) {
+  return t.velocity_m_s + rotation_matrix(t.attitude) * cross(t.body_rate_rad_s, point_m);
+}
+
+template <class T>
+FLAPPY_INLINE ImuSample<T> sample_imu(const ImuConstants<Element<T>>& k, const T& per_interval, const Truth<T>& t, Imu<T>& imu,
+                                      const sim::Normals4<T>& a, const sim::Normals4<T>& b) {
+  const Vec3<T> turn = rotation_vector(from_to(imu.attitude, t.attitude));
+  const Vec3<T> velocity = point_velocity(t, {T(k.position_m[0]), T(k.position_m[1]), T(k.position_m[2])});
+  Vec3<T> force = per_interval * (velocity - imu.velocity_m_s);
+  force.z += T(k.gravity_m_s2);
+  const Matrix3<T> halfway = rotation_matrix(turned(imu.attitude, T(0.25) * turn));
+  const ImuSample<T> mean{per_interval * turn, transpose_times(halfway, force)};
+  ImuSample<T>& y = imu.low_passed;
+  y.gyro_rad_s = add_scaled(y.gyro_rad_s, T(k.low_pass_share), mean.gyro_rad_s - y.gyro_rad_s);
+  y.accel_m_s2 = add_scaled(y.accel_m_s2, T(k.low_pass_share), mean.accel_m_s2 - y.accel_m_s2);
+  imu.attitude = t.attitude;
+  imu.velocity_m_s = velocity;
+  return {add_scaled(y.gyro_rad_s + imu.gyro_bias_rad_s, T(k.gyro_noise_rad_s), Vec3<T>{a.n[0], a.n[1], a.n[2]}),
+          add_scaled(y.accel_m_s2, T(k.accel_noise_m_s2), Vec3<T>{a.n[3], b.n[0], b.n[1]})};
+}
+
+/// A pose on its way, as rows; `valid` is 0 for a lost one.
+template <class T>
+struct MocapSample {
+  Vec3<T> position_m;
+  Quaternion<T> attitude;
+  T valid;
+};
+
+/// `seen`: 1 while the tracker sees the flapper, 0 in a burst of losses.
+template <class T>
+FLAPPY_INLINE MocapSample<T> sample_mocap(const MocapConstants<Element<T>>& k, const Truth<T>& t, T& seen,
+                                          const sim::Normals4<T>& a, const sim::Normals4<T>& b, const T& chance) {
+  const auto sees = seen > T(0);
+  seen = where(sees, where(chance < T(k.loss_begins), T(0), T(1)), where(chance < T(k.loss_ends), T(1), T(0)));
+  return {add_scaled(t.position_m, T(k.position_noise_m), Vec3<T>{a.n[0], a.n[1], a.n[2]}),
+          turned(t.attitude, T(0.5 * k.attitude_noise_rad) * Vec3<T>{a.n[3], b.n[0], b.n[1]}), seen};
+}
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::flight

@@ -1,0 +1,253 @@
+#include "flight/task.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/csv.hpp"
+
+namespace flappy::flight {
+namespace {
+
+constexpr double kFar = 1e9;
+
+struct PartInfo {
+  const char* name;
+  std::vector<Signal> signals;
+};
+
+/// What each Part shows, in the order of their bits. Ranges are what a flying vehicle stays in.
+const std::vector<PartInfo>& part_infos() {
+  static const std::vector<PartInfo> infos = [] {
+    std::vector<PartInfo> list = {
+        {"rotation_matrix", {}},
+        {"position_error", {{"x_error", "m", -1, 1}, {"y_error", "m", -1, 1}, {"z_error", "m", -1, 1}}},
+        {"velocity", {{"x_velocity", "m/s", -3, 3}, {"y_velocity", "m/s", -3, 3}, {"z_velocity", "m/s", -3, 3}}},
+        {"body_rate", {{"roll_rate", "rad/s", -50, 50}, {"pitch_rate", "rad/s", -50, 50}, {"yaw_rate", "rad/s", -50, 50}}},
+        {"beat_phase", {{"beat_sin", "1", -1, 1}, {"beat_cos", "1", -1, 1}}},
+        {"heading_error", {{"heading_sin", "1", -1, 1}, {"heading_cos", "1", -1, 1}}},
+        {"previous_action", {}}};
+    for (const char* row : {"x", "y", "z"})
+      for (const char* column : {"x", "y", "z"})
+        list[0].signals.push_back({std::string("R_") + row + column, "1", -1, 1});
+    for (const char* input : {"amplitude", "difference", "bias", "split_cycle"})
+      list[6].signals.push_back({std::string("previous_") + input, "1", -1, 1});
+    return list;
+  }();
+  return infos;
+}
+
+/// Quintic from rest to rest (minimum jerk).
+Segment<double> rest_to_rest(std::uint32_t start_tick, double duration_s, const double (&from)[4], const double (&to)[4]) {
+  Segment<double> s{start_tick, {}};
+  const double d3 = duration_s * duration_s * duration_s;
+  for (int c = 0; c < 4; ++c) {
+    const double way = to[c] - from[c];
+    const double a[6] = {from[c], 0, 0, 10 * way / d3, -15 * way / (d3 * duration_s), 6 * way / (d3 * duration_s * duration_s)};
+    std::copy(a, a + 6, s.coefficients[c]);
+  }
+  return s;
+}
+
+Segment<double> hold(std::uint32_t start_tick, const double (&at)[4]) {
+  Segment<double> s{start_tick, {}};
+  for (int c = 0; c < 4; ++c) s.coefficients[c][0] = at[c];
+  return s;
+}
+
+struct Knot {
+  std::uint32_t tick;
+  double at[4];
+};
+
+/// Velocities at the knots of the cubic spline through them that starts and ends at rest: its acceleration has no jumps.
+std::vector<double> spline_velocities(const std::vector<Knot>& knots, int c, double tick_s) {
+  const std::size_t n = knots.size();
+  std::vector<double> v(n, 0), upper(n, 0);
+  // tridiagonal: v[i-1]/h0 + 2 (1/h0 + 1/h1) v[i] + v[i+1]/h1 = 3 (d0/h0^2 + d1/h1^2)
+  for (std::size_t i = 1; i + 1 < n; ++i) {
+    const double h0 = tick_s * (knots[i].tick - knots[i - 1].tick), h1 = tick_s * (knots[i + 1].tick - knots[i].tick);
+    const double d0 = knots[i].at[c] - knots[i - 1].at[c], d1 = knots[i + 1].at[c] - knots[i].at[c];
+    const double pivot = 2 * (1 / h0 + 1 / h1) - upper[i - 1] / h0;
+    upper[i] = 1 / h1 / pivot;
+    v[i] = (3 * (d0 / (h0 * h0) + d1 / (h1 * h1)) - v[i - 1] / h0) / pivot;
+  }
+  for (std::size_t i = n; i-- > 1;)
+    if (i + 1 < n) v[i] -= upper[i] * v[i + 1];
+  return v;
+}
+
+std::vector<Segment<double>> spline(const std::vector<Knot>& knots, double tick_s) {
+  std::vector<Segment<double>> path;
+  for (std::size_t i = 0; i + 1 < knots.size(); ++i) path.push_back({knots[i].tick, {}});
+  for (int c = 0; c < 4; ++c) {
+    const std::vector<double> v = spline_velocities(knots, c, tick_s);
+    for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
+      const double h = tick_s * (knots[i + 1].tick - knots[i].tick), d = (knots[i + 1].at[c] - knots[i].at[c]) / h;
+      const double a[6] = {knots[i].at[c], v[i], (3 * d - 2 * v[i] - v[i + 1]) / h, (v[i] + v[i + 1] - 2 * d) / (h * h), 0, 0};
+      std::copy(a, a + 6, path[i].coefficients[c]);
+    }
+  }
+  path.push_back(hold(knots.back().tick, knots.back().at));
+  return path;
+}
+
+std::vector<Segment<double>> read_path(const io::Table& table, double tick_s) {
+  constexpr io::Range kPlace{-1e4, 1e4};
+  std::vector<Knot> knots;
+  const auto add = [&](double t_s, double x, double y, double z, double heading, const auto& refuse) {
+    const auto tick = static_cast<std::uint32_t>(std::lround(t_s / tick_s));
+    if (!knots.empty() && tick <= knots.back().tick) refuse();
+    knots.push_back({tick, {x, y, z, heading}});
+  };
+  const std::string kind = table.choice("path.kind", {"waypoints", "file"});
+  if (kind == "waypoints") {
+    for (const io::Table& p : table.tables("path.waypoint"))
+      add(p.number("t_s", {0, 1e5}), p.number("x_m", kPlace), p.number("y_m", kPlace), p.number("z_m", kPlace),
+          p.number_or("heading_rad", 0, {-100, 100}), [&] { p.fail("t_s", "is not after the one before", "times that increase"); });
+    if (knots.empty()) table.fail("path", "has no waypoint", "at least one [[path.waypoint]]");
+    if (knots[0].tick != 0) table.fail("path", "does not start at t_s = 0", "a first waypoint at 0");
+    std::vector<Segment<double>> path;
+    for (std::size_t i = 0; i + 1 < knots.size(); ++i)
+      path.push_back(rest_to_rest(knots[i].tick, tick_s * (knots[i + 1].tick - knots[i].tick), knots[i].at, knots[i + 1].at));
+    path.push_back(hold(knots.back().tick, knots.back().at));
+    return path;
+  }
+  const io::CsvTable csv = io::read_csv(table.file("path.file"));
+  const auto &t = csv.column("t_s"), &x = csv.column("x_m"), &y = csv.column("y_m"), &z = csv.column("z_m"),
+             &heading = csv.column("heading_rad");
+  for (std::size_t i = 0; i < t.size(); ++i)
+    add(t[i], x[i], y[i], z[i], heading[i], [&] {
+      throw io::InputError(csv.name + ":" + std::to_string(i + 2) + ": t_s is not a control period after the one before; times that increase");
+    });
+  if (knots.size() < 2 || knots[0].tick != 0)
+    throw io::InputError(csv.name + ": is no path; at least two rows, the first at t_s = 0");
+  return spline(knots, tick_s);
+}
+
+void read_spread(const io::Table& table, const std::string& key, Spread (&to)[3]) {
+  const auto part = table.optional_table(key);
+  if (!part) return;
+  const char* names[3] = {"x", "y", "z"};
+  for (int i = 0; i < 3; ++i) {
+    to[i].centre = part->number_or(names[i], 0, {-1e4, 1e4});
+    to[i].half = part->number_or(std::string(names[i]) + "_half", 0, {0, 1e4});
+  }
+}
+
+StartRange read_start(const io::Table& table) {
+  StartRange s;
+  s.kind = table.choice("start.kind", {"standing", "flying"}) == "standing" ? sim::Start::standing : sim::Start::flying;
+  read_spread(table, "start.position_m", s.position_m);
+  read_spread(table, "start.rotation_rad", s.rotation_rad);
+  read_spread(table, "start.velocity_m_s", s.velocity_m_s);
+  read_spread(table, "start.body_rate_rad_s", s.body_rate_rad_s);
+  s.x_low_m = table.number_or("start.x_low_m", -kFar, {-kFar, kFar});
+  s.x_high_m = table.number_or("start.x_high_m", kFar, {s.x_low_m, kFar});
+  return s;
+}
+
+Reward<double> read_reward(const io::Table& table) {
+  Reward<double> r{};
+  const auto weight = [&](const char* name) { return table.number_or(std::string("reward.") + name, 0, {-1e6, 1e6}); };
+  r.action = weight("action");
+  r.action_change = weight("action_change");
+  r.position = weight("position_1_m");
+  r.angles = weight("angles_1_rad");
+  r.velocity = weight("velocity_s_m");
+  r.body_rate = weight("body_rate_s_rad");
+  r.inverse_square = weight("inverse_square");
+  r.cost = weight("cost");
+  r.facing = weight("facing");
+  r.upright = weight("upright");
+  r.behind = weight("behind_1_m");
+  r.behind_m = weight("behind_m");
+  r.alive = weight("alive");
+  return r;
+}
+
+}  // namespace
+
+std::vector<Signal> Task::observation() const {
+  std::vector<Signal> list;
+  for (std::size_t i = 0; i < part_infos().size(); ++i)
+    if (parts >> i & 1) list.insert(list.end(), part_infos()[i].signals.begin(), part_infos()[i].signals.end());
+  return list;
+}
+
+std::vector<Signal> Task::action() const {
+  const char* names[kActions] = {"amplitude", "difference", "bias", "split_cycle"};
+  std::vector<Signal> list;
+  for (int i = 0; i < kActions; ++i)
+    list.push_back({names[i], i < 3 ? "V" : "1", constants.action_low[i], constants.action_high[i]});
+  return list;
+}
+
+sim::FlapperState Task::sample_start(sim::RandomKey key) const {
+  key.stream = sim::Stream::start;
+  std::uint32_t index = 0;
+  const auto draw = [&](const Spread& s) { return s.centre + s.half * (2 * sim::uniform_pair(key, index++).first - 1); };
+  sim::FlapperState s;
+  double turn[3];
+  for (int i = 0; i < 3; ++i) s.position_m[i] = draw(start.position_m[i]);
+  for (int i = 0; i < 3; ++i) turn[i] = draw(start.rotation_rad[i]);
+  for (int i = 0; i < 3; ++i) s.velocity_m_s[i] = draw(start.velocity_m_s[i]);
+  for (int i = 0; i < 3; ++i) s.body_rate_rad_s[i] = draw(start.body_rate_rad_s[i]);
+  s.position_m[0] = std::clamp(s.position_m[0], start.x_low_m, start.x_high_m);
+  const double angle = std::sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
+  const auto half = model::sin_cos_wide(angle / 2);
+  s.attitude[0] = half.cos;
+  for (int i = 0; i < 3; ++i) s.attitude[i + 1] = angle > 0 ? half.sin * turn[i] / angle : 0;
+  return s;
+}
+
+Task read_task(const io::Table& table, double tick_s) {
+  table.integer("schema", 1, 1);
+  Task task;
+  task.name = table.string("name");
+  task.start = read_start(table);
+  task.path = read_path(table, tick_s);
+
+  std::vector<std::string> names;
+  for (const PartInfo& info : part_infos()) names.emplace_back(info.name);
+  for (const std::string& name : table.strings("observation")) {
+    const auto found = std::ranges::find(names, name);
+    std::string known;
+    for (const std::string& n : names) known += (known.empty() ? "" : ", ") + n;
+    if (found == names.end()) table.fail("observation", "no part \"" + name + "\"", known + io::did_you_mean(name, names));
+    const auto bit = std::uint32_t{1} << (found - names.begin());
+    if (task.parts & bit) table.fail("observation", name + " is given twice", "each part once");
+    task.parts |= bit;
+  }
+
+  TaskConstants<double>& k = task.constants;
+  const char* inputs[kActions] = {"amplitude_V", "difference_V", "bias_V", "split_cycle"};
+  for (int i = 0; i < kActions; ++i) {
+    const std::vector<double> range = table.numbers(std::string("action.") + inputs[i], {-18, 18});
+    if (range.size() != 2 || range[0] > range[1])
+      table.fail(std::string("action.") + inputs[i], "is no range", "[low, high]: what -1 and 1 add");
+    k.action_low[i] = range[0];
+    k.action_high[i] = range[1];
+  }
+  k.reward = read_reward(table);
+
+  const auto limit = [&](const char* name, double otherwise) {
+    return table.number_or(std::string("end.") + name, otherwise, {-kFar, kFar});
+  };
+  k.contact_ends = table.boolean_or("end.contact", true) ? 1 : 0;
+  k.limits = {table.number("end.time_s", {tick_s, 1e6}), limit("x_low_m", -kFar), limit("x_high_m", kFar), limit("y_m", kFar),
+              limit("z_m", kFar), limit("distance_m", kFar), limit("faced_by_s", kFar), limit("arrived_by_s", kFar),
+              limit("arrived_x_m", -kFar)};
+
+  const auto back = table.optional_table("hand_back");
+  const auto bound = [&](const char* name, double otherwise) {
+    return back ? back->number_or(name, otherwise, {-kFar, kFar}) : otherwise;
+  };
+  k.hand_back = {back ? 1.0 : 0.0, bound("x_m", -kFar), bound("distance_m", kFar), bound("speed_x_m_s", kFar),
+                 bound("speed_m_s", kFar), bound("heading_rad", 4), bound("tilt_rad", 4), bound("body_rate_rad_s", kFar)};
+  for (double* angle : {&k.hand_back.heading_cos, &k.hand_back.tilt_cos})
+    *angle = *angle > std::numbers::pi ? -2 : model::sin_cos_wide(*angle).cos;
+  table.finish();
+  return task;
+}
+
+}  // namespace flappy::flight

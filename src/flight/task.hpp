@@ -1,0 +1,102 @@
+// What a flapper is to do: where it starts, the path it follows, what it observes, what a policy may add to the
+// controller's output, what that earns, and when it ends. Read from configs/tasks/*.toml.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "flappy/batch.hpp"
+#include "flight/path.hpp"
+#include "io/config.hpp"
+#include "sim/random.hpp"
+
+namespace flappy::flight {
+
+inline constexpr int kActions = 4;
+inline constexpr int kMaxObservation = 32;
+
+/// A row of the observation or the action, for who reads or exports it.
+struct Signal {
+  std::string name, unit;
+  double low, high;  ///< expected range; values outside are possible
+};
+
+/// Parts an observation may have, in the order of their bits. Those of a flapper's state are estimated.
+enum class Part { rotation_matrix, position_error, velocity, body_rate, beat_phase, heading_error, previous_action };
+
+/// Why an episode ended; bits. A time-out is a truncation, all others are terminations.
+enum Ended : std::uint32_t {
+  kTimeOut = 1,
+  kContact = 2,
+  kNotFinite = 4,
+  kOutOfBounds = 8,
+  kHeadingLate = 16,
+  kArrivalLate = 32,
+};
+
+/// Terms of the reward, as rows are scored each control period on the true state:
+///   C = |a|^2 action + |a - a_prev|^2 action_change + |p| position + |(roll, pitch, yaw)| angles + |v| velocity + |w| rate
+///   r = inverse_square / (C^2 + 1e-6) - cost C + facing R'_00 + upright min(0, R'_22) + behind min(0, x + behind_m) + alive
+/// with p, x and R' relative to the set point.
+template <class T>
+struct Reward {
+  T action, action_change, position, angles, velocity, body_rate;
+  T inverse_square, cost, facing, upright, behind, behind_m, alive;
+};
+
+/// When an episode ends, positions relative to the set point. Unused limits are far away.
+template <class T>
+struct Limits {
+  T time_s;
+  T x_low_m, x_high_m, y_m, z_m, distance_m;
+  T faced_by_s;              // after it, R'_00 < 0 ends the episode
+  T arrived_by_s, arrived_x_m;  // after it, x < arrived_x_m does
+};
+
+/// When a policy is done for good and the controller flies alone, on the true state.
+template <class T>
+struct HandBack {
+  T enabled;  // 0 or 1
+  T x_m, distance_m, speed_x_m_s, speed_m_s, heading_cos, tilt_cos, body_rate_rad_s;
+};
+
+template <class T>
+struct TaskConstants {
+  T action_low[kActions], action_high[kActions];  // V, V, V, split cycle: what -1 and 1 add
+  Reward<T> reward;
+  Limits<T> limits;
+  HandBack<T> hand_back;
+  T contact_ends;  // 0 or 1
+  T tick_s;
+};
+
+/// Uniform within +-half about the centre.
+struct Spread {
+  double centre = 0, half = 0;
+};
+
+/// Where episodes start.
+struct StartRange {
+  sim::Start kind = sim::Start::flying;
+  Spread position_m[3], rotation_rad[3], velocity_m_s[3], body_rate_rad_s[3];
+  double x_low_m = -1e9, x_high_m = 1e9;  ///< x is clamped to it
+};
+
+struct Task {
+  std::string name;
+  StartRange start;
+  std::vector<Segment<double>> path;
+  std::uint32_t parts = 0;  ///< bit of each Part observed
+  TaskConstants<double> constants{};
+
+  std::vector<Signal> observation() const;
+  std::vector<Signal> action() const;
+  /// Where the episode of this key starts.
+  sim::FlapperState sample_start(sim::RandomKey key) const;
+};
+
+/// Reads a task. Path times become whole control ticks of `tick_s`.
+Task read_task(const io::Table& table, double tick_s);
+
+}  // namespace flappy::flight

@@ -1,0 +1,52 @@
+// Between rows of numbers, one for each member of a struct, and structs of lanes. For files that are compiled once for
+// each instruction set.
+#pragma once
+
+#include "sim/lanes.hpp"
+
+namespace flappy::sim {
+inline namespace FLAPPY_ISA {
+
+using model::Lanes;
+
+#if defined(FLAPPY_SCALAR)
+template <class T>
+inline constexpr int kWidth = 1;
+#elif defined(__AVX512F__)
+template <class T>
+inline constexpr int kWidth = 64 / sizeof(T);
+#elif defined(__AVX2__)
+template <class T>
+inline constexpr int kWidth = 32 / sizeof(T);
+#else
+template <class T>
+inline constexpr int kWidth = 16 / sizeof(T);
+#endif
+
+template <class S, class T, int lanes>
+FLAPPY_INLINE S load_rows(const T (*rows)[lanes], int first) {
+  S s;
+  using L = Lanes<T, kWidth<T>>;
+  static_assert(sizeof(S) % sizeof(L) == 0);
+  L* to = reinterpret_cast<L*>(&s);
+  for (std::size_t i = 0; i < sizeof(S) / sizeof(L); ++i) to[i] = L::load(rows[i] + first);
+  return s;
+}
+
+/// Rows to read from again and again: in place where lanes fill a row, a copy where they are part of one. In place they
+/// leave the stack, whose spills would otherwise collide with them in the cache: 4 % of the step.
+template <class S, class T, int lanes>
+FLAPPY_INLINE decltype(auto) view_rows(const T (*rows)[lanes], int first) {
+  if constexpr (kWidth<T> == lanes) return (*reinterpret_cast<const S*>(rows));
+  else return load_rows<S>(rows, first);
+}
+
+template <class S, class T, int lanes>
+FLAPPY_INLINE void store_rows(const S& s, T (*rows)[lanes], int first) {
+  using L = Lanes<T, kWidth<T>>;
+  const L* from = reinterpret_cast<const L*>(&s);
+  for (std::size_t i = 0; i < sizeof(S) / sizeof(L); ++i) from[i].store(rows[i] + first);
+}
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::sim

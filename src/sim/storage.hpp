@@ -1,0 +1,78 @@
+// What a Batch holds, for the rooms that work on its blocks.
+#pragma once
+
+#include <bit>
+
+#include "flappy/batch.hpp"
+#include "model/effects/registry.hpp"
+#include "sim/step.hpp"
+
+namespace flappy::sim {
+
+/// Copies a struct of numbers into one lane of its rows, or back.
+template <class S, class T, int lanes>
+void put(const S& s, T (*rows)[lanes], int lane) {
+  const double* from = reinterpret_cast<const double*>(&s);
+  for (std::size_t i = 0; i < sizeof(S) / sizeof(double); ++i) rows[i][lane] = static_cast<T>(from[i]);
+}
+template <class S, class T, int lanes>
+S get(const T (*rows)[lanes], int lane) {
+  S s;
+  double* to = reinterpret_cast<double*>(&s);
+  for (std::size_t i = 0; i < sizeof(S) / sizeof(double); ++i) to[i] = rows[i][lane];
+  return s;
+}
+
+inline std::uint64_t mixed(std::uint64_t h, std::uint64_t word) {  // splitmix64's finaliser
+  h = (h ^ word) * 0x9e3779b97f4a7c15ULL;
+  h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  h = (h ^ (h >> 27)) * 0x94d049bb133111ebULL;
+  return h ^ (h >> 31);
+}
+
+template <class T>
+std::uint64_t bits_of(T value) {
+  if constexpr (sizeof(T) == 4) return std::bit_cast<std::uint32_t>(value);
+  else return std::bit_cast<std::uint64_t>(value);
+}
+
+template <class T>
+struct Batch<T>::Storage {
+  std::size_t count = 0;
+  int threads = 1;
+  double step_s = 0;
+  int steps_per_update = 1;
+  World world;
+  double hold_s = 0;
+  std::int64_t steps = 0;
+  StepBlock<T> kernel = nullptr;
+  std::vector<Block<T>> blocks;
+  std::vector<std::uint64_t> lane_effects;   // set of each lane; empty while no flapper has an effect
+  std::vector<std::uint64_t> block_effects;  // their union
+  std::vector<T> effect_rows;                // [block][row][lane]
+
+  struct Place {
+    Block<T>& block;
+    int lane;
+  };
+  Place at(std::size_t i) {
+    if (i >= count)
+      throw std::out_of_range("no flapper " + std::to_string(i) + " in a batch of " + std::to_string(count));
+    return {blocks[i / kLanes<T>], static_cast<int>(i % kLanes<T>)};
+  }
+  StepPlan plan() const {
+    return {step_s,          steps_per_update, world.gravity_m_s2, world.ground_z_m, world.ceiling_z_m,
+            world.walls.data(), world.walls.size()};
+  }
+  BlockEffects<T> effects_of(std::size_t b) const {
+    if (block_effects.empty()) return {};
+    return {block_effects[b], &effect_rows[b * model::kEffectRows * kLanes<T>]};
+  }
+  const Block<T>* block_after(std::size_t b) const { return b + 1 < blocks.size() ? &blocks[b + 1] : nullptr; }
+
+  void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v);
+  void put_effects(std::size_t i, const model::Vehicle& v);
+  void put_effect_rows(std::size_t i, const model::Vehicle& v);
+};
+
+}  // namespace flappy::sim
