@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 namespace flappy::flight {
 namespace {
@@ -12,6 +13,8 @@ constexpr double kSame_s = 1e-9;  // times closer than this are the same
 
 Schedule::Schedule(const Sensors& sensors, double step_s, int period_steps)
     : sensors_(sensors), step_s_(step_s), lag_s_(low_pass_lag_s(sensors.imu)), period_steps_(period_steps) {
+  if (sensors.imu.rate_hz * step_s > 1 + 1e-9 || sensors.mocap.rate_hz * step_s > 1 + 1e-9)
+    throw std::invalid_argument("a sensor's rate is above that of the physics steps");
   const double period_s = step_s * period_steps;
   // from the horizon to the newest increment: a pose's way, the wait for the next one, and two periods of rounding
   const double reach_s = sensors.mocap.latency_s + 1 / sensors.mocap.rate_hz + sensors.imu.latency_s + lag_s_ +
@@ -84,6 +87,7 @@ void Schedule::fuse_arrived() {
       const double duration = e.to_s - e.from_s, until = std::min(e.to_s, target);
       if (until > horizon_s_ + kSame_s) period_.advance.push_back({e.slot, (until - horizon_s_) / duration, duration});
       horizon_s_ = std::max(horizon_s_, until);
+      period_.newest = {e.slot, 1, duration};  // unless replay knows a newer one
       if (e.to_s > target + kSame_s) break;
       ring_.pop_front();
     }

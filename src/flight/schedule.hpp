@@ -45,7 +45,8 @@ struct Period {
 
 class Schedule {
  public:
-  /// `period_steps` physics steps of `step_s` in a control period.
+  /// `period_steps` physics steps of `step_s` in a control period. std::invalid_argument where a sensor would sample more
+  /// than once in a step.
   Schedule(const Sensors& sensors, double step_s, int period_steps);
 
   const Period& next();
