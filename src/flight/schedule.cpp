@@ -66,7 +66,8 @@ void Schedule::sample(std::int64_t end) {
   }
   if (last_imu_s_ > gathered_from_s) {
     period_.push_slot = static_cast<int>(pushed_++ % ring_slots_);
-    ring_.push_back({period_.push_slot, gathered_from_s - lag_s_, last_imu_s_ - lag_s_, last_imu_s_ + sensors_.imu.latency_s});
+    ring_.push_back(
+        {period_.push_slot, gathered_from_s - lag_s_, last_imu_s_ - lag_s_, last_imu_s_ + sensors_.imu.latency_s});
   }
 }
 
@@ -78,7 +79,8 @@ void Schedule::fuse_arrived() {
       if (e.arrival_s <= now_s() + kSame_s) until = e.to_s;
     return until;
   }();
-  while (!queue_.empty() && queue_.front().arrival_s <= now_s() + kSame_s && queue_.front().time_s <= covered_s + kSame_s) {
+  while (!queue_.empty() && queue_.front().arrival_s <= now_s() + kSame_s &&
+         queue_.front().time_s <= covered_s + kSame_s) {
     Fuse fuse{queue_.front().slot, static_cast<int>(period_.advance.size()), 0};
     const double target = queue_.front().time_s;
     queue_.pop_front();

@@ -17,7 +17,8 @@ inline Sensors sensors(const std::string& name, const Overrides& overrides = {})
 }
 inline Controller controller(const std::string& name, const Overrides& overrides = {}) {
   if (name == "none") return {};
-  return read_controller(io::Config::load(test::source_path("configs/controllers/" + name + ".toml"), overrides).root());
+  return read_controller(
+      io::Config::load(test::source_path("configs/controllers/" + name + ".toml"), overrides).root());
 }
 inline Task task(const std::string& text, double tick_s = 0.002) {
   return read_task(io::Config::parse(text, "task.toml").root(), tick_s);
@@ -48,9 +49,12 @@ inline std::string along(const std::string& waypoints, const std::string& start 
   return "schema = 1\nname = \"test\"\nobservation = [" + observation + "]\n[start]\n" + start +
          "\n[path]\nkind = \"waypoints\"\n" + waypoints + kPlainTask;
 }
-inline std::string staying(const std::string& start = "kind = \"flying\"") { return along(waypoint(0, 0, 0, 0), start); }
+inline std::string staying(const std::string& start = "kind = \"flying\"") {
+  return along(waypoint(0, 0, 0, 0), start);
+}
 
-inline FleetOptions fleet_options(const Sensors& sensors, const Controller& controller, const Task& task, int threads = 0) {
+inline FleetOptions fleet_options(const Sensors& sensors, const Controller& controller, const Task& task,
+                                  int threads = 0) {
   FleetOptions o;
   o.sensors = sensors;
   o.controller = controller;

@@ -54,10 +54,12 @@ class Follower {
     if (!p.fuse.empty()) present_s_ = horizon_s_;
     for (const Advance& a : p.replay) present_s_ = walk(present_s_, a, "replay");
     expect(present_s_ >= before - kSame_s || !p.fuse.empty(), "the present goes back");
-    expect(near(present_s_, std::max(covered_s_, horizon_s_)), "the present is not where the IMU's arrived samples end");
+    expect(near(present_s_, std::max(covered_s_, horizon_s_)),
+           "the present is not where the IMU's arrived samples end");
     expect(near(p.ahead_s, now_s() - present_s_), "ahead_s");
     const auto next = poses_.find(next_pose_);
-    expect(next == poses_.end() || next->second.arrival_s > now_s() + kSame_s || next->second.time_s > covered_s_ + kSame_s,
+    expect(next == poses_.end() || next->second.arrival_s > now_s() + kSame_s ||
+               next->second.time_s > covered_s_ + kSame_s,
            "a pose could have been fused");
     if (newest_) {
       expect(p.newest.slot >= 0 && near(ring_[p.newest.slot].to_s, newest_->to_s) && p.newest.share == 1 &&
@@ -96,8 +98,9 @@ class Follower {
       steps_ += s.steps;
       expect(s.imu == (steps_ == sample_step(c_.imu_hz, imu_ + 1)), "an IMU sample at the wrong step");
       expect(s.mocap == (steps_ == sample_step(c_.mocap_hz, mocap_ + 1)), "a pose at the wrong step");
-      expect(steps_ < sample_step(c_.imu_hz, imu_ + 1) + s.imu && steps_ < sample_step(c_.mocap_hz, mocap_ + 1) + s.mocap,
-             "a sample was left out");
+      expect(
+          steps_ < sample_step(c_.imu_hz, imu_ + 1) + s.imu && steps_ < sample_step(c_.mocap_hz, mocap_ + 1) + s.mocap,
+          "a sample was left out");
       if (s.imu) {
         expect(s.imu_index == imu_, "imu_index");
         expect(near(s.imu_interval_s, now_s() - static_cast<double>(last_imu_) * kStep_s), "imu_interval_s");
@@ -144,7 +147,8 @@ class Follower {
     expect(pose != poses_.end() && queue_.at(f.slot) == next_pose_, "a pose out of order, twice, or overwritten");
     if (pose == poses_.end()) return;
     expect(pose->second.arrival_s <= now_s() + kSame_s, "a pose is fused before it has arrived");
-    for (int i = 0; i < f.count; ++i) horizon_s_ = walk(horizon_s_, p.advance[static_cast<std::size_t>(f.first + i)], "advance");
+    for (int i = 0; i < f.count; ++i)
+      horizon_s_ = walk(horizon_s_, p.advance[static_cast<std::size_t>(f.first + i)], "advance");
     expect(near(horizon_s_, pose->second.time_s), "the horizon does not end at the time of the pose");
     ++next_pose_;
   }
