@@ -37,7 +37,8 @@ Actor random_actor(std::vector<int> widths, Activation hidden, std::uint32_t see
 }
 
 std::vector<double> expected(const Actor& a, std::vector<double> x) {
-  for (std::size_t i = 0; i < x.size(); ++i) x[i] = std::min(std::max((x[i] - a.mean[i]) * a.scale[i], -a.clip), a.clip);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    x[i] = std::min(std::max((x[i] - a.mean[i]) * a.scale[i], -a.clip), a.clip);
   std::size_t weight = 0;
   for (std::size_t layer = 1; layer < a.widths.size(); ++layer) {
     std::vector<double> y;
@@ -92,7 +93,8 @@ void lanes_agree() {
         for (const L& row : in) alone.push_back(row.raw[i]);
         const std::vector<double> y = expected(a, alone);
         for (std::size_t k = 0; k < y.size(); ++k)
-          EXPECT_NEAR(out[k].raw[i], y[k], 40 * std::numeric_limits<T>::epsilon()) << widths.size() << " layers, lane " << i;
+          EXPECT_NEAR(out[k].raw[i], y[k], 40 * std::numeric_limits<T>::epsilon())
+              << widths.size() << " layers, lane " << i;
       }
       // a lane of NaN is nobody else's affair
       const std::vector<L> good = in;
@@ -158,7 +160,8 @@ TEST(Actor, MustFitItsTask) {
   other = fitting(o.task);
   std::swap(other.action[0], other.action[1]);
   EXPECT_THROW(fleet.set_actor(std::make_shared<Actor>(other)), std::invalid_argument);
-  EXPECT_THROW(fleet.set_actor(std::make_shared<Actor>(random_actor({40, 4}, Activation::relu, 1))), std::invalid_argument);
+  EXPECT_THROW(fleet.set_actor(std::make_shared<Actor>(random_actor({40, 4}, Activation::relu, 1))),
+               std::invalid_argument);
   fleet.step();  // and goes on with the one it had
   EXPECT_NO_THROW(fleet.set_actor(nullptr));
 }
@@ -217,7 +220,8 @@ TEST(ActorFile, RefusesWhatIsNoActor) {
   has(with([](Actor& a) { a.widths = {3, 0, 4}; }), "0 wide");
   has(with([](Actor& a) { a.widths = {3, -5, 4}; }), "-5 wide");
   has(with([](Actor& a) { a.widths = {3, 5, 3}; }), "widths has 3");
-  has(with([](Actor& a) { a.weights[7] = std::numeric_limits<double>::quiet_NaN(); }), "weights has null in it; numbers");
+  has(with([](Actor& a) { a.weights[7] = std::numeric_limits<double>::quiet_NaN(); }),
+      "weights has null in it; numbers");
   has(with([](Actor& a) { a.mean[1] = std::numeric_limits<double>::infinity(); }), "mean has null in it; numbers");
   has(with([](Actor& a) { a.clip = -1; }), "clip is -1");
   has(with([](Actor& a) { a.clip = 0; }), "clip is 0");
@@ -233,7 +237,8 @@ TEST(ActorFile, RefusesWhatIsNoActor) {
   has(edited("\"schema\":1", "\"schema\":2"), "schema");
   has(edited("\"relu\"", "\"gelu\""), "gelu");
   has(edited("\"relu\"", "5"), "string");
-  for (const char* key : {"schema", "task", "observation", "action", "widths", "hidden", "mean", "scale", "clip", "weights"})
+  for (const char* key :
+       {"schema", "task", "observation", "action", "widths", "hidden", "mean", "scale", "clip", "weights"})
     has(edited("\"" + std::string(key) + "\":", "\"x\":"), key);
   has(edited("\"widths\":[3,", "\"widths\":[\"a\","), "number");
   has(edited("\"widths\":[3,", "\"widths\":[true,"), "whole numbers");

@@ -54,7 +54,7 @@ inline std::string staying(const std::string& start = "kind = \"flying\"") {
 }
 
 inline FleetOptions fleet_options(const Sensors& sensors, const Controller& controller, const Task& task,
-                                  int threads = 0) {
+                                  int threads = 1) {
   FleetOptions o;
   o.sensors = sensors;
   o.controller = controller;

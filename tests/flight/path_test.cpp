@@ -41,7 +41,8 @@ Setpoint<One> setpoint(const std::vector<Segment<double>>& path, std::uint32_t t
 }
 
 TEST(Waypoints, GoFromRestToRest) {
-  const Task t = task(along(waypoint(0, 0.1, 0.2, 0.3, -1) + waypoint(1.5, 0.4, -0.2, 0.9, 2) + waypoint(2.5, 0.4, 1, 0, 2)));
+  const Task t =
+      task(along(waypoint(0, 0.1, 0.2, 0.3, -1) + waypoint(1.5, 0.4, -0.2, 0.9, 2) + waypoint(2.5, 0.4, 1, 0, 2)));
   ASSERT_EQ(t.path.size(), 3u);
   const double places[3][4] = {{0.1, 0.2, 0.3, -1}, {0.4, -0.2, 0.9, 2}, {0.4, 1, 0, 2}};
   const double times[3] = {0, 1.5, 2.5};
@@ -70,7 +71,8 @@ TEST(Waypoints, GoFromRestToRest) {
 }
 
 TEST(Setpoint, IsThePolynomialAndItsDerivatives) {
-  const Task t = task(along(waypoint(0, 0.1, 0.2, 0.3, -1) + waypoint(1.5, 0.4, -0.2, 0.9, 2) + waypoint(2.5, 0.4, 1, 0, 2)));
+  const Task t =
+      task(along(waypoint(0, 0.1, 0.2, 0.3, -1) + waypoint(1.5, 0.4, -0.2, 0.9, 2) + waypoint(2.5, 0.4, 1, 0, 2)));
   for (const std::uint32_t tick : {0u, 1u, 333u, 749u, 750u, 751u, 1249u, 1250u, 5000u}) {
     const Point p = at(t.path, tick * kTick_s, tick < 750 ? 0 : tick < 1250 ? 1 : 2);
     const Setpoint<One> s = setpoint(t.path, tick);
@@ -90,7 +92,8 @@ TEST(Setpoint, IsThePolynomialAndItsDerivatives) {
 
 TEST(Setpoint, EachLaneIsWhereItIsAlone) {
   using Four = model::Lanes<float, 4>;
-  const Task t = task(along(waypoint(0, 0, 0, 0) + waypoint(0.2, 1, 2, 3, 1) + waypoint(0.3, 2, 1, 0, -1) + waypoint(0.9, 0, 0, 1)));
+  const Task t = task(
+      along(waypoint(0, 0, 0, 0) + waypoint(0.2, 1, 2, 3, 1) + waypoint(0.3, 2, 1, 0, -1) + waypoint(0.9, 0, 0, 1)));
   std::vector<Segment<float>> path;
   for (const Segment<double>& s : t.path) {
     Segment<float> f{s.start_tick, {}};
@@ -107,7 +110,8 @@ TEST(Setpoint, EachLaneIsWhereItIsAlone) {
       const auto one = setpoint_at<model::Lanes<float, 1>>(view, tick + i, &alone);
       ASSERT_EQ(segment[i], alone);
       for (std::size_t k = 0; k < sizeof s / sizeof(Four); ++k)
-        ASSERT_EQ(reinterpret_cast<const Four*>(&s)[k].raw[i], (reinterpret_cast<const model::Lanes<float, 1>*>(&one)[k].raw[0]))
+        ASSERT_EQ(reinterpret_cast<const Four*>(&s)[k].raw[i],
+                  (reinterpret_cast<const model::Lanes<float, 1>*>(&one)[k].raw[0]))
             << "tick " << tick[i] << ", number " << k;
     }
     for (std::uint32_t& t_i : tick) ++t_i;

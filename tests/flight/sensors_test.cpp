@@ -28,8 +28,10 @@ Q after(const Q& from, const V& turn) {
   const double angle = std::sqrt(model::dot(turn, turn));
   const double s = angle > 0 ? std::sin(angle / 2) / angle : 0.5, c = std::cos(angle / 2);
   const Q r{c, s * turn.x, s * turn.y, s * turn.z};
-  return {from.w * r.w - from.x * r.x - from.y * r.y - from.z * r.z, from.w * r.x + from.x * r.w + from.y * r.z - from.z * r.y,
-          from.w * r.y + from.y * r.w + from.z * r.x - from.x * r.z, from.w * r.z + from.z * r.w + from.x * r.y - from.y * r.x};
+  return {from.w * r.w - from.x * r.x - from.y * r.y - from.z * r.z,
+          from.w * r.x + from.x * r.w + from.y * r.z - from.z * r.y,
+          from.w * r.y + from.y * r.w + from.z * r.x - from.x * r.z,
+          from.w * r.z + from.z * r.w + from.x * r.y - from.y * r.x};
 }
 
 ImuConstants<double> quiet(const V& position_m, double low_pass_share = 1) {
@@ -37,7 +39,8 @@ ImuConstants<double> quiet(const V& position_m, double low_pass_share = 1) {
 }
 
 /// One sample of an IMU between two true states.
-ImuSample<double> between(const ImuConstants<double>& k, double interval_s, const Truth<double>& a, const Truth<double>& b) {
+ImuSample<double> between(const ImuConstants<double>& k, double interval_s, const Truth<double>& a,
+                          const Truth<double>& b) {
   Imu<double> imu{};
   imu.attitude = a.attitude;
   imu.velocity_m_s = point_velocity(a, {k.position_m[0], k.position_m[1], k.position_m[2]});
@@ -53,7 +56,8 @@ TEST(Imu, AtRestReadsGravityUpwardAndNoRate) {
   }
   // level, and rolled to the left side: up is then to the right, -y... of a body whose +y axis points down
   const Truth<double> left_down{{}, after({1, 0, 0, 0}, {-M_PI / 2, 0, 0}), {0, 0, 0}, {0, 0, 0}};
-  expect_near(between(quiet({}), 0.002, left_down, left_down).accel_m_s2, {0, -kGravity, 0}, 1e-14, "rolled to the left");
+  expect_near(between(quiet({}), 0.002, left_down, left_down).accel_m_s2, {0, -kGravity, 0}, 1e-14,
+              "rolled to the left");
 }
 
 /// A body that starts at rate w, turns ever faster about a fixed axis, and whose origin accelerates: all in closed form.
@@ -73,7 +77,8 @@ struct Spin {
   V force(double t, const V& r) const {
     const V w = (rate + growth * t) * axis, alpha = growth * axis;
     const V up{0, 0, kGravity};
-    return transpose_times(rotation_matrix(at(t).attitude), acceleration + up) + cross(alpha, r) + cross(w, cross(w, r));
+    return transpose_times(rotation_matrix(at(t).attitude), acceleration + up) + cross(alpha, r) +
+           cross(w, cross(w, r));
   }
 };
 
@@ -235,7 +240,8 @@ TEST_P(Presets, NoiseIsWhiteAndAsWideAsStated) {
         all.other += x * seen[i][other][j] * shown[k / 3] / shown[other / 3];
       }
     double sd = shown[k / 3];
-    if (k < 3) {  // its own mean was taken out: one degree of freedom for each flight, and x_j x_j-1 loses sd^2/n on the way
+    if (k <
+        3) {  // its own mean was taken out: one degree of freedom for each flight, and x_j x_j-1 loses sd^2/n on the way
       sd *= std::sqrt(1 - 1 / n);
       all.lagged += all.square / n * (1 - 1 / n);
     }
@@ -289,7 +295,8 @@ TEST(Mocap, LosesBurstsOfSamples) {
   EXPECT_NEAR(lost / n, kFraction, kSigmas * std::sqrt(kFraction * (1 - kFraction) / n * (1 + kRho) / (1 - kRho)));
   // geometric lengths: mean L, variance L (L - 1); the fraction above 10 is (1 - 1/L)^10. Bursts that the end cuts off are
   // left out, which shortens the mean by no more than L/400 of L.
-  EXPECT_NEAR(in_bursts / bursts, kLength, kSigmas * std::sqrt(kLength * (kLength - 1) / bursts) + kLength * kLength / 400);
+  EXPECT_NEAR(in_bursts / bursts, kLength,
+              kSigmas * std::sqrt(kLength * (kLength - 1) / bursts) + kLength * kLength / 400);
   const double longer = std::pow(1 - 1 / kLength, 10);
   EXPECT_NEAR(long_bursts / bursts, longer, kSigmas * std::sqrt(longer / bursts) + 0.01);
 }
