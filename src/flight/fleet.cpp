@@ -131,6 +131,10 @@ struct Fleet<T>::Storage {
     plan.arc = rounded<T>(fill(c.arc));
     TaskConstants<double> task = options.task.constants;
     task.tick_s = period_s;
+    // half-way between ticks, so that rounding cannot move an end by one
+    task.limits.time_s = (std::ceil(task.limits.time_s / period_s - 1e-6) - 0.5) * period_s;
+    for (double* after : {&task.limits.faced_by_s, &task.limits.arrived_by_s})
+      *after = (std::floor(*after / period_s + 1e-6) + 0.5) * period_s;
     plan.task = rounded<T>(task);
     plan.parts = options.task.parts;
     plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(period_s)};

@@ -16,11 +16,12 @@ Schedule::Schedule(const Sensors& sensors, double step_s, int period_steps)
   if (sensors.imu.rate_hz * step_s > 1 + 1e-9 || sensors.mocap.rate_hz * step_s > 1 + 1e-9)
     throw std::invalid_argument("a sensor's rate is above that of the physics steps");
   const double period_s = step_s * period_steps;
-  // from the horizon to the newest increment: a pose's way, the wait for the next one, and two periods of rounding
-  const double reach_s = sensors.mocap.latency_s + 1 / sensors.mocap.rate_hz + sensors.imu.latency_s + lag_s_ +
-                         1 / sensors.imu.rate_hz + 2 * period_s;
-  ring_slots_ = static_cast<int>(std::ceil(reach_s / period_s)) + 2;
-  queue_slots_ = static_cast<int>(std::ceil(reach_s * sensors.mocap.rate_hz)) + 2;
+  // a pose waits until it and the IMU's samples of its time have arrived, and for the end of the period; the ring holds what
+  // the IMU gathered since the pose before it
+  const double wait_s =
+      period_s + std::max(sensors.mocap.latency_s, sensors.imu.latency_s + lag_s_ + 1 / sensors.imu.rate_hz + period_s);
+  ring_slots_ = static_cast<int>(std::ceil((wait_s + 1 / sensors.mocap.rate_hz) / period_s)) + 2;
+  queue_slots_ = static_cast<int>(std::ceil(wait_s * sensors.mocap.rate_hz)) + 1;
   horizon_s_ = present_s_ = -lag_s_;
 }
 
