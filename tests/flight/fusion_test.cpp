@@ -542,7 +542,8 @@ TEST(FleetFusion, InnovationsAreAsPredicted) {
 TEST(FleetFusion, StartsAnewOnTheWayAsWellAsFresh) {
   constexpr std::size_t kCount = 256;
   for (const Overrides& rates : {Overrides{"imu.rate_hz=333.0", "mocap.rate_hz=97.0", "mocap.latency_s=0.0333"},
-                                 {"imu.latency_s=0.003", "imu.low_pass_hz=60.0"}}) {
+                                 {"imu.latency_s=0.003", "imu.low_pass_hz=60.0"},
+                                 {"mocap.latency_s=0.0", "imu.rate_hz=90.0"}}) {
     const FleetOptions o = fleet_options(sensors("paper", rates), controller("pid"), travelling());
     Fleet<float> fresh(kCount, test::nominal(), o), again(kCount, test::nominal(), o);
     for (int period = 0; period < 101; ++period) again.step();  // 0.202 s: amid samples, poses on their way
