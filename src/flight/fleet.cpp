@@ -450,6 +450,13 @@ std::pair<double, double> Fleet<T>::innovation(std::size_t i) const {
 }
 
 template <class T>
+std::array<double, 3> Fleet<T>::gyro_bias_rad_s(std::size_t i) const {
+  const auto [f, lane] = storage_->at(i);
+  const auto bias = get<Imu<double>>(f.imu, lane).gyro_bias_rad_s;
+  return {bias.x, bias.y, bias.z};
+}
+
+template <class T>
 void Fleet<T>::record(bool on) {
   storage_->recording = on;
 }

@@ -47,12 +47,14 @@ sim::World read_world(const io::Table& root) {
   w.gravity_m_s2 = table->number_or("gravity_m_s2", w.gravity_m_s2, {0, 100});
   w.ground_z_m = table->number_or("ground_z_m", w.ground_z_m, kPlace);
   w.ceiling_z_m = table->number_or("ceiling_z_m", w.ceiling_z_m, kPlace);
-  if (w.ceiling_z_m <= w.ground_z_m) table->fail("ceiling_z_m", "is not above the ground", "a ceiling above ground_z_m");
+  if (w.ceiling_z_m <= w.ground_z_m)
+    table->fail("ceiling_z_m", "is not above the ground", "a ceiling above ground_z_m");
   if (!table->has("walls")) return w;
   for (const auto& row : table->rows("walls", 4, kPlace)) {
     const double length = std::hypot(row[2], row[3]);
     if (std::abs(length - 1) > 1e-3)
-      table->fail("walls", "normal of wall " + std::to_string(w.walls.size()) + " has length " + io::shortest_digits(length),
+      table->fail("walls",
+                  "normal of wall " + std::to_string(w.walls.size()) + " has length " + io::shortest_digits(length),
                   "[x_m, y_m, normal_x, normal_y], the normal of length 1");
     w.walls.push_back({row[0], row[1], row[2] / length, row[3] / length});
   }
@@ -64,7 +66,8 @@ LogOptions read_log(const io::Table& root, double control_hz) {
   LogOptions log;
   if (const auto t = root.optional_table("log.power"))
     log.power = {t->number("battery_nominal_V", io::positive(100)), t->number("rate_hz", rate),
-                 t->number("latency_s", noise), t->number("voltage_noise_V", noise), t->number("current_noise_A", noise)};
+                 t->number("latency_s", noise), t->number("voltage_noise_V", noise),
+                 t->number("current_noise_A", noise)};
   if (const auto t = root.optional_table("log.wings"))
     log.wings = {t->number("rate_hz", rate), t->number("noise_rad", io::non_negative(1))};
   return log;
@@ -145,7 +148,8 @@ class Reader {
     c_.fleet.sensors = read("sensors", read_sensors);
     c_.fleet.controller = read("controller", read_controller);
     if (root_.has("randomisation")) {
-      c_.randomisation = read("randomisation", [&](const io::Table& t) { return sim::read_randomisation(c_.vehicle, t); });
+      c_.randomisation =
+          read("randomisation", [&](const io::Table& t) { return sim::read_randomisation(c_.vehicle, t); });
       c_.vehicle_sha256.clear();
     } else if (!to_["randomisation"].empty()) {
       root_.fail("randomisation", "is missing, but overridden", "a file of [[randomise]] tables");
@@ -158,11 +162,13 @@ class Reader {
     if (!whole(1 / (o.control_hz * step)))
       root_.fail("flight.control_hz", "its period is no whole number of steps", "1 / (n step_s)");
     if (!whole(c_.vehicle.driver.hold_s / step))
-      root_.fail("flight.step_s", "does not divide the driver's hold of " + io::shortest_digits(c_.vehicle.driver.hold_s) + " s",
+      root_.fail("flight.step_s",
+                 "does not divide the driver's hold of " + io::shortest_digits(c_.vehicle.driver.hold_s) + " s",
                  "hold_s / n");
     for (const double rate : {o.sensors.imu.rate_hz, o.sensors.mocap.rate_hz})
       if (rate * step > 1 + 1e-9)
-        root_.fail("flight.step_s", "is longer than the " + io::shortest_digits(1 / rate) + " s between samples of a sensor",
+        root_.fail("flight.step_s",
+                   "is longer than the " + io::shortest_digits(1 / rate) + " s between samples of a sensor",
                    "a shorter step, or a slower sensor");
   }
 
