@@ -28,19 +28,25 @@ std::string log_name(std::size_t i, std::size_t count) {
   return std::string(width - digits.size(), '0') + digits;
 }
 
-/// Refuses, before anything flies, a folder where logs of this run would lie beside others.
-void check_log_folder(const fs::path& folder, std::size_t count) {
+/// Refuses, before anything flies, a folder that cannot be written or where logs of this run would lie beside others.
+void prepare_log_folder(const fs::path& folder, std::size_t count) {
   std::error_code error;
-  const std::string accepted = "; accepted: a new folder, an empty one, or logs of as many flights to replace";
-  if (!fs::exists(folder, error)) return;
-  if (!fs::is_directory(folder, error)) throw io::InputError(folder.string() + ": is no folder" + accepted);
-  if (count == 1) return;
+  const auto refuse = [&](const std::string& what) {
+    throw io::InputError(folder.string() + ": " + what +
+                         "; accepted: a new folder, an empty one, or logs of as many flights to replace");
+  };
+  if (fs::exists(folder, error) && !fs::is_directory(folder, error)) refuse("is no folder");
+  fs::create_directories(folder, error);
+  if (error) throw io::InputError(folder.string() + ": cannot be written: " + error.message());
+  const bool is_log = fs::exists(folder / log_file::kHeader, error);
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
-    const bool digits = !name.empty() && name.find_first_not_of("0123456789") == std::string::npos;
-    if (!digits || name.size() > 9 || name != log_name(std::stoul(name), count) || std::stoul(name) >= count)
-      throw io::InputError(folder.string() + ": holds " + name + accepted);
+    bool belongs = count == 1 && is_log;  // the writer of logs looks closer
+    const bool number = name.size() < 10 && name.find_first_not_of("0123456789") == std::string::npos;
+    if (count > 1 && number) belongs = std::stoul(name) < count && name == log_name(std::stoul(name), count);
+    if (!belongs) refuse("holds " + name);
   }
+  if (error) throw io::InputError(folder.string() + ": cannot be read: " + error.message());
 }
 
 /// Flights that are flown together.
@@ -144,7 +150,7 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
   const bool logged = !options.log_folder.empty();
   std::size_t at_a_time = options.count;
   if (logged) {
-    check_log_folder(options.log_folder, options.count);
+    prepare_log_folder(options.log_folder, options.count);
     const double room = kLogBytes / (Recorder<T>::bytes_per_s(config) * config.duration_s);
     at_a_time = std::clamp<std::size_t>(static_cast<std::size_t>(std::min(room, 1e6)), 1, options.count);
     if (at_a_time > 16) at_a_time -= at_a_time % 16;  // whole blocks

@@ -178,6 +178,15 @@ class Reader {
       c_.resolved[key + ".toml"] = config.resolved();
       names.push_back(key + "=" + key + ".toml");
     }
+    // the file of a path goes along
+    const io::Table task = files_.at("task").root();
+    if (task.has("path.file")) {
+      const std::filesystem::path csv = task.file("path.file");
+      const std::string name = csv.filename().string();
+      c_.resolved[name] = io::read_text(csv);
+      c_.resolved["task.toml"] =
+          io::Config::parse(c_.resolved["task.toml"], "task.toml", {"path.file=" + io::toml_string(name)}).resolved();
+    }
     c_.resolved["fly.toml"] = io::Config::parse(main_.resolved(), "fly.toml", names).resolved();
   }
 

@@ -43,7 +43,8 @@ struct FlyConfig {
   Excitation excitation;
   LogOptions log;
   std::shared_ptr<const Actor> actor;
-  /// Texts of all files that were read, overrides applied and defaults filled in, by name; fly.toml names the others.
+  /// Texts of the files that were read, overrides applied and defaults filled in, by name; fly.toml names the others.
+  /// Actors and scripts stay where they are.
   std::map<std::string, std::string> resolved;
 
   /// The vehicle of a flapper: another one each where they are randomised.
