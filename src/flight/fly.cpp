@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <set>
 
 #include "flight/recorder.hpp"
 #include "sim/storage.hpp"
@@ -14,8 +15,6 @@ namespace flappy::flight {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kLogBytes = 512e6;  // of the flights flown at a time
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -39,14 +38,16 @@ void prepare_log_folder(const fs::path& folder, std::size_t count) {
   fs::create_directories(folder, error);
   if (error) throw io::InputError(folder.string() + ": cannot be written: " + error.message());
   const bool is_log = fs::exists(folder / log_file::kHeader, error);
+  std::set<std::string> foreign;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     bool belongs = count == 1 && is_log;  // the writer of logs looks closer
     const bool number = name.size() < 10 && name.find_first_not_of("0123456789") == std::string::npos;
     if (count > 1 && number) belongs = std::stoul(name) < count && name == log_name(std::stoul(name), count);
-    if (!belongs) refuse("holds " + name);
+    if (!belongs) foreign.insert(name);
   }
   if (error) throw io::InputError(folder.string() + ": cannot be read: " + error.message());
+  if (!foreign.empty()) refuse("holds " + *foreign.begin());
 }
 
 /// Flights that are flown together.
@@ -151,7 +152,7 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
   std::size_t at_a_time = options.count;
   if (logged) {
     prepare_log_folder(options.log_folder, options.count);
-    const double room = kLogBytes / (Recorder<T>::bytes_per_s(config) * config.duration_s);
+    const double room = options.log_bytes / (Recorder<T>::bytes_per_s(config) * config.duration_s);
     at_a_time = std::clamp<std::size_t>(static_cast<std::size_t>(std::min(room, 1e6)), 1, options.count);
     if (at_a_time > 16) at_a_time -= at_a_time % 16;  // whole blocks
   }

@@ -12,9 +12,10 @@ namespace flappy::flight {
 
 struct FlyOptions {
   std::size_t count = 1;
-  /// Where logs go: the folder itself is the log of a single flight, else it has one folder each, 0000 and on. Logged
-  /// flights are flown in parts, so that their logs need no more than half a gigabyte of memory at a time.
+  /// Where logs go: the folder itself is the log of a single flight, else it has one folder each, 0000 and on.
   std::filesystem::path log_folder;
+  /// Memory for logs: flights are flown in parts whose logs need no more, or one by one.
+  double log_bytes = 512e6;
   /// Asked every control period, with the share that is done; false ends the flights where they are.
   std::function<bool(double done)> keep_going;
 };

@@ -344,7 +344,7 @@ TEST(Fly, HoversAndDependsOnNothingButItsNumber) {
   EXPECT_LT(r.summary.takeoff[5], 0.1);
   EXPECT_EQ(r.steps, 3 * 5000);
   const Folder folder;
-  const FlyResult logged = fly(c, {.count = 3, .log_folder = folder / "log"});
+  const FlyResult logged = fly(c, {.count = 3, .log_folder = folder / "log", .log_bytes = 1});  // one by one
   EXPECT_EQ(logged.hash, r.hash);
   EXPECT_EQ(logged.logs, 3u);
   EXPECT_TRUE(fs::exists(folder / "log" / "0002" / "truth.csv"));
@@ -385,8 +385,9 @@ TEST(Fly, RefusesFoldersOfOthers) {
 
 template <class T>
 void expect_voltages_to_the_bit(const std::string& control_hz) {
-  const FlyConfig c = read_fly_config(source_path("configs/fly/hover_randomised.toml"),
-                                      {"flight.control_hz=" + control_hz, "task.start.kind=flying", "flight.threads=1"});
+  const FlyConfig c =
+      read_fly_config(source_path("configs/fly/hover_randomised.toml"),
+                      {"flight.control_hz=" + control_hz, "task.start.kind=flying", "flight.threads=1"});
   constexpr std::size_t kFlights = 20;
   Fleet<T> fleet(kFlights, c.vehicle, c.fleet);
   for (std::size_t i = 0; i < kFlights; ++i) {

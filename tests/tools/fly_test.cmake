@@ -120,5 +120,5 @@ expect_refused("flappy-fly: --count: Value 0 not in range 1 to 1000000; see flap
 expect_refused("flappy-fly: config is required; see flappy-fly --help")
 expect_refused("${WORK}/bad.toml: is no folder; accepted: a new folder, an empty one, or logs of as many flights to replace"
   ${hover} --log ${WORK}/bad.toml)
-expect_refused("${WORK}/logs: holds 0001; accepted: a new folder, an empty one, or logs of as many flights to replace"
+expect_refused("${WORK}/logs: holds 0000; accepted: a new folder, an empty one, or logs of as many flights to replace"
   ${hover} --log ${WORK}/logs)
