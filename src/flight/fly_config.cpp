@@ -77,7 +77,7 @@ bool whole(double number) { return number > 0.5 && std::abs(number - std::round(
 
 /// An actor sees and does what it was trained for.
 std::shared_ptr<const Actor> fitting_actor(const io::Table& root, const Task& task) {
-  const auto actor = std::make_shared<const Actor>(read_actor(root.file("actor")));
+  auto actor = std::make_shared<const Actor>(read_actor(root.file("actor")));
   const auto check = [&](const char* does, const std::vector<std::string>& has, const std::vector<Signal>& wanted) {
     std::string list;
     for (const Signal& s : wanted) list += (list.empty() ? "" : ", ") + s.name;

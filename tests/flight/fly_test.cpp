@@ -350,9 +350,9 @@ TEST(Fly, HoversAndDependsOnNothingButItsNumber) {
   EXPECT_TRUE(fs::exists(folder / "log" / "0002" / "truth.csv"));
   EXPECT_NE(fly(read_fly_config(kHover, {"flight.duration_s=0.5", "flight.seed=2"}), {.count = 3}).hash, r.hash);
   // of many, on threads: the same flights, the same sums
-  const FlyResult one = fly(c, {.count = 200});
+  const FlyResult one = fly(c, {.count = 130});
   const FlyResult two = fly(
-      read_fly_config(kHover, {"flight.duration_s=0.5", "flight.settle_s=0.2", "flight.threads=2"}), {.count = 200});
+      read_fly_config(kHover, {"flight.duration_s=0.5", "flight.settle_s=0.2", "flight.threads=2"}), {.count = 130});
   EXPECT_EQ(one.hash, two.hash);
   EXPECT_EQ(one.summary.settled, two.summary.settled);
 }
