@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace flappy::flight {
@@ -55,12 +56,13 @@ void FlightScore::add(const Motion& truth, const Target& target, std::uint32_t s
 FlightSummary summarise(std::span<const FlightScore> flights) {
   FlightSummary s;
   s.flights = flights.size();
-  std::array<std::vector<double>, kFailures> when;
+  std::array<std::vector<std::pair<double, std::size_t>>, kFailures> when;  // and which flight
   std::size_t within = 0, settled_ticks = 0, ticks = 0;
-  for (const FlightScore& f : flights) {
+  for (std::size_t i = 0; i < flights.size(); ++i) {
+    const FlightScore& f = flights[i];
     s.crashed += f.crashed;
     within += f.ticks > 0 && !f.crashed && !f.far_away;
-    if (f.failure != Failure::none) when[static_cast<std::size_t>(f.failure)].push_back(f.failed_s);
+    if (f.failure != Failure::none) when[static_cast<std::size_t>(f.failure)].push_back({f.failed_s, i});
     if (f.crashed) continue;
     settled_ticks += f.settled_ticks;
     ticks += f.ticks;
@@ -70,10 +72,10 @@ FlightSummary summarise(std::span<const FlightScore> flights) {
   for (double& sum : s.takeoff) sum = std::sqrt(sum / static_cast<double>(ticks));
   s.within_share = static_cast<double>(within) / static_cast<double>(flights.size());
   for (std::size_t k = 0; k < kFailures; ++k) {
-    std::vector<double>& t = when[k];
+    auto& t = when[k];
     if (t.empty()) continue;
     std::ranges::sort(t);
-    s.failures[k] = {t.size(), t.front(), t[t.size() / 2], t.back()};
+    s.failures[k] = {t.size(), t.front().second, t.front().first, t[t.size() / 2].first, t.back().first};
     s.failed += t.size();
   }
   return s;

@@ -36,6 +36,7 @@ struct FlightScore {
 
 struct FailureCount {
   std::size_t flights = 0;
+  std::size_t first_flight = 0;  ///< that failed first
   double first_s = 0, median_s = 0, last_s = 0;
 };
 

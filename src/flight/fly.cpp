@@ -55,12 +55,13 @@ template <class T>
 class Part {
  public:
   Part(const FlyConfig& config, std::size_t first, std::size_t count, bool logged)
-      : config_(config), first_(first), fleet_(make_fleet(config, first, count)), scores_(count) {
+      : config_(config), first_(first), fleet_(make_fleet(config, first, count)), scores_(count), ended_(count) {
     for (std::size_t i = 0; i < count; ++i) {
-      const model::Vehicle vehicle = config.vehicle_of(static_cast<std::uint32_t>(first + i));
+      const auto flapper = config.fleet.first_flapper + static_cast<std::uint32_t>(first + i);
+      const model::Vehicle vehicle = config.vehicle_of(flapper);
       if (config.randomisation) fleet_.set_vehicle(i, vehicle);
       if (config.welded) {
-        const sim::RandomKey key{config.fleet.seed, static_cast<std::uint32_t>(first + i), 0, sim::Stream::start};
+        const sim::RandomKey key{config.fleet.seed, flapper, 0, sim::Stream::start};
         fleet_.start(i, 0, config.fleet.task.sample_start(key), sim::Start::welded);
       } else if (config.randomisation) {
         fleet_.start(i, 0);  // where its own centre of mass is counts
@@ -85,6 +86,7 @@ class Part {
     for (std::ptrdiff_t k = 0; k < n; ++k) {
       const auto i = static_cast<std::size_t>(k);
       if (!config_.welded) scores_[i].add(fleet_.truth(i), target, fleet_.batch().status(i), t_s, settled);
+      if (ended_[i] == 0) ended_[i] = fleet_.ended(i);
       if (!recorders_.empty()) recorders_[i].record();
     }
     result.scoring_s += seconds_since(before);
@@ -93,7 +95,7 @@ class Part {
   void finish(FlyResult& result) {
     for (std::size_t i = 0; i < scores_.size(); ++i) {
       result.hash = sim::mixed(result.hash, fleet_.hash(i, i + 1));
-      for (std::size_t k = 0; k < result.ended.size(); ++k) result.ended[k] += fleet_.ended(i) >> k & 1;
+      for (std::size_t k = 0; k < result.ended.size(); ++k) result.ended[k] += ended_[i] >> k & 1;
       result.handed_back += fleet_.handed_back(i);
     }
     result.flown_s = tick_ * fleet_.period_s();
@@ -142,6 +144,7 @@ class Part {
   std::size_t first_;
   Fleet<T> fleet_;
   std::vector<FlightScore> scores_;
+  std::vector<std::uint32_t> ended_;  // the bits that came first
   std::vector<Recorder<T>> recorders_;
   int tick_ = 0;
 };

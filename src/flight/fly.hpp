@@ -24,7 +24,7 @@ struct FlyResult {
   FlightSummary summary;
   bool stopped = false;
   double flown_s = 0;                  ///< by each flight; where stopped, by the last ones
-  std::array<std::size_t, 6> ended{};  ///< flights for which each bit of Ended is set
+  std::array<std::size_t, 6> ended{};  ///< flights whose task ended by each bit of Ended; they fly on
   std::size_t handed_back = 0;
   std::size_t logs = 0;
   std::uint64_t hash = 0;  ///< of all that moves, of each flight in order

@@ -332,7 +332,10 @@ TEST(Score, PoolsFlightsThatDidNotCrash) {
   EXPECT_NEAR(s.settled[3], std::sqrt((0.01 * 0.01 + 0.03 * 0.03) / 2), 1e-12);
   EXPECT_NEAR(s.takeoff[3], std::sqrt((10 * 1e-4 + 5 * 9e-4) / 20), 1e-12);
   EXPECT_NEAR(s.settled[4], 0.4 / std::sqrt(2), 1e-12);
-  EXPECT_EQ(s.failures[static_cast<std::size_t>(Failure::drifted_away)].flights, 2u);
+  const FailureCount& away = s.failures[static_cast<std::size_t>(Failure::drifted_away)];
+  EXPECT_EQ(away.flights, 2u);
+  EXPECT_EQ(away.first_flight, 1u);
+  EXPECT_EQ(away.first_s, 1);
 }
 
 TEST(Fly, HoversAndDependsOnNothingButItsNumber) {
@@ -347,7 +350,11 @@ TEST(Fly, HoversAndDependsOnNothingButItsNumber) {
   const FlyResult logged = fly(c, {.count = 3, .log_folder = folder / "log", .log_bytes = 1});  // one by one
   EXPECT_EQ(logged.hash, r.hash);
   EXPECT_EQ(logged.logs, 3u);
-  EXPECT_TRUE(fs::exists(folder / "log" / "0002" / "truth.csv"));
+  FlyConfig third = c;
+  third.fleet.first_flapper = 2;
+  fly(third, {.log_folder = folder / "third"});
+  EXPECT_EQ(io::read_text(folder / "log" / "0002" / "truth.csv"), io::read_text(folder / "third" / "truth.csv"));
+  EXPECT_NE(io::read_text(folder / "log" / "0001" / "truth.csv"), io::read_text(folder / "third" / "truth.csv"));
   EXPECT_NE(fly(read_fly_config(kHover, {"flight.duration_s=0.5", "flight.seed=2"}), {.count = 3}).hash, r.hash);
   // of many, on threads: the same flights, the same sums
   const FlyResult one = fly(c, {.count = 130});

@@ -111,7 +111,7 @@ expect_equal("stopped" "${stopped}" ON)
 expect_refused("${WORK}/none.toml: cannot be read: No such file or directory" ${WORK}/none.toml)
 file(WRITE ${WORK}/bad.toml "schema = 1\nprecision = \"half\"\n")
 expect_refused("${WORK}/bad.toml:2:13: precision: \"half\" is not known; accepted: \"float\", \"double\"" ${WORK}/bad.toml)
-expect_refused("--set flight.durations_s=1: flight.durations_s: unknown key; accepted: control_hz, duration_s, seed, settle_s, step_s, support, threads; did you mean \"duration_s\"?"
+expect_refused("--set flight.durations_s=1: flight.durations_s: unknown key; accepted: control_hz, duration_s, first_flapper, seed, settle_s, step_s, support, threads; did you mean \"duration_s\"?"
   ${hover} --set flight.durations_s=1)
 expect_refused("--set controller.attitude.pitch.q=1: attitude.pitch.q: unknown key; accepted: d, i, integral_limit, p"
   ${hover} --set controller.attitude.pitch.q=1)

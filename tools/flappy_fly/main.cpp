@@ -46,6 +46,7 @@ class ProgressLine {
 };
 
 constexpr const char* kAxes[6] = {"roll", "pitch", "yaw", "x", "y", "z"};
+constexpr const char* kEnds[6] = {"time_out", "contact", "not_finite", "out_of_bounds", "heading_late", "arrival_late"};
 constexpr const char* kKeys[6] = {"rms_roll_deg", "rms_pitch_deg", "rms_yaw_deg", "rms_x_mm", "rms_y_mm", "rms_z_mm"};
 
 /// Degrees and millimetres.
@@ -89,8 +90,8 @@ void print_score(const FlyConfig& config, const FlightSummary& s) {
     std::string name = name_of(static_cast<Failure>(k));
     for (char& c : name)
       if (c == '_') c = ' ';
-    std::printf("  %zu %s: first at %.2f s, half of them by %.2f s, last at %.2f s\n", f.flights, name.c_str(),
-                f.first_s, f.median_s, f.last_s);
+    std::printf("  %zu %s: flight %zu first, at %.2f s; half of them by %.2f s, the last at %.2f s\n", f.flights,
+                name.c_str(), config.fleet.first_flapper + f.first_flight, f.first_s, f.median_s, f.last_s);
   }
 }
 
@@ -102,6 +103,8 @@ void print(const FlyConfig& config, const FlyOptions& options, const FlyResult& 
               config.precision.c_str());
   if (config.welded) std::printf("  held on a stand: nothing to score\n");
   else print_score(config, s);
+  for (std::size_t k = 1; k < 6 && !config.welded; ++k)
+    if (r.ended[k] > 0) std::printf("  the task ended by %s: %zu\n", kEnds[k], r.ended[k]);
   if (r.handed_back > 0) std::printf("  handed back to the controller: %zu\n", r.handed_back);
   if (!options.log_folder.empty()) {
     std::printf("  %zu logs in %s\n", r.logs, options.log_folder.c_str());
@@ -123,19 +126,20 @@ Json json_of(const FlyConfig& config, const FlyOptions& options, const FlyResult
   json["duration_s"] = config.duration_s;
   json["settle_s"] = config.settle_s;
   json["seed"] = config.fleet.seed;
+  json["first_flapper"] = config.fleet.first_flapper;
   json["task"] = config.fleet.task.name;
   json["stopped"] = r.stopped;
   json["failed"] = s.failed;
   for (std::size_t k = 1; k < kFailures; ++k) {
     const FailureCount& f = s.failures[k];
     const auto when = [&](double t_s) { return f.flights > 0 ? Json(t_s) : Json(nullptr); };
-    json["failures"][name_of(static_cast<Failure>(k))] = {{"flights", f.flights},
-                                                          {"first_s", when(f.first_s)},
-                                                          {"median_s", when(f.median_s)},
-                                                          {"last_s", when(f.last_s)}};
+    json["failures"][name_of(static_cast<Failure>(k))] = {
+        {"flights", f.flights},
+        {"first_flight", f.flights > 0 ? Json(config.fleet.first_flapper + f.first_flight) : Json(nullptr)},
+        {"first_s", when(f.first_s)},
+        {"median_s", when(f.median_s)},
+        {"last_s", when(f.last_s)}};
   }
-  constexpr const char* kEnds[6] = {"time_out",      "contact",      "not_finite",
-                                    "out_of_bounds", "heading_late", "arrival_late"};
   for (std::size_t k = 0; k < 6; ++k) json["ended"][kEnds[k]] = r.ended[k];
   json["handed_back"] = r.handed_back;
   json["hash"] = hexadecimal(r.hash);
