@@ -450,6 +450,11 @@ std::pair<double, double> Fleet<T>::innovation(std::size_t i) const {
 }
 
 template <class T>
+void Fleet<T>::count_cycles(std::uint64_t* cycles) {
+  storage_->plan.cycles = cycles;
+}
+
+template <class T>
 void Fleet<T>::record(bool on) {
   storage_->recording = on;
 }
