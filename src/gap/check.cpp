@@ -14,21 +14,22 @@ using flight::FlightLog;
 
 void check_stream(const StreamStatistics& s, double flapping_Hz, Findings& findings) {
   const auto warn = [&](const std::string& text) { findings.push_back({s.name, Verdict::warning, text, {}}); };
+  if (!s.declared_hz) return;
   const std::size_t before = findings.size();
   const double interval = 1 / s.rate_hz;
   // Crystals agree to 1e-4 and a stream's mean rate is exact to 1 / samples: 5 % is another rate, or another unit.
-  if (s.declared_hz && std::abs(s.rate_hz / *s.declared_hz - 1) > 0.05)
+  if (std::abs(s.rate_hz / *s.declared_hz - 1) > 0.05)
     warn(format("%.4g samples/s, %.4g declared: thinned out, repeated, or t_s not in seconds", s.rate_hz,
                 *s.declared_hz));
   const double missing = static_cast<double>(s.missing) / static_cast<double>(s.samples + s.missing);
   if (missing > 0.01)
     warn(format("%zu samples missing (%.1f %%), at most 1 %% expected: dropouts", s.missing, 100 * missing));
   // Three beats unseen cannot be bridged: the body's motion within a beat is not smooth.
-  if (s.declared_hz && s.longest_gap_s > std::max(10 * interval, 3 / flapping_Hz))
+  if (s.longest_gap_s > std::max(10 * interval, 3 / flapping_Hz))
     warn(format("a gap of %.3g s, at most %.3g s expected: lost tracking or a lost link", s.longest_gap_s,
                 std::max(10 * interval, 3 / flapping_Hz)));
   // Beyond this, samples begin to change places.
-  if (s.declared_hz && s.jitter_s > 0.3 * interval)
+  if (s.jitter_s > 0.3 * interval)
     warn(format("intervals vary by %.2g ms of %.2g ms: arrival times are not evenly spaced; a buffered link?",
                 1e3 * s.jitter_s, 1e3 * interval));
   if (findings.size() == before) findings.push_back({s.name, Verdict::ok, "rate, gaps and intervals as declared", {}});
@@ -92,14 +93,19 @@ StreamStatistics stream_statistics(const std::string& name, const Column& t_s, s
   s.samples = t_s.size();
   s.duration_s = t_s.back() - t_s.front();
   s.declared_hz = declared_hz;
-  std::vector<double> intervals;
+  std::vector<double> intervals, pairs;
   for (std::size_t i = 1; i < t_s.size(); ++i) intervals.push_back(t_s[i] - t_s[i - 1]);
-  const double usual = median(intervals);
+  for (std::size_t i = 2; i < t_s.size(); ++i) pairs.push_back((t_s[i] - t_s[i - 2]) / 2);
+  const double usual = median(pairs.empty() ? intervals : pairs);
   double sum = 0, squares = 0, count = 0;
-  for (const double dt : intervals) {
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    const double dt = intervals[i];
     s.longest_gap_s = std::max(s.longest_gap_s, dt);
-    if (dt > 1.5 * usual) {
-      if (declared_hz) s.missing += static_cast<std::size_t>(std::lround(dt / usual)) - 1;
+    // With either neighbour: a late sample makes a long interval and a short one.
+    const double before = i > 0 ? intervals[i - 1] : usual, after = i + 1 < intervals.size() ? intervals[i + 1] : usual;
+    const long missing = dt > 1.5 * usual ? std::lround((dt + std::min(before, after)) / usual) - 2 : 0;
+    if (missing > 0) {
+      if (declared_hz) s.missing += static_cast<std::size_t>(missing);
     } else {
       sum += dt, squares += dt * dt, ++count;
     }

@@ -40,11 +40,11 @@ struct Wave {
   double cosine = 0, sine = 0, explained = 0;
 };
 
-Wave fit_wave(const Column& phase_rad, double scale, const Column& volts) {
+Wave fit_wave(const Column& phase_rad, const Column& volts) {
   // Least squares of volts on 1, cos and sin, by Cramer's rule on the centred sums.
   double n = 0, c = 0, s = 0, v = 0, cc = 0, ss = 0, cs = 0, cv = 0, sv = 0, vv = 0;
   for (std::size_t i = 0; i < volts.size(); ++i) {
-    const double a = std::cos(scale * phase_rad[i]), b = std::sin(scale * phase_rad[i]), y = volts[i];
+    const double a = std::cos(phase_rad[i]), b = std::sin(phase_rad[i]), y = volts[i];
     n += 1, c += a, s += b, v += y, cc += a * a, ss += b * b, cs += a * b, cv += a * y, sv += b * y, vv += y * y;
   }
   cc -= c * c / n, ss -= s * s / n, cs -= c * s / n, cv -= c * v / n, sv -= s * v / n, vv -= v * v / n;
@@ -59,10 +59,10 @@ void check_frequency(const FlightLog& log, Findings& findings) {
   const double declared = log.header.flapping_Hz, per_beat = 1 / (declared * median_interval(log.command.t_s));
   const auto say = [&](Verdict verdict, const std::string& text) { findings.push_back({name, verdict, text, {}}); };
   if (per_beat < 4)
-    return say(Verdict::not_tested, format("not tested: command.csv has %.2g samples a beat, 4 are needed", per_beat));
+    return say(Verdict::not_tested, format("command.csv has %.2g samples a beat, 4 are needed", per_beat));
   const auto left = beat_frequency(log.command.t_s, log.command.left_voltage_V);
   const auto right = beat_frequency(log.command.t_s, log.command.right_voltage_V);
-  if (!left || !right) return say(Verdict::not_tested, "not tested: fewer than five beats in the voltages");
+  if (!left || !right) return say(Verdict::not_tested, "fewer than five beats in the voltages");
   const std::string seen =
       format("voltages beat at %.4g Hz left, %.4g Hz right, %.4g Hz declared", *left, *right, declared);
   const double worst = std::max(std::abs(*left / declared - 1), std::abs(*right / declared - 1));
@@ -81,18 +81,25 @@ void check_phase(const FlightLog& log, Findings& findings) {
   for (std::size_t i = 0; i < volts.size(); ++i) volts[i] = u.left_voltage_V[i] + u.right_voltage_V[i];
   const auto say = [&](Verdict verdict, const std::string& text) { findings.push_back({name, verdict, text, {}}); };
   if (f * interval > 0.25 || rms(volts) < 0.1)
-    return say(Verdict::not_tested, "not tested: too few samples a beat, or hardly any voltage");
-  const Wave wave = fit_wave(*u.phase_rad, 1, volts);
-  // Changing amplitudes leave most of the variance to the wave; a wrong phase leaves nothing.
-  if (wave.explained < 0.5) {
-    std::string cause = "another clock, or an estimate that slipped";
-    if (fit_wave(*u.phase_rad, kTurn / 360, volts).explained > 0.5) cause = "likely in degrees, not rad";
-    if (fit_wave(*u.phase_rad, kTurn, volts).explained > 0.5) cause = "likely in beats, not rad";
-    if (fit_wave(*u.phase_rad, 0.5, volts).explained > 0.5) cause = "likely counts 4 pi a beat";
-    return say(Verdict::warning, format("phase_rad explains %.0f %% of the voltages, at least 50 %% expected: ",
-                                        100 * std::max(wave.explained, 0.0)) +
-                                     cause);
+    return say(Verdict::not_tested, "too few samples a beat, or hardly any voltage");
+  Column speeds;
+  for (std::size_t i = 1; i < volts.size(); ++i)
+    speeds.push_back(((*u.phase_rad)[i] - (*u.phase_rad)[i - 1]) / (u.t_s[i] - u.t_s[i - 1]));
+  const double speed = median(speeds), ratio = speed / (kTurn * f);  // a wrap is one step of many
+  if (std::abs(ratio - 1) > kFrequencyTolerance) {
+    const auto is = [&](double unit) { return std::abs(ratio / unit - 1) < kFrequencyTolerance; };
+    const char* cause = is(360 / kTurn) ? "likely in degrees, not rad"
+                        : is(1 / kTurn) ? "likely in beats, not rad"
+                                        : "another beat";
+    return say(Verdict::warning, format("phase_rad advances by %.4g rad/s, %.4g expected: ", speed, kTurn * f) + cause);
   }
+  const Wave wave = fit_wave(*u.phase_rad, volts);
+  // Changing amplitudes leave most of the variance to the wave; a wrong phase leaves nothing.
+  if (wave.explained < 0.5)
+    return say(Verdict::warning,
+               format("phase_rad explains %.0f %% of the voltages, at least 50 %% expected: another clock, "
+                      "or an estimate that slipped",
+                      100 * std::max(wave.explained, 0.0)));
   // The voltage is A cos(phase), held for an interval: the driver may take its phase anywhere in it.
   const double offset = std::atan2(wave.sine, wave.cosine), allowed = kTurn * f * interval + 0.1;
   const std::string seen = format("voltages lag phase_rad by %.2f rad, at most %.2f expected", offset, allowed);
@@ -205,8 +212,7 @@ void check_power(const FlightLog& log, Findings& findings) {
     else if (mean < -least)
       findings.push_back({name, Verdict::warning,
                           figures + ", positive expected: the current's sign, or left and right swapped", values});
-    else if (mean <= least)
-      findings.push_back({name, Verdict::not_tested, "not tested: no power beyond the noise", values});
+    else if (mean <= least) findings.push_back({name, Verdict::not_tested, "no power beyond the noise", values});
     else findings.push_back({name, Verdict::ok, figures, values});
   }
 }
@@ -237,8 +243,7 @@ void check_wings(const FlightLog& log, Findings& findings) {
   const double declared = log.header.flapping_Hz, per_beat = 1 / (declared * median_interval(w.t_s));
   const auto f = beat_frequency(w.t_s, w.left_stroke_rad);
   if (per_beat < 4 || !f) {
-    findings.push_back(
-        {"stroke frequency", Verdict::not_tested, "not tested: too few samples a beat, or too few beats", {}});
+    findings.push_back({"stroke frequency", Verdict::not_tested, "too few samples a beat, or too few beats", {}});
     return;
   }
   const std::string seen = format("the left wing beats at %.4g Hz, %.4g Hz declared", *f, declared);

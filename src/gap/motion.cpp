@@ -71,9 +71,14 @@ Motion::Motion(const flight::FlightLog& log) {
   const flight::ImuStream& s = log.imu;
   const double start_s = m.t_s.front() - log.header.mocap.latency_s;
   for (std::size_t i = 0; i < m.t_s.size(); ++i) {
+    const Vector3d position(m.x_m[i], m.y_m[i], m.z_m[i]);
+    const std::array<double, 4> quaternion = {m.qw[i], m.qx[i], m.qy[i], m.qz[i]};
+    const bool repeated = i > 1 && log.header.mocap.position_noise_m > 0 && position == position_m_.back() &&
+                          quaternion == quaternion_.back();
+    if (repeated) continue;
     mocap_t_s_.push_back(m.t_s[i] - log.header.mocap.latency_s - start_s);
-    position_m_.emplace_back(m.x_m[i], m.y_m[i], m.z_m[i]);
-    quaternion_.push_back({m.qw[i], m.qx[i], m.qy[i], m.qz[i]});
+    position_m_.push_back(position);
+    quaternion_.push_back(quaternion);
   }
   for (std::size_t i = 0; i < s.t_s.size(); ++i) {
     imu_t_s_.push_back(s.t_s[i] - log.header.imu.latency_s - start_s);
@@ -131,23 +136,37 @@ std::optional<Vector3d> Motion::mean_rate(double begin_s, double end_s) const {
   return (gyro_integral(last, end_s) - gyro_integral(first, begin_s)) / (end_s - begin_s);
 }
 
+double Motion::roughness_rad() const {
+  double squares = 0, count = 0;
+  for (std::size_t i = 1; i + 1 < mocap_t_s_.size(); ++i) {
+    const double before = mocap_t_s_[i] - mocap_t_s_[i - 1], after = mocap_t_s_[i + 1] - mocap_t_s_[i];
+    if (std::max(before, after) > longest_mocap_s_) continue;
+    const Quaterniond between =
+        attitude(i - 1, Order::wxyz).slerp(before / (before + after), attitude(i + 1, Order::wxyz));
+    squares += rotation_vector(between.conjugate() * attitude(i, Order::wxyz)).squaredNorm() / 3;
+    ++count;
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0;
+}
+
 std::vector<Window> make_windows(const Motion& motion, double length_s) {
   const std::vector<double>& t = motion.mocap_t_s();
   std::vector<Window> windows;
-  for (std::size_t i = 0; i + 1 < t.size();) {
-    std::size_t j = index_before(t, t[i] + length_s);
-    if (j + 1 < t.size() && t[j + 1] - t[i] - length_s < t[i] + length_s - t[j]) ++j;
-    if (j <= i || std::abs(t[j] - t[i] - length_s) > 0.25 * length_s) {
-      ++i;  // a gap
-      continue;
-    }
-    Window w{t[i], t[j], {}};
+  for (std::size_t i = 0; i < t.size();) {
+    const double end_s = t[i] + length_s;
+    Window w{t[i], end_s, {}};
+    bool whole = true;
     for (const Order order : kOrders) {
-      const Quaterniond turn = motion.attitude(i, order).conjugate() * motion.attitude(j, order);
-      w.rate_rad_s[static_cast<std::size_t>(order)] = rotation_vector(turn) / w.duration_s();
+      const auto end = motion.attitude_at(end_s, order);
+      whole &= end.has_value();
+      if (end)
+        w.rate_rad_s[static_cast<std::size_t>(order)] =
+            rotation_vector(motion.attitude(i, order).conjugate() * *end) / length_s;
     }
-    windows.push_back(w);
-    i = j;
+    if (whole) windows.push_back(w);
+    const std::size_t last = index_before(t, end_s);
+    i = whole ? std::max(last, i + 1) : i + 1;
+    if (last + 1 >= t.size()) break;
   }
   return windows;
 }
@@ -155,7 +174,8 @@ std::vector<Window> make_windows(const Motion& motion, double length_s) {
 Pairs pair_up(const Motion& motion, const std::vector<Window>& windows, Order order, const Lag& lag) {
   constexpr double kStep_s = 0.005;  // wide enough to smooth the change over the gyro's samples
   Pairs pairs;
-  for (const Window& w : windows) {
+  for (std::size_t i = 0; i < windows.size(); ++i) {
+    const Window& w = windows[i];
     const double shift = lag.at(w.middle_s());
     const auto rate = motion.mean_rate(w.begin_s + shift, w.end_s + shift);
     const auto before = motion.mean_rate(w.begin_s + shift - kStep_s, w.end_s + shift - kStep_s);
@@ -164,22 +184,23 @@ Pairs pair_up(const Motion& motion, const std::vector<Window>& windows, Order or
     pairs.mocap.push_back(w.rate_rad_s[static_cast<std::size_t>(order)]);
     pairs.gyro.push_back(*rate);
     pairs.gyro_change.emplace_back((*after - *before) / (2 * kStep_s));
-    pairs.duration_s.push_back(w.duration_s());
-    pairs.middle_s.push_back(w.middle_s());
+    pairs.window.push_back(i);
   }
   return pairs;
 }
 
 std::optional<Sync> find_lag(const Motion& motion, const std::vector<Window>& windows) {
-  constexpr double kRange_s = 0.5, kStep_s = 0.005;
+  constexpr double kRange_s = 1, kStep_s = 0.005;
   // Of nearly periodic motion, the lag that is nearer and the frame that is declared.
   constexpr double kPenalty_per_s = 0.1, kOtherFrame = 0.01;
   std::optional<Sync> best;
   double best_score = 0;
   for (double lag_s = -kRange_s; lag_s <= kRange_s; lag_s += kStep_s) {
+    Pairs pairs = pair_up(motion, windows, Order::wxyz, {0, lag_s, 0});
+    if (pairs.mocap.size() < 10) continue;
     for (const Order order : kOrders) {
-      const Pairs pairs = pair_up(motion, windows, order, {0, lag_s, 0});
-      if (pairs.mocap.size() < 10) continue;
+      for (std::size_t i = 0; i < pairs.mocap.size(); ++i)
+        pairs.mocap[i] = windows[pairs.window[i]].rate_rad_s[static_cast<std::size_t>(order)];
       const Moments m = moments(pairs);
       if (!(m.mocap > 0 && m.gyro > 0)) continue;
       for (const Matrix3d& axes : signed_permutations()) {
@@ -196,20 +217,20 @@ std::optional<Sync> find_lag(const Motion& motion, const std::vector<Window>& wi
   return best;
 }
 
-std::optional<Estimate> refine_lag(const Motion& motion, const std::vector<Window>& windows, const Sync& sync,
-                                   double noise) {
-  double lag_s = sync.lag_s, sd = 0;
+std::optional<Estimate> refine_lag(const Motion& motion, const std::vector<Window>& windows, const Frame& frame,
+                                   Lag start, double noise) {
+  double moved_s = 0, sd = 0;
   for (int iteration = 0; iteration < 4; ++iteration) {
     // mocap = a gyro + a step gyro_change + constant, for a and a step
-    const Pairs pairs = pair_up(motion, windows, sync.frame.order, {0, lag_s, 0});
+    const Pairs pairs = pair_up(motion, windows, frame.order, start);
     if (pairs.mocap.size() < 10) return std::nullopt;
     const Vector3d m0 = mean_of(pairs.mocap), g0 = mean_of(pairs.gyro), c0 = mean_of(pairs.gyro_change);
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
     double squares = 0;
     for (std::size_t i = 0; i < pairs.mocap.size(); ++i) {
-      const Vector3d m = pairs.mocap[i] - m0, g = sync.frame.axes * (pairs.gyro[i] - g0);
-      const Vector3d c = sync.frame.axes * (pairs.gyro_change[i] - c0);
+      const Vector3d m = pairs.mocap[i] - m0, g = frame.axes * (pairs.gyro[i] - g0);
+      const Vector3d c = frame.axes * (pairs.gyro_change[i] - c0);
       normal += Eigen::Matrix2d{{g.dot(g), g.dot(c)}, {g.dot(c), c.dot(c)}};
       right += Eigen::Vector2d(g.dot(m), c.dot(m));
       squares += m.squaredNorm();
@@ -222,9 +243,10 @@ std::optional<Estimate> refine_lag(const Motion& motion, const std::vector<Windo
     // the noise declared or seen, whichever is larger: here too small a figure would cry wolf
     sd = std::max(noise, residual) * std::sqrt(normal.inverse()(1, 1)) / std::abs(gain);
     if (!(std::abs(step) < 0.1)) return std::nullopt;
-    lag_s += step;
+    start.at_middle_s += step;
+    moved_s += step;
   }
-  return Estimate{lag_s, sd};
+  return Estimate{moved_s, sd};
 }
 
 double remainder(const Pairs& pairs, const Matrix3d& axes, double scale) {

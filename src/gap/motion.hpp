@@ -23,7 +23,8 @@ inline constexpr std::array kOrders = {Order::wxyz, Order::xyzw, Order::wxyz_inv
 /// The 48 matrices that permute and flip axes; the first is the identity.
 const std::vector<Matrix3d>& signed_permutations();
 
-/// Times of the IMU and of mocap less their declared latencies, from the first mocap sample on.
+/// Times of the IMU and of mocap less their declared latencies, from the first mocap sample on. A pose that repeats the
+/// one before is none.
 class Motion {
  public:
   explicit Motion(const flight::FlightLog& log);
@@ -35,6 +36,8 @@ class Motion {
   /// Between samples; nothing in a gap or outside.
   std::optional<Quaterniond> attitude_at(double t_s, Order order) const;
   std::optional<Vector3d> position_at(double t_s) const;
+  /// Rms per axis by which an attitude differs from the middle of its neighbours: noise, and what goes on in between.
+  double roughness_rad() const;
   /// Mean of the gyro over an interval; nothing across a gap or outside.
   std::optional<Vector3d> mean_rate(double begin_s, double end_s) const;
 
@@ -50,21 +53,21 @@ class Motion {
   std::vector<std::size_t> gaps_before_;  ///< of the IMU, up to each sample
 };
 
-/// From one mocap sample to another, so that no attitude is interpolated.
+/// Whole beats, in which the shaking of the beat cancels: it repeats, and would match at the wrong lag.
 struct Window {
   double begin_s, end_s;
-  std::array<Vector3d, 4> rate_rad_s;  ///< from mocap, in the body, for each Order
-  double duration_s() const { return end_s - begin_s; }
+  std::array<Vector3d, 4> rate_rad_s;  ///< mean from mocap, in the body, for each Order
   double middle_s() const { return (begin_s + end_s) / 2; }
 };
 
-/// One after another, each of about `length_s`.
+/// One after another, each of `length_s`, without gaps.
 std::vector<Window> make_windows(const Motion& motion, double length_s);
 
 /// The frame a log is in: mocap's rate = scale x axes x gyro's.
 struct Frame {
   Order order = Order::wxyz;
   Matrix3d axes = Matrix3d::Identity();
+  bool operator==(const Frame&) const = default;
 };
 
 /// The IMU's clock against mocap's, beyond the latencies declared: gyro(t + lag_s(t)) belongs to mocap(t).
@@ -76,7 +79,7 @@ struct Lag {
 /// Rates of both in the windows where both have them.
 struct Pairs {
   std::vector<Vector3d> mocap, gyro, gyro_change;  ///< change of the gyro's rate per second of lag
-  std::vector<double> duration_s, middle_s;
+  std::vector<std::size_t> window;                 ///< of which window
 };
 Pairs pair_up(const Motion& motion, const std::vector<Window>& windows, Order order, const Lag& lag);
 
@@ -86,15 +89,15 @@ struct Sync {
   Frame frame;             ///< at which it is best
 };
 
-/// The lag, within half a second, and frame at which mocap follows the gyro best; nothing without common windows.
+/// The lag, within a second, and frame at which mocap follows the gyro best; nothing without common windows.
 std::optional<Sync> find_lag(const Motion& motion, const std::vector<Window>& windows);
 
 struct Estimate {
   double value = 0, sd = 0;
 };
-/// The lag to a fraction of a sample, by least squares from a first one; `noise` of a window's mean mocap rate.
-std::optional<Estimate> refine_lag(const Motion& motion, const std::vector<Window>& windows, const Sync& sync,
-                                   double noise);
+/// What is to be added to a first lag, to a fraction of a sample, by least squares; `noise` of a window's mean mocap rate.
+std::optional<Estimate> refine_lag(const Motion& motion, const std::vector<Window>& windows, const Frame& frame,
+                                   Lag start, double noise);
 
 /// Sum of squares that mocap's rates keep once `scale x axes x gyro` and a constant are taken off.
 double remainder(const Pairs& pairs, const Matrix3d& axes, double scale);

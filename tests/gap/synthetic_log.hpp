@@ -13,7 +13,7 @@ namespace flappy::gap {
 
 struct SyntheticMotion {
   double duration_s = 20, rotation = 1, translation = 1;  ///< sizes
-  double yaw_offset_rad = 0;
+  double yaw_offset_rad = 0, shake_rad = 0.01;
   std::uint64_t seed = 1;
 };
 
@@ -61,7 +61,7 @@ class Synthesis {
     return sum;
   }
   Eigen::Quaterniond attitude(double t) const {
-    const double shake = 0.01 * std::sin(2 * kPi * kBeat_Hz * t);
+    const double shake = motion_.shake_rad * std::sin(2 * kPi * kBeat_Hz * t);
     const double k = motion_.rotation;
     return Eigen::AngleAxisd(motion_.yaw_offset_rad + 0.3 * k * at(angles_[2], t), Eigen::Vector3d::UnitZ()) *
            Eigen::AngleAxisd(0.1 * k * at(angles_[1], t) + shake, Eigen::Vector3d::UnitY()) *
@@ -69,7 +69,8 @@ class Synthesis {
   }
   Eigen::Vector3d position(double t) const {
     const double k = 0.2 * motion_.translation;
-    return {k * at(places_[0], t), k * at(places_[1], t), 1.4 + k * at(places_[2], t) + 5e-5 * std::sin(4 * kPi * kBeat_Hz * t)};
+    return {k * at(places_[0], t), k * at(places_[1], t),
+            1.4 + k * at(places_[2], t) + 5e-5 * std::sin(4 * kPi * kBeat_Hz * t)};
   }
   Eigen::Vector3d rate(double t) const {
     constexpr double h = 1e-4;
@@ -82,6 +83,15 @@ class Synthesis {
     const Eigen::Vector3d acceleration = (place(t + h) - 2 * place(t) + place(t - h)) / (h * h);
     return attitude(t).conjugate() * (acceleration + Eigen::Vector3d(0, 0, 9.81));
   }
+  /// What a first-order low-pass makes of a signal: Gauss-Laguerre quadrature over its past.
+  template <class Signal>
+  static Eigen::Vector3d low_pass(const Signal& signal, double t, double time_constant_s) {
+    constexpr double kNodes[] = {0.26356032, 1.41340306, 3.59642577, 7.08581001, 12.64080084};
+    constexpr double kWeights[] = {0.52175561, 0.39866681, 0.07594245, 0.00361176, 0.00002337};
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (int i = 0; i < 5; ++i) sum += kWeights[i] * signal(t - time_constant_s * kNodes[i]);
+    return sum;
+  }
   double uniform() { return std::uniform_real_distribution<double>(0, 1)(random_); }
   double normal(double sd) { return sd * normal_(random_); }
   Eigen::Vector3d normal3(double sd) { return {normal(sd), normal(sd), normal(sd)}; }
@@ -91,7 +101,8 @@ class Synthesis {
     u.inputs.emplace();
     u.phase_rad.emplace();
     for (int i = 0; i < motion_.duration_s * 1000; ++i) {
-      const double t = i * 1e-3, amplitude = 9 + 0.5 * std::sin(t), difference = 0.3 * std::sin(2 * t), bias = 0.2 * std::cos(t);
+      const double t = i * 1e-3, amplitude = 9 + 0.5 * std::sin(t), difference = 0.3 * std::sin(2 * t),
+                   bias = 0.2 * std::cos(t);
       const double phase = std::remainder(2 * kPi * kBeat_Hz * t, 2 * kPi);
       u.t_s.push_back(100 + t);
       u.left_voltage_V.push_back((amplitude + difference) * std::cos(phase) + bias);
@@ -121,9 +132,11 @@ class Synthesis {
     const Eigen::Vector3d arm(h.position_m[0], h.position_m[1], h.position_m[2]);
     const Eigen::Vector3d gyro_bias = normal3(h.gyro_bias_sd_rad_s[0]), accel_bias = normal3(0.2);
     for (int i = 0; i < motion_.duration_s * h.rate_hz; ++i) {
-      const double t = i / h.rate_hz, seen = t - 1 / (2 * kPi * h.bandwidth_hz);
-      const Eigen::Vector3d g = rate(seen) + gyro_bias + normal3(h.gyro_noise_rad_s);
-      const Eigen::Vector3d a = specific_force(seen, arm) + accel_bias + normal3(h.accel_noise_m_s2);
+      const double t = i / h.rate_hz, slow_s = 1 / (2 * kPi * h.bandwidth_hz);
+      const auto force = [&](double past_s) { return specific_force(past_s, arm); };
+      const Eigen::Vector3d g =
+          low_pass([&](double past_s) { return rate(past_s); }, t, slow_s) + gyro_bias + normal3(h.gyro_noise_rad_s);
+      const Eigen::Vector3d a = low_pass(force, t, slow_s) + accel_bias + normal3(h.accel_noise_m_s2);
       s.t_s.push_back(100 + t + h.latency_s + normal(5e-5));
       s.gyro_x_rad_s.push_back(g(0)), s.gyro_y_rad_s.push_back(g(1)), s.gyro_z_rad_s.push_back(g(2));
       s.accel_x_m_s2.push_back(a(0)), s.accel_y_m_s2.push_back(a(1)), s.accel_z_m_s2.push_back(a(2));
