@@ -94,10 +94,26 @@ TEST(Check, SaysWhatItCannotTest) {
     EXPECT_EQ(check_flight(synthetic_log({.rotation = 0.1, .translation = 0.1, .seed = seed})).count(Verdict::warning),
               0u);
   }
+  // Rotation that the gyro sees and mocap does not.
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const std::string text = describe(check_flight(synthetic_log({.rotation = 0.03, .seed = seed})));
+    EXPECT_TRUE(text.starts_with("clock not tested: too little rotation\ngyro not tested: too little rotation\n"))
+        << text;
+  }
   EXPECT_EQ(describe(check_flight(synthetic_log({.duration_s = 1}))),
             "clock not tested: too short, or too many gaps\ngyro not tested: too short, or too many gaps\n"
             "accelerometer not tested: shorter than 2 s\n"
             "position scale not tested: needs an accelerometer that is understood\n");
+}
+
+TEST(Check, KnowsWhereTheImuSits) {
+  const SyntheticMotion motion = {.rotation = 2, .translation = 0.2, .arm_m = 0.5};
+  EXPECT_TRUE(warns([](FlightLog&) {}, {}, motion));
+  EXPECT_TRUE(warns(
+      [](FlightLog& log) {
+        log.header.imu.position_m = {0, 0, 0};
+      },
+      {"position scale: do not belong to this motion"}, motion));
 }
 
 TEST(Check, DescribesStreams) {

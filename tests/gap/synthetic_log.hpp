@@ -13,7 +13,7 @@ namespace flappy::gap {
 
 struct SyntheticMotion {
   double duration_s = 20, rotation = 1, translation = 1;  ///< sizes
-  double yaw_offset_rad = 0, shake_rad = 0.01;
+  double yaw_offset_rad = 0, shake_rad = 0.01, arm_m = 0.004;
   std::uint64_t seed = 1;
 };
 
@@ -31,7 +31,7 @@ class Synthesis {
     h.flapping_Hz = kBeat_Hz;
     h.ambient = {1.18, 0, 3, {{5, 0, -1, 0}}};
     h.mocap = {200, 0.006, 2e-4, 3e-3};
-    h.imu = {500, 0.002, 80, {0.004, 0, -0.006}, 0.02, {0.02, 0.02, 0.02}, 0.3};
+    h.imu = {500, 0.002, 80, {motion_.arm_m, 0, -0.006}, 0.02, {0.02, 0.02, 0.02}, 0.3};
     h.power = {7.4, 1000, 0.0005, 0.02, 0.03};
     h.wings = {1000, 0.02};
     add_command(log);
