@@ -457,6 +457,11 @@ std::array<double, 3> Fleet<T>::gyro_bias_rad_s(std::size_t i) const {
 }
 
 template <class T>
+void Fleet<T>::count_cycles(std::uint64_t* cycles) {
+  storage_->plan.cycles = cycles;
+}
+
+template <class T>
 void Fleet<T>::record(bool on) {
   storage_->recording = on;
 }

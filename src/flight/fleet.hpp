@@ -81,6 +81,9 @@ class Fleet {
   const sim::Batch<T>& batch() const;
   double period_s() const;
 
+  /// Counts processor cycles of each Stage (flight_block.hpp) into `cycles` from now on; for fleets on one thread.
+  void count_cycles(std::uint64_t* cycles);
+
   /// What a recorder sees of the last period's samples; switched on by record(true).
   struct ImuRecord {
     double arrival_s, gyro_rad_s[3], accel_m_s2[3];

@@ -98,8 +98,8 @@ FLAPPY_INLINE T tanh(T x) {
   return copysign(T(below_one / (T(2) + below_one)), x);
 }
 
-/// Natural logarithm of a positive normal number. Absolute error below 1.2e-7 max(1, |log x|) in float, 4.5e-16 max(1, ...)
-/// in double.
+/// Natural logarithm of a positive normal number. Relative error below 2.4e-7 in float, 4.5e-16 in double; of the
+/// polynomials: 9e-10 and 3e-17.
 template <class T>
 FLAPPY_INLINE T log(T x) {
   const T whole = mantissa(x), k = exponent(x);

@@ -53,7 +53,7 @@ struct Lanes {
 
   Lanes() = default;
   FLAPPY_INLINE explicit Lanes(Raw r) : raw(r) {}
-  FLAPPY_INLINE Lanes(double value) : raw(Raw{} + static_cast<T>(value)) {}
+  FLAPPY_INLINE Lanes(double value) : raw(static_cast<T>(value) - Raw{}) {}  // a sum would lose the sign of -0
 
   static FLAPPY_INLINE Lanes load(const T* from) {
     Lanes l;

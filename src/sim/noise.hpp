@@ -87,10 +87,11 @@ FLAPPY_INLINE Uniforms4<L> uniforms(std::uint64_t seed, std::uint32_t stream, st
     }
   } else {
     using Wide = WideWords<N>;
+    using Narrow __attribute__((vector_size(N * sizeof(std::uint32_t)))) = std::uint32_t;
     const auto load = [](const std::uint32_t* from) {
-      Wide w;
-      for (int i = 0; i < N; ++i) w.raw[i] = from[i];
-      return w;
+      Narrow w;
+      std::memcpy(&w, from, sizeof w);
+      return Wide{__builtin_convertvector(w, typename Wide::Raw)};
     };
     Wide c[4][1] = {{Wide::all(index)}, {Wide::all(stream)}, {load(flapper)}, {load(episode)}};
     philox(c, seed);
