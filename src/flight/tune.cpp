@@ -54,83 +54,104 @@ double cost_of(const Score& s) {
 }
 
 struct Problem {
-  const FleetOptions* options = nullptr;
-  const TuneOptions* tune = nullptr;
-  std::vector<double> start;
+  const TuneConfig* config = nullptr;
 
-  Controller controller(const std::vector<double>& x) const {
-    Controller c = options->controller;
-    std::size_t i = 0;
-    for (const std::string& path : tune->vary)
-      for (const ControllerField& f : fields(c))
-        if (f.path == path) *f.value = std::clamp(start[i] * std::exp(x[i]), f.range.low, f.range.high), ++i;
+  /// A decision is the logarithm of each gain over where it started.
+  Controller controller(const std::vector<double>& decision) const {
+    Controller c = config->start;
+    const std::vector<ControllerField> all = fields(c);
+    for (std::size_t i = 0; i < decision.size(); ++i) {
+      const ControllerField& f = *std::ranges::find(all, config->vary[i], &ControllerField::path);
+      *f.value = std::clamp(*f.value * std::exp(decision[i]), f.range.low, f.range.high);
+    }
     return c;
   }
-  std::vector<double> fitness(const std::vector<double>& x) const {
-    return {trial_cost(*options, controller(x), *tune)};
+  std::vector<double> fitness(const std::vector<double>& decision) const {
+    return {flight::cost_of(*config, controller(decision))};
   }
   std::pair<std::vector<double>, std::vector<double>> get_bounds() const {
-    return {std::vector<double>(start.size(), -kReach), std::vector<double>(start.size(), kReach)};
+    return {std::vector<double>(config->vary.size(), -kReach), std::vector<double>(config->vary.size(), kReach)};
   }
 };
 
+double cost_of_trial(const TuneConfig& config, const Trial& trial, const Controller& controller) {
+  FleetOptions o = trial.fly.fleet;
+  o.controller = controller;
+  o.seed = config.seed;
+  Fleet<float> fleet(trial.count, trial.fly.vehicle, o);
+  for (std::size_t i = 0; i < trial.count; ++i)
+    if (trial.fly.randomisation)
+      fleet.set_vehicle(i, trial.fly.randomisation->sample({.seed = o.seed, .flapper = static_cast<std::uint32_t>(i)}));
+  std::vector<Score> scores(trial.count);
+  const int ticks = static_cast<int>(std::lround(config.duration_s / fleet.period_s()));
+  for (int k = 1; k <= ticks; ++k) {
+    fleet.step();
+    if (k % kLook != 0) continue;
+    for (std::size_t i = 0; i < trial.count; ++i)
+      look(scores[i], fleet.truth(i), fleet.target(i), static_cast<double>(k) / ticks,
+           k * fleet.period_s() >= config.settle_s);
+  }
+  double sum = 0;
+  for (const Score& s : scores) sum += cost_of(s);
+  return sum / static_cast<double>(trial.count);
+}
+
 }  // namespace
 
-double trial_cost(const FleetOptions& options, const Controller& controller, const TuneOptions& tune) {
+TuneConfig read_tune_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  const io::Table root = io::Config::load(path, overrides).root();
+  root.integer("schema", 1, 1);
+  TuneConfig c;
+  c.vary = root.strings("vary");
+  c.duration_s = root.number("duration_s", io::positive(1000));
+  c.settle_s = root.number("settle_s", io::non_negative(1000));
+  c.seed = static_cast<std::uint64_t>(root.integer("seed", 0, INT64_MAX));
+  c.population = static_cast<unsigned>(root.integer("population", 5, 10000));
+  c.generations = static_cast<unsigned>(root.integer("generations", 1, 100000));
+  for (const io::Table& t : root.tables("trial"))
+    c.trials.push_back({read_fly_config(t.file("fly")), static_cast<std::size_t>(t.integer("count", 1, 100000)),
+                        t.number("weight", io::positive(1e6))});
+  if (c.trials.empty()) root.fail("trial", "is missing", "at least one [[trial]]");
+  c.start = c.trials[0].fly.fleet.controller;
+  std::vector<std::string> known;
+  for (const ControllerField& f : fields(c.start)) known.push_back(f.path);
+  for (const std::string& gain : c.vary) {
+    const auto found = std::ranges::find(known, gain);
+    if (found == known.end())
+      root.fail("vary", "no gain \"" + gain + "\"", "paths of the controller's file" + io::did_you_mean(gain, known));
+    if (!(*fields(c.start)[static_cast<std::size_t>(found - known.begin())].value > 0))
+      root.fail("vary", gain + " starts at 0", "gains above 0");
+  }
+  root.finish();
+  return c;
+}
+
+double cost_of(const TuneConfig& config, const Controller& controller) {
   double cost = 0, weight = 0;
-  FleetOptions o = options;
-  o.controller = controller;
-  for (const Trial& trial : tune.trials) {
-    Fleet<float> fleet(trial.count, trial.vehicles.nominal(), o);
-    for (std::size_t i = 0; i < trial.count; ++i)
-      fleet.set_vehicle(i, trial.vehicles.sample({.seed = o.seed, .flapper = static_cast<std::uint32_t>(i)}));
-    std::vector<Score> scores(trial.count);
-    const int ticks = static_cast<int>(std::lround(tune.duration_s / fleet.period_s()));
-    for (int k = 1; k <= ticks; ++k) {
-      fleet.step();
-      if (k % kLook != 0) continue;
-      for (std::size_t i = 0; i < trial.count; ++i)
-        look(scores[i], fleet.truth(i), fleet.target(i), static_cast<double>(k) / ticks, k * fleet.period_s() >= tune.settled_from_s);
-    }
-    double sum = 0;
-    for (const Score& s : scores) sum += cost_of(s);
-    cost += trial.weight * sum / static_cast<double>(trial.count);
+  for (const Trial& trial : config.trials) {
+    cost += trial.weight * cost_of_trial(config, trial, controller);
     weight += trial.weight;
   }
   return cost / weight;
 }
 
-TuneReport tune(const FleetOptions& options, const TuneOptions& tune,
-                const std::function<void(unsigned, double, const Controller&)>& progress) {
-  Problem problem{&options, &tune, {}};
-  Controller c = options.controller;
-  for (const std::string& path : tune.vary) {
-    for (const ControllerField& f : fields(c))
-      if (f.path == path && *f.value > 0) problem.start.push_back(*f.value);
-  }
-  if (problem.start.size() != tune.vary.size()) throw std::invalid_argument("a gain to vary is unknown or not above 0");
-
-  pagmo::population population(pagmo::problem(problem), tune.population - 1, tune.seed);
-  population.push_back(std::vector<double>(problem.start.size(), 0));
-  pagmo::cmaes strategy(1, -1, -1, -1, -1, kFirstStep, 0, 0, true, true, tune.seed);
-  // the first generation springs from the start, not from a random individual
-  for (std::size_t i = 0; i + 1 < population.size(); ++i) {
-    std::vector<double> x = population.get_x()[i];
-    for (double& v : x) v *= 0.1;
-    population.set_x(i, x);
-  }
-  pagmo::algorithm algorithm(strategy);
-  for (unsigned g = 1; g <= tune.generations; ++g) {
+TuneResult tune(const TuneConfig& config, const std::function<bool(const TuneResult&)>& progress) {
+  const Problem problem{&config};
+  const auto seed = static_cast<unsigned>(config.seed);
+  // the first generation springs from the controller as it is
+  pagmo::population population(pagmo::problem(problem), 0, seed);
+  for (unsigned i = 0; i < config.population; ++i)
+    population.push_back(std::vector<double>(config.vary.size(), 0), {i == 0 ? cost_of(config, config.start) : 1e9});
+  const pagmo::algorithm algorithm(pagmo::cmaes(1, -1, -1, -1, -1, kFirstStep, 0, 0, true, true, seed));
+  TuneResult result{config.start, population.get_f()[0][0], 0};
+  while (result.generations < config.generations) {
     population = algorithm.evolve(population);
-    progress(g, population.champion_f()[0], problem.controller(population.champion_x()));
+    ++result.generations;
+    const double cost = population.get_f()[population.best_idx()][0];
+    if (cost < result.cost) result = {problem.controller(population.get_x()[population.best_idx()]), cost, result.generations};
+    if (!progress(result)) break;
   }
-  TuneReport report;
-  report.best = problem.controller(population.champion_x());
-  report.cost = population.champion_f()[0];
-  for (const std::string& path : tune.vary)
-    for (const ControllerField& f : fields(report.best))
-      if (f.path == path) report.values.push_back(*f.value);
-  return report;
+  return result;
 }
 
 }  // namespace flappy::flight

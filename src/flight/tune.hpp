@@ -1,41 +1,49 @@
-// Tuning of a controller: evolution strategy (CMA-ES) over the logarithm of its gains, on many randomised vehicles at once.
+// Tuning of a controller: evolution strategy (CMA-ES) over the logarithm of its gains, judged on many flights at once.
+//
+//   schema = 1
+//   vary = ["attitude.roll.p", ...]       gains, as in the controller's file; each starts above 0
+//   duration_s, settle_s, seed, population, generations
+//   [[trial]]                             flights that judge; the controller of the first trial is where the search starts
+//   fly = "file"                          a configuration of flappy-fly
+//   count, weight
 #pragma once
 
 #include <functional>
 
-#include "flight/fleet.hpp"
-#include "sim/randomise.hpp"
+#include "flight/fly_config.hpp"
 
 namespace flappy::flight {
 
-/// Flights that judge a controller: `count` different vehicles (or one with different noise), each for `duration_s`.
 struct Trial {
-  sim::Randomisation vehicles;
+  FlyConfig fly;
   std::size_t count;
   double weight;
 };
 
-struct TuneOptions {
-  std::vector<std::string> vary;  ///< paths of the gains, as in the controller's file; each must be above 0
+struct TuneConfig {
+  std::vector<std::string> vary;
   std::vector<Trial> trials;
-  double duration_s = 5, settled_from_s = 3;
-  unsigned population = 20, generations = 60;
-  unsigned seed = 1;
+  double duration_s, settle_s;
+  std::uint64_t seed;
+  unsigned population, generations;
+  Controller start;
 };
 
-struct TuneReport {
+/// io::InputError for whatever is missing, unknown or out of range.
+TuneConfig read_tune_config(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
+
+/// Mean cost of a flight, over trials by weight. A flight that strays 0.3 m from its path costs 3 to 4, the earlier the
+/// more; another one (largest distance / 0.3 m)^2 plus, once settled, the mean square of its errors over 5 deg of roll and
+/// of pitch, 10 deg of yaw (this term at most 1) and 5 cm.
+double cost_of(const TuneConfig& config, const Controller& controller);
+
+struct TuneResult {
   Controller best;
   double cost = 0;
-  std::vector<double> values;  ///< of `vary`
+  unsigned generations = 0;
 };
 
-/// Mean cost of a flight. One that strays 0.3 m from its path costs 3 to 4, the earlier the more; another (largest
-/// distance / 0.3 m)^2 plus, once settled, the mean square of its errors over 5 deg of roll and pitch, 10 deg of yaw (at
-/// most 1) and 5 cm of x, y and z.
-double trial_cost(const FleetOptions& options, const Controller& controller, const TuneOptions& tune);
-
-/// `progress(generation, cost, controller)` after each generation.
-TuneReport tune(const FleetOptions& options, const TuneOptions& tune,
-                const std::function<void(unsigned, double, const Controller&)>& progress);
+/// `progress` after each generation; false ends the search.
+TuneResult tune(const TuneConfig& config, const std::function<bool(const TuneResult&)>& progress);
 
 }  // namespace flappy::flight

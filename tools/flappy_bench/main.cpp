@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "accuracy.hpp"
@@ -93,7 +94,7 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
           {"ns_per_step_100000", report.sizes.back().ns_per_step.median},
           {"closed_loop_control_steps_per_s", loop.rows[0].control_steps_per_s.median},
           {"bytes_per_flapper_closed_loop", loop.bytes_per_flapper},
-          {"closed_loop_shares", loop.shares},
+          {"closed_loop_shares", Json(std::map<std::string, double>(loop.shares.begin(), loop.shares.end()))},
           {"flops_per_step", ops.flops()},
           {"roof_steps_per_s", roof},
           {"instruction_set", sim::best_instruction_set()}};
