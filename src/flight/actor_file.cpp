@@ -26,15 +26,24 @@ Actor read_actor(const std::filesystem::path& path) {
   Json json;
   try {
     json = Json::parse(io::read_text(path));
-  } catch (const Json::parse_error& e) {
+  } catch (const Json::exception& e) {
     refuse(path, "is no JSON: " + std::string(e.what()), "an actor file");
   }
   Actor a;
+  // what the library would convert in silence
+  const auto check = [&](const char* key, bool (Json::*is)() const noexcept, const char* accepted) {
+    for (const Json& x : json.at(key))
+      if (!(x.*is)()) refuse(path, std::string(key) + " has " + x.dump() + " in it", accepted);
+  };
   try {
     if (json.at("schema") != 1) refuse(path, "schema is not 1", "schema 1");
     a.task = json.at("task").get<std::string>();
     a.observation = json.at("observation").get<std::vector<std::string>>();
     a.action = json.at("action").get<std::vector<std::string>>();
+    check("widths", &Json::is_number_integer, "whole numbers");
+    for (const char* key : {"mean", "scale", "weights"}) check(key, &Json::is_number, "numbers");
+    for (const auto w : json.at("widths").get<std::vector<std::int64_t>>())
+      if (w < 1 || w > kMaxWidth) refuse(path, "a layer is " + std::to_string(w) + " wide", "1 to 256");
     a.widths = json.at("widths").get<std::vector<int>>();
     const auto hidden = json.at("hidden").get<std::string>();
     if (hidden != "relu" && hidden != "tanh") refuse(path, "hidden is \"" + hidden + "\"", "relu or tanh");
@@ -48,8 +57,7 @@ Actor read_actor(const std::filesystem::path& path) {
   }
   const auto layers = static_cast<int>(a.widths.size()) - 1;
   if (layers < 1 || layers > kMaxLayers) refuse(path, "has " + std::to_string(layers) + " layers", "1 to 6");
-  for (const int w : a.widths)
-    if (w < 1 || w > kMaxWidth) refuse(path, "a layer is " + std::to_string(w) + " wide", "1 to 256");
+  if (!(a.clip > 0)) refuse(path, "clip is " + io::shortest_digits(a.clip), "a number above 0");
   const auto count = [&](const char* name, std::size_t have, std::size_t want) {
     if (have != want)
       refuse(path, std::string(name) + " has " + std::to_string(have) + " entries", std::to_string(want) + " of them");
@@ -65,16 +73,11 @@ Actor read_actor(const std::filesystem::path& path) {
 }
 
 void write_actor(const std::filesystem::path& path, const Actor& a) {
-  const Json json = {{"schema", 1},
-                     {"task", a.task},
-                     {"observation", a.observation},
-                     {"action", a.action},
-                     {"widths", a.widths},
-                     {"hidden", a.hidden == Activation::relu ? "relu" : "tanh"},
-                     {"mean", a.mean},
-                     {"scale", a.scale},
-                     {"clip", a.clip},
-                     {"weights", a.weights}};
+  const Json json = {
+      {"schema", 1},         {"task", a.task},     {"observation", a.observation},
+      {"action", a.action},  {"widths", a.widths}, {"hidden", a.hidden == Activation::relu ? "relu" : "tanh"},
+      {"mean", a.mean},      {"scale", a.scale},   {"clip", a.clip},
+      {"weights", a.weights}};
   io::write_atomically(path, json.dump() + "\n");
 }
 

@@ -1,5 +1,6 @@
 #include "flight/fleet.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string_view>
@@ -130,6 +131,10 @@ struct Fleet<T>::Storage {
     plan.arc = rounded<T>(fill(c.arc));
     TaskConstants<double> task = options.task.constants;
     task.tick_s = period_s;
+    // half-way between ticks, so that rounding cannot move an end by one
+    task.limits.time_s = (std::ceil(task.limits.time_s / period_s - 1e-6) - 0.5) * period_s;
+    for (double* after : {&task.limits.faced_by_s, &task.limits.arrived_by_s})
+      *after = (std::floor(*after / period_s + 1e-6) + 0.5) * period_s;
     plan.task = rounded<T>(task);
     plan.parts = options.task.parts;
     plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(period_s)};
@@ -250,6 +255,7 @@ Fleet<T>::Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOpt
   const double steps = 1 / (options.control_hz * options.batch.step_s);
   if (!(steps >= 1) || std::abs(steps - std::round(steps)) > 1e-6)
     throw std::invalid_argument("the control period is no whole number of physics steps");
+  if (options.task.path.empty()) throw std::invalid_argument("the task has no path");
   storage_ = std::make_unique<Storage>(count, vehicle, options, static_cast<int>(std::lround(steps)));
   // lanes beyond the last flapper fly along, so that no lane ever holds numbers of no flight
   Storage& s = *storage_;
@@ -310,6 +316,14 @@ void Fleet<T>::start(std::size_t i, std::uint32_t episode, const sim::FlapperSta
 template <class T>
 void Fleet<T>::set_actor(std::shared_ptr<const Actor> actor) {
   Storage& s = *storage_;
+  if (actor) {
+    const auto same = [](const std::vector<std::string>& names, const std::vector<Signal>& signals) {
+      return std::ranges::equal(names, signals, {}, {}, &Signal::name);
+    };
+    if (!same(actor->observation, s.options.task.observation()) || !same(actor->action, s.options.task.action()) ||
+        actor->widths.empty() || static_cast<std::size_t>(actor->widths.front()) != actor->observation.size())
+      throw std::invalid_argument("the actor's observation or action is not that of the task");
+  }
   s.actor = actor;
   s.plan.actor = {};
   if (!actor) return;
@@ -464,12 +478,16 @@ void Fleet<T>::count_cycles(std::uint64_t* cycles) {
 template <class T>
 void Fleet<T>::record(bool on) {
   storage_->recording = on;
+  storage_->imu_tap.clear();
+  storage_->mocap_tap.clear();
 }
 
 template <class T>
 auto Fleet<T>::imu_samples(std::size_t i) const -> std::vector<ImuRecord> {
   const Storage& s = *storage_;
   std::vector<ImuRecord> list;
+  if (s.imu_tap.empty()) return list;
+  storage_->at(i);
   double time = static_cast<double>(s.period->first_step) * s.options.batch.step_s;
   int sample = 0;
   for (const Slice& slice : s.period->slices) {
@@ -488,6 +506,8 @@ template <class T>
 auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
   const Storage& s = *storage_;
   std::vector<MocapRecord> list;
+  if (s.mocap_tap.empty()) return list;
+  storage_->at(i);
   double time = static_cast<double>(s.period->first_step) * s.options.batch.step_s;
   int sample = 0;
   for (const Slice& slice : s.period->slices) {

@@ -40,7 +40,7 @@ template <class T>
 class Fleet {
  public:
   /// `count` copies of `vehicle`, each at the start of its episode 0. std::invalid_argument where the control period is no
-  /// whole number of physics steps.
+  /// whole number of physics steps, a sensor is faster than they are, or the task has no path.
   Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOptions& options);
   ~Fleet();
   Fleet(Fleet&&) noexcept;
@@ -54,7 +54,8 @@ class Fleet {
   void start(std::size_t i, std::uint32_t episode);
   void start(std::size_t i, std::uint32_t episode, const sim::FlapperState& state, sim::Start kind);
 
-  /// The actor that acts from now on, or none. It must fit the task's observation and action.
+  /// The actor that acts from now on, or none: then the last actions stay. std::invalid_argument unless its observation and
+  /// action are those of the task.
   void set_actor(std::shared_ptr<const Actor> actor);
   /// Action of flapper `i` for the next period, each in [-1, 1]; an actor would overwrite it.
   void set_action(std::size_t i, const double (&action)[kActions]);
@@ -84,7 +85,7 @@ class Fleet {
   /// Counts processor cycles of each Stage (flight_block.hpp) into `cycles` from now on; for fleets on one thread.
   void count_cycles(std::uint64_t* cycles);
 
-  /// What a recorder sees of the last period's samples; switched on by record(true).
+  /// What a recorder sees of the last period's samples: none unless record(true) came before it.
   struct ImuRecord {
     double arrival_s, gyro_rad_s[3], accel_m_s2[3];
   };

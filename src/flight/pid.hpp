@@ -36,10 +36,10 @@ inline namespace FLAPPY_ISA {
 /// What it remembers, as rows.
 template <class T>
 struct Pid {
-  T integral_x, integral_y;         // of the velocity error in W, m
-  T integral_z;                     // V
-  T integral_roll, integral_pitch;  // V
-  T integral_yaw;                   // split cycle
+  T integral_x, integral_y;               // m/s^2, in W
+  T integral_z;                           // V
+  T integral_roll, integral_pitch;        // V
+  T integral_yaw;                         // split cycle
   Vec3<T> velocity_m_s, body_rate_rad_s;  // low-passed
 };
 
@@ -87,24 +87,26 @@ FLAPPY_INLINE WingBeat<T> control(const PidConstants<Element<T>>& k, Pid<T>& m, 
   const Vec3<T> error = wanted - m.velocity_m_s;
   const auto forward = [&](const T& ex, const T& ey) { return T(yaw.cos * ex + yaw.sin * ey); };
   const auto left = [&](const T& ex, const T& ey) { return T(yaw.cos * ey - yaw.sin * ex); };
-  const T limit(k.acceleration_limit_m_s2);
-  const T a_f = T(k.forward.p) * forward(error.x, error.y) +
-                (T(k.forward.i) * forward(m.integral_x, m.integral_y) +
-                 (T(k.forward.d) * forward(slope.x, slope.y) + forward(ref.acceleration_m_s2.x, ref.acceleration_m_s2.y)));
-  const T a_l = T(k.left.p) * left(error.x, error.y) +
-                (T(k.left.i) * left(m.integral_x, m.integral_y) +
-                 (T(k.left.d) * left(slope.x, slope.y) + left(ref.acceleration_m_s2.x, ref.acceleration_m_s2.y)));
-  const auto blocked = (abs(a_f) > limit) | (abs(a_l) > limit);
-  const T reach(k.forward.integral_limit);
-  m.integral_x = where(blocked, m.integral_x, clamp(T(m.integral_x + dt * error.x), T(-reach), reach));
-  m.integral_y = where(blocked, m.integral_y, clamp(T(m.integral_y + dt * error.y), T(-reach), reach));
+  const T sum_f = forward(m.integral_x, m.integral_y), sum_l = left(m.integral_x, m.integral_y);
+  const T error_f = forward(error.x, error.y), error_l = left(error.x, error.y);
+  const T a_f = T(k.forward.p) * error_f + (T(k.forward.d) * forward(slope.x, slope.y) +
+                                            (sum_f + forward(ref.acceleration_m_s2.x, ref.acceleration_m_s2.y)));
+  const T a_l = T(k.left.p) * error_l + (T(k.left.d) * left(slope.x, slope.y) +
+                                         (sum_l + left(ref.acceleration_m_s2.x, ref.acceleration_m_s2.y)));
 
   // acceleration -> lean
-  const T g(k.gravity_m_s2);
-  const T pitch_wanted = clamp(atan2(clamp(a_f, T(-limit), limit), g), T(-T(k.pitch_limit_rad)), T(k.pitch_limit_rad));
-  const T pitch_cos = sin_cos(pitch_wanted).cos;
-  const T roll_wanted = clamp(T(-atan2(T(clamp(a_l, T(-limit), limit) * pitch_cos), g)), T(-T(k.roll_limit_rad)),
-                              T(k.roll_limit_rad));
+  const T g(k.gravity_m_s2), limit(k.acceleration_limit_m_s2), most_pitch(k.pitch_limit_rad),
+      most_roll(k.roll_limit_rad);
+  const T pitch_for_a = atan2(clamp(a_f, T(-limit), limit), g);
+  const T pitch_wanted = clamp(pitch_for_a, T(-most_pitch), most_pitch);
+  const T roll_for_a = -atan2(T(clamp(a_l, T(-limit), limit) * sin_cos(pitch_wanted).cos), g);
+  const T roll_wanted = clamp(roll_for_a, T(-most_roll), most_roll);
+  const T blocked_f = saturation(a_f, T(-limit), limit) + saturation(pitch_for_a, T(-most_pitch), most_pitch);
+  const T blocked_l = saturation(a_l, T(-limit), limit) - saturation(roll_for_a, T(-most_roll), most_roll);
+  const T step_f = integrated(sum_f, T(T(k.forward.i) * dt), error_f, T(k.forward.integral_limit), blocked_f) - sum_f;
+  const T step_l = integrated(sum_l, T(T(k.left.i) * dt), error_l, T(k.left.integral_limit), blocked_l) - sum_l;
+  m.integral_x += yaw.cos * step_f - yaw.sin * step_l;
+  m.integral_y += yaw.sin * step_f + yaw.cos * step_l;
   const T roll = atan2(R.row_z.y, R.row_z.z), pitch = T(-asin(R.row_z.x));
   const T yaw_error = atan2(T(ref.heading.sin * yaw.cos - ref.heading.cos * yaw.sin),
                             T(ref.heading.cos * yaw.cos + ref.heading.sin * yaw.sin));
@@ -115,7 +117,8 @@ FLAPPY_INLINE WingBeat<T> control(const PidConstants<Element<T>>& k, Pid<T>& m, 
                             auto most) {
     const T out = T(gain.p) * angle_error + (T(gain.d) * rate_error + integral);
     const T top(most);
-    integral = integrated(integral, T(T(gain.i) * dt), angle_error, T(gain.integral_limit), saturation(out, T(-top), top));
+    integral =
+        integrated(integral, T(T(gain.i) * dt), angle_error, T(gain.integral_limit), saturation(out, T(-top), top));
     return clamp(out, T(-top), top);
   };
   const Vec3<T>& w = m.body_rate_rad_s;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 namespace flappy::flight {
 namespace {
@@ -12,12 +13,15 @@ constexpr double kSame_s = 1e-9;  // times closer than this are the same
 
 Schedule::Schedule(const Sensors& sensors, double step_s, int period_steps)
     : sensors_(sensors), step_s_(step_s), lag_s_(low_pass_lag_s(sensors.imu)), period_steps_(period_steps) {
+  if (sensors.imu.rate_hz * step_s > 1 + 1e-9 || sensors.mocap.rate_hz * step_s > 1 + 1e-9)
+    throw std::invalid_argument("a sensor's rate is above that of the physics steps");
   const double period_s = step_s * period_steps;
-  // from the horizon to the newest increment: a pose's way, the wait for the next one, and two periods of rounding
-  const double reach_s = sensors.mocap.latency_s + 1 / sensors.mocap.rate_hz + sensors.imu.latency_s + lag_s_ +
-                         1 / sensors.imu.rate_hz + 2 * period_s;
-  ring_slots_ = static_cast<int>(std::ceil(reach_s / period_s)) + 2;
-  queue_slots_ = static_cast<int>(std::ceil(reach_s * sensors.mocap.rate_hz)) + 2;
+  // a pose waits until it and the IMU's samples of its time have arrived, and for the end of the period; the ring holds what
+  // the IMU gathered since the pose before it
+  const double wait_s =
+      period_s + std::max(sensors.mocap.latency_s, sensors.imu.latency_s + lag_s_ + 1 / sensors.imu.rate_hz + period_s);
+  ring_slots_ = static_cast<int>(std::ceil((wait_s + 1 / sensors.mocap.rate_hz) / period_s)) + 2;
+  queue_slots_ = static_cast<int>(std::ceil(wait_s * sensors.mocap.rate_hz)) + 1;
   horizon_s_ = present_s_ = -lag_s_;
 }
 
@@ -63,7 +67,8 @@ void Schedule::sample(std::int64_t end) {
   }
   if (last_imu_s_ > gathered_from_s) {
     period_.push_slot = static_cast<int>(pushed_++ % ring_slots_);
-    ring_.push_back({period_.push_slot, gathered_from_s - lag_s_, last_imu_s_ - lag_s_, last_imu_s_ + sensors_.imu.latency_s});
+    ring_.push_back(
+        {period_.push_slot, gathered_from_s - lag_s_, last_imu_s_ - lag_s_, last_imu_s_ + sensors_.imu.latency_s});
   }
 }
 
@@ -75,7 +80,8 @@ void Schedule::fuse_arrived() {
       if (e.arrival_s <= now_s() + kSame_s) until = e.to_s;
     return until;
   }();
-  while (!queue_.empty() && queue_.front().arrival_s <= now_s() + kSame_s && queue_.front().time_s <= covered_s + kSame_s) {
+  while (!queue_.empty() && queue_.front().arrival_s <= now_s() + kSame_s &&
+         queue_.front().time_s <= covered_s + kSame_s) {
     Fuse fuse{queue_.front().slot, static_cast<int>(period_.advance.size()), 0};
     const double target = queue_.front().time_s;
     queue_.pop_front();
@@ -84,6 +90,7 @@ void Schedule::fuse_arrived() {
       const double duration = e.to_s - e.from_s, until = std::min(e.to_s, target);
       if (until > horizon_s_ + kSame_s) period_.advance.push_back({e.slot, (until - horizon_s_) / duration, duration});
       horizon_s_ = std::max(horizon_s_, until);
+      period_.newest = {e.slot, 1, duration};  // unless replay knows a newer one
       if (e.to_s > target + kSame_s) break;
       ring_.pop_front();
     }

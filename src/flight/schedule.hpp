@@ -45,7 +45,8 @@ struct Period {
 
 class Schedule {
  public:
-  /// `period_steps` physics steps of `step_s` in a control period.
+  /// `period_steps` physics steps of `step_s` in a control period. std::invalid_argument where a sensor would sample more
+  /// than once in a step.
   Schedule(const Sensors& sensors, double step_s, int period_steps);
 
   const Period& next();
@@ -82,8 +83,8 @@ class Schedule {
   int period_steps_, ring_slots_, queue_slots_;
   std::int64_t step_ = 0, imu_count_ = 0, mocap_count_ = 0, pushed_ = 0;
   double last_imu_s_ = 0, horizon_s_, present_s_;
-  std::deque<Entry> ring_;   // beyond the horizon, oldest first
-  std::deque<Pose> queue_;   // not yet fused
+  std::deque<Entry> ring_;  // beyond the horizon, oldest first
+  std::deque<Pose> queue_;  // not yet fused
   Period period_;
 };
 
