@@ -534,7 +534,7 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
       h = sim::mixed(h, sim::bits_of(rows[r][lane]));
     for (const std::uint32_t word : {f.flapper[lane], f.flight[lane], f.tick[lane], f.segment[lane], f.ended[lane]})
       h = sim::mixed(h, word);
-    const auto add = [&](const std::vector<T>& rows_of_all, std::size_t size) {
+    const auto add = [&, lane = lane](const std::vector<T>& rows_of_all, std::size_t size) {
       for (std::size_t k = static_cast<std::size_t>(lane); k < size; k += kLanes<T>)
         h = sim::mixed(h, sim::bits_of(rows_of_all[i / kLanes<T> * size + k]));
     };
