@@ -1,0 +1,175 @@
+// The determinism contract for closed-loop flight: sensors, estimator, controllers, actors and tasks too give one hash for any
+// number of threads, batch size, place in the batch, instruction set and optimisation level.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "flight/fleets.hpp"
+#include "sim/randomise.hpp"
+
+namespace flappy::flight {
+namespace {
+
+/// Golden hashes; a change means that every recorded run and every trained policy flies differently: say so in the commit.
+struct Case {
+  const char* name;
+  std::uint64_t in_float, in_double;
+};
+constexpr Case kCases[] = {{"pid", 0x2c663e8f207c2410, 0xc4b389096adfabfd},
+                           {"arc", 0xe8f8fa8532091c39, 0x43353cd999453413},
+                           {"actor", 0xe741150b47d89170, 0xae66f5fa8dada656}};
+
+constexpr std::size_t kFlappers = 272, kSmall = 17;
+constexpr int kPeriods = 10;
+
+model::Vehicle vehicle(std::size_t id) {
+  static const sim::Randomisation randomisation = [] {
+    const auto config = io::Config::load(test::source_path("configs/sim/hover_batch.toml"));
+    return sim::Randomisation(test::identified(), config.root());
+  }();
+  model::Vehicle v = randomisation.sample({.seed = 11, .flapper = static_cast<std::uint32_t>(id), .episode = 2});
+  if (id % 5 == 0) v.effects["body_drag"] = {{"drag_area_m2", 0.001}, {"centre_z_m", 0.01}};
+  if (id % 7 == 0) v.effects["ground_effect"] = {{"gain", 0.2}, {"length_m", 0.05}};
+  return v;
+}
+
+std::shared_ptr<const Actor> actor(const Task& task) {
+  Actor a;
+  for (const Signal& s : task.observation()) {
+    a.observation.push_back(s.name);
+    a.mean.push_back(0.125 * s.low);
+    a.scale.push_back(2 / (s.high - s.low));
+  }
+  for (const Signal& s : task.action()) a.action.push_back(s.name);
+  a.widths = {static_cast<int>(a.observation.size()), 11, 9, kActions};
+  a.hidden = Activation::tanh;
+  for (std::size_t i = 0; i < weight_count(a.widths); ++i)
+    a.weights.push_back(static_cast<double>(i * 37 % 101) / 128 - 0.375);
+  return std::make_shared<Actor>(std::move(a));
+}
+
+/// Rates that divide neither each other nor the control rate, delays, losses, a path, and every part of an observation. Gains
+/// stand here, so that tuning the shipped ones changes no hash.
+FleetOptions options(const std::string& name) {
+  const bool adaptive = name == "arc";
+  Controller c;
+  c.kind = adaptive ? Controller::Kind::arc : Controller::Kind::pid;
+  double gain = 0.5;
+  for (ControllerField& f : fields(c)) {
+    *f.value = std::min(std::max(gain, f.range.low + 0.01), f.range.high);
+    gain = gain < 3 ? gain * 1.3 : 0.4;
+  }
+  c.velocity_low_pass_hz = 20, c.body_rate_low_pass_hz = 30;
+  if (adaptive) {
+    c.arc.inertia_x_kg_m2 = c.arc.inertia_y_kg_m2 = 5e-6, c.arc.inertia_z_kg_m2 = 3e-6;
+    c.arc.roll_Nm_V = 1e-3, c.arc.pitch_Nm_V = 6e-4, c.arc.yaw_Nm_split = 4e-3, c.arc.thrust_N_V = 0.0165;
+    c.arc.initial_mass_kg = 0.0125, c.arc.mass_kg = {0.05, 0.008, 0.02};
+    for (auto* a : {&c.arc.roll_Nm, &c.arc.pitch_Nm, &c.arc.yaw_Nm}) *a = {1e-4, -1e-5, 1e-5};
+    c.arc.disturbance_m_s2 = {5, -0.5, 0.5};
+  }
+  const Sensors s = sensors("paper", {"imu.rate_hz=333.0", "imu.latency_s=0.0005", "imu.low_pass_hz=90.0",
+                                      "imu.position_m.x=0.01", "imu.position_m.z=-0.005", "mocap.rate_hz=470.0",
+                                      "mocap.latency_s=0.003", "mocap.loss_probability=0.3", "mocap.loss_length=2.0"});
+  const Task t = task(
+      along(waypoint(0, 0, 0, 0.3) + waypoint(0.004, 0.1, 0.05, 0.4, 1) + waypoint(0.02, 0, 0, 0.3, -2),
+            "kind = \"flying\"\n[start.position_m]\nx_half = 0.3\ny_half = 0.3\nz = 0.4\nz_half = 0.1\n"
+            "[start.rotation_rad]\nx_half = 0.5\ny_half = 0.5\nz_half = 3.0\n[start.velocity_m_s]\nx_half = 1.0\n"
+            "[start.body_rate_rad_s]\nx_half = 5.0\nz_half = 5.0",
+            "\"rotation_matrix\", \"position_error\", \"velocity\", \"body_rate\", \"beat_phase\", \"heading_error\", "
+            "\"previous_action\""),
+      0.001);
+  FleetOptions o = fleet_options(s, c, t);
+  o.control_hz = 1000;
+  o.seed = 0x123456789abcULL;
+  o.batch.world.ground_z_m = 0;
+  o.batch.world.walls = {{1, 0, -1, 0}};
+  o.task.constants.hand_back = {1, -1, 0.3, 2, 2, 0.5, 0.5, 8};
+  o.task.constants.limits.x_high_m = 0.1;
+  return o;
+}
+
+template <class T>
+Fleet<T> fly(const FleetOptions& common, bool acting, std::size_t first, std::size_t count, int threads,
+             const std::string& set) {
+  FleetOptions o = common;
+  o.first_flapper = static_cast<std::uint32_t>(first);
+  o.batch.threads = threads;
+  o.batch.instruction_set = set;
+  Fleet<T> fleet(count, test::identified(), o);
+  if (acting) fleet.set_actor(actor(o.task));
+  const auto start = [&](std::size_t i, std::uint32_t episode) {
+    if ((first + i) % 3 == 0) fleet.start(i, episode, {}, sim::Start::standing);
+    else fleet.start(i, episode);
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    fleet.set_vehicle(i, vehicle(first + i));
+    start(i, 0);
+    fleet.set_added(i, {0.1 * static_cast<double>((first + i) % 9), 0, 0, 0.001});
+  }
+  for (int period = 0; period < kPeriods; ++period) {
+    fleet.step();
+    for (std::size_t i = 0; i < count && period == 5; ++i)
+      if ((first + i) % 13 == 0) start(i, 1);
+  }
+  return fleet;
+}
+
+template <class T>
+void one_hash(const Case& c, std::uint64_t golden) {
+  const FleetOptions o = options(c.name);
+  const bool acting = std::string(c.name) == "actor";
+  std::uint64_t small = 0;
+  for (const std::string& set : sim::instruction_sets())
+    for (const int threads : {1, 2, 3, 16}) {
+      const Fleet<T> fleet = fly<T>(o, acting, 0, kFlappers, threads, set);
+      EXPECT_EQ(fleet.hash(), golden) << c.name << ", " << set << ", " << threads << " threads: 0x" << std::hex
+                                      << fleet.hash();
+      EXPECT_EQ(fleet.batch().count_status(sim::kFrozen), 0u);
+      small = 0;
+      for (std::size_t i = 0; i < kSmall; ++i) small = small * 31 + fleet.hash(i, i + 1);
+    }
+  for (const std::string& set : sim::instruction_sets())
+    for (const int threads : {1, 2, 3, 16})
+      for (const std::size_t size : {std::size_t{1}, std::size_t{17}}) {
+        std::uint64_t all = 0;
+        for (std::size_t first = 0; first < kSmall; first += size) {
+          const Fleet<T> fleet = fly<T>(o, acting, first, size, threads, set);
+          for (std::size_t i = 0; i < size; ++i) all = all * 31 + fleet.hash(i, i + 1);
+        }
+        EXPECT_EQ(all, small) << c.name << ", " << set << ", batches of " << size;
+      }
+}
+
+TEST(ClosedLoopDeterminism, Float) {
+  for (const Case& c : kCases) one_hash<float>(c, c.in_float);
+}
+TEST(ClosedLoopDeterminism, Double) {
+  for (const Case& c : kCases) one_hash<double>(c, c.in_double);
+}
+
+TEST(ClosedLoopDeterminism, HashSeesNoiseActionsAndTime) {
+  const FleetOptions o = options("pid");
+  Fleet<float> a = fly<float>(o, false, 0, 3, 1, ""), b = fly<float>(o, false, 0, 3, 1, "");
+  EXPECT_EQ(a.hash(), b.hash());
+  b.set_action(1, {0, 0, 0, 1e-6});
+  EXPECT_NE(a.hash(), b.hash());
+  EXPECT_EQ(a.hash(0, 1), b.hash(0, 1));
+  FleetOptions other = o;
+  other.seed += std::uint64_t{1} << 40;
+  EXPECT_NE(fly<float>(other, false, 0, 3, 1, "").hash(), a.hash());
+  // losses, corrections, contact with a task's limits: all of it happened to someone
+  const Fleet<float> many = fly<float>(o, false, 0, kFlappers, 1, "");
+  int corrected = 0, out = 0, back = 0;
+  for (std::size_t i = 0; i < kFlappers; ++i) {
+    corrected += many.innovation(i).first > 0;
+    out += (many.ended(i) & kOutOfBounds) != 0;
+    back += many.handed_back(i);
+  }
+  for (const int n : {corrected, out, back}) {
+    EXPECT_GT(n, 10);
+    EXPECT_LT(n, static_cast<int>(kFlappers) - 10);
+  }
+}
+
+}  // namespace
+}  // namespace flappy::flight
