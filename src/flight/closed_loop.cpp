@@ -167,24 +167,44 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   store_rows(episode, f.episode, first);
 }
 
+/// Adds the time since the last lap to a stage, where a benchmark asked for it.
+class Stopwatch {
+ public:
+  explicit Stopwatch(std::uint64_t* cycles) : cycles_(cycles), last_(cycles != nullptr ? __rdtsc() : 0) {}
+  void lap(Stage stage) {
+    if (cycles_ == nullptr) return;
+    const std::uint64_t now = __rdtsc();
+    cycles_[stage] += now - last_;
+    last_ = now;
+  }
+
+ private:
+  std::uint64_t* cycles_;
+  std::uint64_t last_;
+};
+
 template <class T>
 void fly_block(const FlightSpace<T>& s, const FlightPlan<T>& plan) {
+  Stopwatch watch(plan.cycles);
   for_lanes<T>([&](int first) { steer(s, plan, first); });
+  watch.lap(kSteer);
   std::int64_t step = plan.first_step;
   int imu_samples = 0, mocap_samples = 0;
   for (int i = 0; i < plan.slice_count; ++i) {
     const Slice& slice = plan.slices[i];
     plan.step(s.body, s.effects, *plan.physics, step, slice.steps, i == 0 ? s.next : nullptr);
+    watch.lap(kPhysics);
     step += slice.steps;
     if (slice.imu || slice.mocap)
       for_lanes<T>([&](int first) { sense(s, plan, slice, imu_samples, mocap_samples, first); });
     imu_samples += slice.imu;
     mocap_samples += slice.mocap;
+    watch.lap(kSense);
   }
-  for_lanes<T>([&](int first) {
-    fuse(s, plan, first);
-    judge(s, plan, first);
-  });
+  for_lanes<T>([&](int first) { fuse(s, plan, first); });
+  watch.lap(kFuse);
+  for_lanes<T>([&](int first) { judge(s, plan, first); });
+  watch.lap(kJudge);
 }
 
 }  // namespace

@@ -466,6 +466,18 @@ std::pair<double, double> Fleet<T>::innovation(std::size_t i) const {
 }
 
 template <class T>
+std::array<double, 3> Fleet<T>::gyro_bias_rad_s(std::size_t i) const {
+  const auto [f, lane] = storage_->at(i);
+  const auto bias = get<Imu<double>>(f.imu, lane).gyro_bias_rad_s;
+  return {bias.x, bias.y, bias.z};
+}
+
+template <class T>
+void Fleet<T>::count_cycles(std::uint64_t* cycles) {
+  storage_->plan.cycles = cycles;
+}
+
+template <class T>
 void Fleet<T>::record(bool on) {
   storage_->recording = on;
   storage_->imu_tap.clear();
@@ -524,7 +536,7 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
       h = sim::mixed(h, sim::bits_of(rows[r][lane]));
     for (const std::uint32_t word : {f.flapper[lane], f.flight[lane], f.tick[lane], f.segment[lane], f.ended[lane]})
       h = sim::mixed(h, word);
-    const auto add = [&](const std::vector<T>& rows_of_all, std::size_t size) {
+    const auto add = [&, lane = lane](const std::vector<T>& rows_of_all, std::size_t size) {
       for (std::size_t k = static_cast<std::size_t>(lane); k < size; k += kLanes<T>)
         h = sim::mixed(h, sim::bits_of(rows_of_all[i / kLanes<T> * size + k]));
     };

@@ -2,6 +2,7 @@
 // bytes of a flapper depend on its vehicle, its task and its place in the random streams, as those of a Batch do.
 #pragma once
 
+#include <array>
 #include <memory>
 
 #include "flight/actor_file.hpp"
@@ -75,10 +76,14 @@ class Fleet {
   std::vector<double> observation(std::size_t i) const;
   /// Squared innovations of the last pose over their variance: angle and position, three degrees of freedom each.
   std::pair<double, double> innovation(std::size_t i) const;
+  std::array<double, 3> gyro_bias_rad_s(std::size_t i) const;  ///< true
 
   sim::Batch<T>& batch();
   const sim::Batch<T>& batch() const;
   double period_s() const;
+
+  /// Counts processor cycles of each Stage (flight_block.hpp) into `cycles` from now on; for fleets on one thread.
+  void count_cycles(std::uint64_t* cycles);
 
   /// What a recorder sees of the last period's samples: none unless record(true) came before it.
   struct ImuRecord {

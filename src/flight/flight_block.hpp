@@ -53,6 +53,9 @@ struct FlightSpace {
   const sim::Block<T>* next;  // to be fetched from memory meanwhile
 };
 
+/// Stages of a control period, in order.
+enum Stage { kSteer, kPhysics, kSense, kFuse, kJudge, kStages };
+
 /// How all blocks fly through one control period.
 template <class T>
 struct FlightPlan {
@@ -77,6 +80,7 @@ struct FlightPlan {
   std::uint32_t parts;  // observed
   PathView<T> path;
   ActorView<T> actor;
+  std::uint64_t* cycles = nullptr;  // spent in each stage, for a benchmark on one thread
 };
 
 /// Flies a block through one control period.

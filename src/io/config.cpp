@@ -484,6 +484,8 @@ std::vector<Table> Table::tables(std::string_view key) const {
   return all;
 }
 
+bool Table::has(std::string_view key) const { return find(*section_, key).node != nullptr; }
+
 std::vector<std::string> Table::keys() const {
   std::vector<std::string> names;
   for (const auto& [key, node] : *section_->table) names.emplace_back(key.str());

@@ -65,6 +65,8 @@ class Table {
   /// The tables of an array of tables; none when it is missing.
   std::vector<Table> tables(std::string_view key) const;
 
+  /// Whether a key is present; it counts as asked for.
+  bool has(std::string_view key) const;
   /// Names of the keys present, sorted.
   std::vector<std::string> keys() const;
   /// Full dotted path of this table; empty for the root.

@@ -11,7 +11,17 @@
 namespace flappy::sim {
 
 /// What a random number is for; part of its key. Never renumber: recorded runs depend on it.
-enum class Stream : std::uint32_t { vehicle = 1, sensor_bias = 2, imu = 3, mocap = 4, start = 5, exploration = 6, start_estimate = 7 };
+enum class Stream : std::uint32_t {
+  vehicle = 1,
+  sensor_bias = 2,
+  imu = 3,
+  mocap = 4,
+  start = 5,
+  exploration = 6,
+  start_estimate = 7,
+  power = 8,
+  wings = 9,
+};
 
 struct RandomKey {
   std::uint64_t seed = 0;

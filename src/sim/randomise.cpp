@@ -135,4 +135,11 @@ model::Vehicle Randomisation::sample(RandomKey key) const {
   return vehicle;
 }
 
+Randomisation read_randomisation(model::Vehicle nominal, const io::Table& root) {
+  root.integer("schema", 1, 1);
+  Randomisation randomisation(std::move(nominal), root);
+  root.finish();
+  return randomisation;
+}
+
 }  // namespace flappy::sim

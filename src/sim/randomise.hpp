@@ -52,4 +52,7 @@ class Randomisation {
   std::vector<Draw> draws_;
 };
 
+/// Reads all of a file of [[randomise]] tables, as configs/randomisation has them.
+Randomisation read_randomisation(model::Vehicle nominal, const io::Table& root);
+
 }  // namespace flappy::sim

@@ -18,7 +18,7 @@ constexpr int kPeriods = 4, kSteps = 20;
 
 const Randomisation& randomisation() {
   static const Randomisation r = [] {
-    const auto config = io::Config::load(test::source_path("configs/sim/hover_batch.toml"));
+    const auto config = io::Config::load(test::source_path("configs/randomisation/published.toml"));
     return Randomisation(test::identified(), config.root());
   }();
   return r;

@@ -90,6 +90,20 @@ TEST(FlightLog, ReadsBackExactly) {
   EXPECT_EQ(flight_log_files(least).size(), 4u);
 }
 
+TEST(FlightLog, KeepsUnitQuaternionsToTheLastDigit) {
+  FlightLog log = sample_log();
+  flight::MocapStream& m = log.mocap;
+  m = {};
+  for (int i = 0; i < 1000; ++i) {
+    const double w = std::cos(i), x = std::sin(2.0 * i), y = std::sin(3.0 * i), z = std::cos(5.0 * i);
+    const double length = std::sqrt(w * w + x * x + y * y + z * z);
+    m.t_s.push_back(1e-3 * i);
+    for (Column* c : {&m.x_m, &m.y_m, &m.z_m}) c->push_back(i);
+    m.qw.push_back(w / length), m.qx.push_back(x / length), m.qy.push_back(y / length), m.qz.push_back(z / length);
+  }
+  EXPECT_EQ(parse_flight_log(flight_log_files(log), "log"), log);
+}
+
 TEST(FlightLog, TakesColumnsInAnyOrder) {
   LogFiles files = flight_log_files(sample_log());
   files["power.csv"] = "right_current_A,battery_V,t_s,left_current_A\n1,2,0,3\n4,5,0.01,6\n";
@@ -206,6 +220,8 @@ TEST(FlightLog, RefusesWhatIsMissingOrApart) {
             "log/wings.csv: is there, but flight.toml has no [wings]; accepted: both or neither");
   EXPECT_EQ(changed([](LogFiles& f) { f["wings.csv"] = f["wings.csv"].substr(0, f["wings.csv"].find('\n')); }),
             "log/wings.csv: holds 0 samples; accepted: at least 2");
+  EXPECT_EQ(changed([](LogFiles& f) { f["wings.csv"].resize(f["wings.csv"].find("\n0.00")); }),
+            "log/wings.csv: holds 1 samples; accepted: at least 2");
   EXPECT_EQ(changed([](LogFiles& f) { f["power.csv"] = ""; }),
             "log/power.csv: is empty; accepted: a line of column names, then rows of numbers");
   EXPECT_EQ(changed([](LogFiles& f) {

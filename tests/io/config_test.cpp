@@ -100,6 +100,15 @@ TEST(Config, KeysAreSortedAndMayHoldDotsWhenQuoted) {
   EXPECT_EQ(config.root().number("left.motor"), 2.0);
 }
 
+TEST(Config, SaysWhetherAKeyIsThere) {
+  const Table root = Config::parse("a.b = 1\n", "v.toml").root();
+  EXPECT_TRUE(root.has("a"));
+  EXPECT_TRUE(root.has("a.b"));
+  EXPECT_FALSE(root.has("a.c"));
+  EXPECT_FALSE(root.has("d"));
+  root.finish();  // what was asked about is known
+}
+
 TEST(Config, TablesOutliveTheConfig) {
   const Table torso = Config::parse("[torso]\nmass_kg = 0.1\n", "v.toml").root().table("torso");
   EXPECT_EQ(torso.number("mass_kg"), 0.1);

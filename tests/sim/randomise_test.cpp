@@ -194,7 +194,7 @@ TEST(Sample, ScalesMassAndInertiaOfABodyByOneFactor) {
 }
 
 TEST(Sample, OfTheShippedTableIsPhysicalAndUncorrelated) {
-  const auto config = io::Config::load(test::source_path("configs/sim/hover_batch.toml"));
+  const auto config = io::Config::load(test::source_path("configs/randomisation/published.toml"));
   const Randomisation r(test::nominal(), config.root());
   std::vector<std::vector<double>> x(6);
   for (std::uint32_t i = 0; i < kDraws / 4; ++i) {

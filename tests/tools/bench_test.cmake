@@ -36,11 +36,15 @@ string(CONCAT good
   "duration_s = 0.05\n"
   "step_s = 1e-4\n"
   "[input]\n"
-  "amplitude_V = 9.8\n"
+  "amplitude_V = 9.8\n")
+string(CONCAT randomisation
+  "schema = 1\n"
   "[[randomise]]\n"
   "parameters = [\"torso.mass_kg\", \"torso.inertia_kg_m2\"]\n"
   "law = \"scale_normal\"\n"
   "sd = 0.1\n")
+file(WRITE ${WORK}/randomisation.toml "${randomisation}")
+string(REPLACE "[input]" "randomisation = \"randomisation.toml\"\n[input]" good "${good}")
 file(WRITE ${WORK}/good.toml "${good}")
 
 foreach(threads IN ITEMS 1 2)
@@ -127,19 +131,21 @@ endfunction()
 
 expect_edit_refused("seed = 1" "sed = 1" ": seed: is missing; accepted: an integer of at least 0; is it misspelt as \"sed\"?")
 expect_edit_refused("seed = 1" "seed = 1\nthread = 1"
-  ":6:1: thread: unknown key; accepted: count, duration_s, input, precision, randomise, schema, seed, step_s, threads, vehicle, world; did you mean \"threads\"?")
+  ":6:1: thread: unknown key; accepted: count, duration_s, input, precision, randomisation, schema, seed, step_s, threads, vehicle, world; did you mean \"threads\"?")
 expect_edit_refused("duration_s = 0.05" "duration_s = \"long\""
   ":6:14: duration_s: is a string; accepted: a number above 0, at most 1000")
 expect_edit_refused("count = 70" "count = -70" ":4:9: count: -70 is out of range; accepted: an integer from 1 to 1000000")
-expect_edit_refused("amplitude_V = 9.8" "amplitude_V = nan" ":9:15: input.amplitude_V: nan is not finite; accepted: a number")
+expect_edit_refused("amplitude_V = 9.8" "amplitude_V = nan" ":10:15: input.amplitude_V: nan is not finite; accepted: a number")
 expect_edit_refused("seed = 1" "seed = 1\nseed = 1"
   ":6:8: not valid TOML: Error while parsing key-value pair: cannot redefine existing integer 'seed'")
-expect_edit_refused("sd = 0.1\n" "sd = 0.1\nlaw"
-  ":14:4: not valid TOML: Error while parsing key-value pair: encountered end-of-file")
+expect_edit_refused("amplitude_V = 9.8\n" "amplitude_V = 9.8\nlaw"
+  ":11:4: not valid TOML: Error while parsing key-value pair: encountered end-of-file")
 expect_edit_refused("step_s = 1e-4" "step_s = 3e-4"
   ":7:10: step_s: does not divide the driver's hold of 0.001 s; accepted: hold_s / n")
-expect_edit_refused("sd = 0.1\n" "sd = 0.4\n"
-  ":11:14: randomise[0].parameters: torso.mass_kg could become -0.00218134; accepted: draws between 1e-09 and 10")
+string(REPLACE "sd = 0.1" "sd = 0.4" wide "${randomisation}")
+file(WRITE ${WORK}/wide.toml "${wide}")
+expect_refused("${WORK}/wide.toml:3:14: randomise[0].parameters: torso.mass_kg could become -0.00218134; accepted: draws between 1e-09 and 10"
+  batch ${WORK}/good.toml --set randomisation=wide.toml)
 file(WRITE ${WORK}/no_schema.toml "")
 expect_refused("${WORK}/no_schema.toml: schema: is missing; accepted: an integer from 1 to 1" batch ${WORK}/no_schema.toml)
 expect_refused("--set count=0: count: 0 is out of range; accepted: an integer from 1 to 1000000"

@@ -37,7 +37,9 @@ Job read_job(const std::filesystem::path& path, const std::vector<std::string>& 
           {root.number("input.amplitude_V"), root.number_or("input.difference_V", 0), root.number_or("input.bias_V", 0),
            root.number_or("input.split_cycle", 0)},
           {},
-          sim::Randomisation(vehicle, root)};
+          sim::Randomisation(vehicle)};
+  if (root.has("randomisation"))
+    job.randomisation = sim::read_randomisation(vehicle, io::Config::load(root.file("randomisation")).root());
   job.options.step_s = root.number("step_s", {1e-6, 1e-3});
   job.options.threads = static_cast<int>(root.integer_or("threads", 0, 0, 1024));
   job.options.world.gravity_m_s2 = root.number_or("world.gravity_m_s2", 9.81, {0, 100});

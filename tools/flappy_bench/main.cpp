@@ -2,9 +2,11 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "accuracy.hpp"
+#include "closed_loop.hpp"
 #include "flappy/batch.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "hover.hpp"
@@ -67,6 +69,16 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
               100 * thrust_error, 1e3 * position_error);
   std::printf("%zu bytes per float flapper\n", bytes);
 
+  const LoopReport loop = measure_closed_loop(vehicle, FLAPPY_CONFIGS, options);
+  std::printf("closed loop, one core, float: 2 ms of physics, sensors, fusion, controller, reward and observation\n");
+  for (const LoopRow& row : loop.rows)
+    std::printf("  %-24s %8.2f M control steps/s  [%5.2f .. %5.2f]\n", row.name.c_str(),
+                row.control_steps_per_s.median / 1e6, row.control_steps_per_s.low / 1e6,
+                row.control_steps_per_s.high / 1e6);
+  std::printf("  of the first row's time:");
+  for (const auto& [name, share] : loop.shares) std::printf(" %s %.1f %%%s", name.c_str(), 100 * share, name == loop.shares.back().first ? "\n" : ",");
+  std::printf("  %zu bytes per float flapper beyond its body\n", loop.bytes_per_flapper);
+
   const auto or_null = [&](const char* name) {
     return report.median(name) ? Json(*report.median(name)) : Json(nullptr);
   };
@@ -80,6 +92,9 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
           {"bytes_per_flapper", bytes},
           {"ns_per_step_1000", report.sizes.front().ns_per_step.median},
           {"ns_per_step_100000", report.sizes.back().ns_per_step.median},
+          {"closed_loop_control_steps_per_s", loop.rows[0].control_steps_per_s.median},
+          {"bytes_per_flapper_closed_loop", loop.bytes_per_flapper},
+          {"closed_loop_shares", Json(std::map<std::string, double>(loop.shares.begin(), loop.shares.end()))},
           {"flops_per_step", ops.flops()},
           {"roof_steps_per_s", roof},
           {"instruction_set", sim::best_instruction_set()}};

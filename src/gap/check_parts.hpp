@@ -1,0 +1,40 @@
+// The parts of check_flight().
+#pragma once
+
+#include <cstdarg>
+#include <string>
+#include <vector>
+
+#include "gap/check.hpp"
+
+namespace flappy::gap {
+
+/// What a deviation must exceed to be no accident, in standard deviations: one in 16,000.
+inline constexpr double kSigmas = 4;
+
+using Findings = std::vector<Finding>;
+
+/// As printf.
+[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
+
+double median(std::vector<double> values);
+
+/// Index of the last time not after t; times.size() where there is none.
+std::size_t index_before(const std::vector<double>& times, double t);
+
+StreamStatistics stream_statistics(const std::string& name, const flight::Column& t_s,
+                                   std::optional<double> declared_hz);
+
+/// Rate of rises through the mean, from the median of the time between them; nothing with fewer than five.
+std::optional<double> beat_frequency(const flight::Column& t_s, const flight::Column& values);
+
+/// Gyro, attitude, accelerometer, position and their clocks.
+void check_motion(const flight::FlightLog& log, Findings& findings);
+/// Positions against the ground, the ceiling and the walls.
+void check_space(const flight::FlightLog& log, Findings& findings);
+/// Voltages against the frequency, inputs and phase of the beat.
+void check_command(const flight::FlightLog& log, Findings& findings);
+void check_power(const flight::FlightLog& log, Findings& findings);
+void check_wings(const flight::FlightLog& log, Findings& findings);
+
+}  // namespace flappy::gap

@@ -1,0 +1,115 @@
+# flappy-gap as a person meets it: what it prints, writes and refuses, and its exit codes.
+#   cmake -DPROGRAM=flappy-gap -DSOURCE=the project -DWORK=a folder to use -P gap_test.cmake
+cmake_minimum_required(VERSION 3.25)
+file(REMOVE_RECURSE ${WORK})
+file(MAKE_DIRECTORY ${WORK})
+
+# Runs the program; leaves `out`, `err`, `code`.
+macro(run)
+  execute_process(COMMAND ${PROGRAM} ${ARGN} OUTPUT_VARIABLE out ERROR_VARIABLE err RESULT_VARIABLE code)
+endmacro()
+
+function(expect_equal what actual expected)
+  if(NOT "${actual}" STREQUAL "${expected}")
+    message(SEND_ERROR "${what}:\n  is       ${actual}\n  expected ${expected}")
+  endif()
+endfunction()
+
+function(expect_line text)
+  string(FIND "${out}" "${text}\n" at)
+  if(at EQUAL -1)
+    message(SEND_ERROR "no line \"${text}\" in\n${out}")
+  endif()
+endfunction()
+
+# Exit code 2, `line` alone on stderr, nothing on stdout, no file (not even a temporary one) where --json pointed.
+function(expect_refused line)
+  run(${ARGN} --json ${WORK}/refused.json)
+  expect_equal("stderr" "${err}" "${line}\n")
+  expect_equal("stdout of: ${line}" "${out}" "")
+  expect_equal("exit code of: ${line}" "${code}" 2)
+  file(GLOB left ${WORK}/refused.json*)
+  expect_equal("files left by: ${line}" "${left}" "")
+endfunction()
+
+# Three seconds standing still, in `folder`, with this gravity in the accelerometer.
+function(write_flight folder gravity)
+  file(WRITE ${folder}/flight.toml
+    "schema = 1\nvehicle = \"bird.toml\"\nflapping_Hz = 10\ngravity_m_s2 = 9.81\n"
+    "[ambient]\nair_density_kg_m3 = 1.18\nground_z_m = 0\nceiling_z_m = 3\nwalls = []\n"
+    "[mocap]\nrate_hz = 50\nlatency_s = 0\nposition_noise_m = 0\nattitude_noise_rad = 1e-3\n"
+    "[imu]\nrate_hz = 50\nlatency_s = 0\nbandwidth_hz = 20\nposition_m = [0, 0, 0]\n"
+    "gyro_noise_rad_s = 0\ngyro_bias_sd_rad_s = [0.01, 0.01, 0.01]\naccel_noise_m_s2 = 0\n")
+  set(command "t_s,left_voltage_V,right_voltage_V\n")
+  set(mocap "t_s,x_m,y_m,z_m,qw,qx,qy,qz\n")
+  set(imu "t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2\n")
+  foreach(i RANGE 150)
+    math(EXPR ms "1000 + 20 * ${i}")
+    string(REGEX REPLACE "(...)$" ".\\1" t "${ms}")
+    math(EXPR phase "${i} % 5")
+    list(GET volts ${phase} volt)
+    string(APPEND command "${t},${volt},${volt}\n")
+    string(APPEND mocap "${t},0,0,0.1,1,0,0,0\n")
+    string(APPEND imu "${t},0,0,0,0,0,${gravity}\n")
+  endforeach()
+  file(WRITE ${folder}/command.csv "${command}")
+  file(WRITE ${folder}/mocap.csv "${mocap}")
+  file(WRITE ${folder}/imu.csv "${imu}")
+endfunction()
+set(volts 9 2.8 -7.3 -7.3 2.8)
+
+# ---- what is read
+
+write_flight(${WORK}/good 9.81)
+write_flight(${WORK}/bad 0)
+run(check ${WORK}/good)
+expect_equal("stderr" "${err}" "")
+expect_equal("exit code" "${code}" 0)
+expect_line("${WORK}/good: bird.toml, 10 Hz")
+expect_line("  imu            151     3.000     50.00     50.00        20.00         0  0.00 %      0.000")
+expect_line("  command        151     3.000     50.00         -        20.00         -       -      0.000")
+expect_line("  clock              not tested: too little rotation")
+expect_line("  accelerometer      ok: mean specific force (0.00, 0.00, 9.81) m/s^2 in W")
+expect_line("  flapping frequency ok: voltages beat at 10 Hz left, 10 Hz right, 10 Hz declared")
+expect_line("1 readable, warnings 0, not tested 3")
+
+run(check ${WORK}/good ${WORK}/bad --json ${WORK}/out.json)
+expect_equal("exit code" "${code}" 0)
+expect_line("  accelerometer      warning: mean specific force (0.00, 0.00, 0.00) m/s^2 in W, (0, 0, 9.81) +- 3.0 expected: gravity is missing: acceleration instead of specific force")
+expect_line("2 readable, warnings 1, not tested 6")
+file(READ ${WORK}/out.json json)
+foreach(pair IN ITEMS "warnings=1" "not_tested=6" "flights 0 warnings=0" "flights 1 warnings=1" "flights 1 folder=${WORK}/bad"
+    "flights 0 vehicle=bird.toml" "flights 0 streams 1 name=mocap" "flights 0 streams 1 samples=151" "flights 0 streams 1 declared_hz=50.0"
+    "flights 0 streams 1 missing=0" "flights 0 streams 0 declared_hz=" "flights 0 findings 0 verdict=ok")
+  string(REGEX MATCH "^([^=]*)=(.*)$" matched "${pair}")
+  string(REPLACE " " ";" keys "${CMAKE_MATCH_1}")
+  set(expected "${CMAKE_MATCH_2}")
+  string(JSON actual GET "${json}" ${keys})
+  expect_equal("${keys}" "${actual}" "${expected}")
+endforeach()
+
+# Truth is there to be judged against, not to be read.
+file(WRITE ${WORK}/good/truth.csv "no table")
+run(check ${WORK}/good)
+expect_equal("exit code beside a truth" "${code}" 0)
+
+run(--help)
+expect_equal("exit code" "${code}" 0)
+if(NOT out MATCHES "check +axes, units, clocks and dropouts")
+  message(SEND_ERROR "--help does not tell of check: ${out}")
+endif()
+
+# ---- what is refused
+
+expect_refused("${WORK}/none: cannot be read: No such file or directory" check ${WORK}/none)
+expect_refused("${WORK}/none: cannot be read: No such file or directory" check ${WORK}/good ${WORK}/none)
+expect_refused("${WORK}/good/imu.csv: cannot be read: Not a directory" check ${WORK}/good/imu.csv)
+file(APPEND ${WORK}/bad/imu.csv "4.0,0,0,0,0,0,9.81\n")
+expect_refused("${WORK}/bad/imu.csv:153: t_s: 4 does not come after 4 of the line before; accepted: times that increase"
+  check ${WORK}/good ${WORK}/bad)
+file(WRITE ${WORK}/bad/mocap.csv "t_s,x_mm,y_m,z_m,qw,qx,qy,qz\n")
+expect_refused("${WORK}/bad/mocap.csv:1: x_mm: unknown column; accepted here with another unit: \"x_m\"" check ${WORK}/bad)
+file(REMOVE ${WORK}/bad/flight.toml)
+expect_refused("${WORK}/bad/flight.toml: cannot be read: No such file or directory" check ${WORK}/bad)
+expect_refused("flappy-gap: A subcommand is required; see flappy-gap --help")
+expect_refused("flappy-gap: flight is required; see flappy-gap --help" check)

@@ -1,0 +1,98 @@
+#include "closed_loop.hpp"
+
+#include <ctime>
+
+#include "flight/flight_block.hpp"
+#include "flight/fleet.hpp"
+
+namespace flappy::bench {
+namespace {
+
+constexpr std::size_t kFlappers = 4096;
+constexpr double kControl_hz = 500;
+
+double processor_seconds() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+io::Table table(const std::string& path) { return io::Config::load(path).root(); }
+
+/// An actor of the usual size that does nothing: its weights are zero, its time is not.
+std::shared_ptr<const flight::Actor> idle_actor(const flight::Task& task) {
+  auto actor = std::make_shared<flight::Actor>();
+  const int inputs = static_cast<int>(task.observation().size());
+  actor->widths = {inputs, 32, 32, flight::kActions};
+  actor->weights.assign(flight::weight_count(actor->widths), 0);
+  actor->mean.assign(static_cast<std::size_t>(inputs), 0);
+  actor->scale.assign(static_cast<std::size_t>(inputs), 1);
+  return actor;
+}
+
+class Loop {
+ public:
+  Loop(const model::Vehicle& vehicle, const std::string& configs, const std::string& sensors,
+       const std::string& controller, bool actor)
+      : fleet_(kFlappers, vehicle, options(configs, sensors, controller)) {
+    if (actor) fleet_.set_actor(idle_actor(fleet_.options().task));
+    run(1);  // everyone is in the air
+  }
+  /// Control steps per second over `seconds` of computing.
+  double run(double seconds) {
+    double spent = 0;
+    long ticks = 0;
+    while (spent < seconds) {
+      const double start = processor_seconds();
+      for (int i = 0; i < 50; ++i) fleet_.step();
+      spent += processor_seconds() - start;
+      ticks += 50;
+    }
+    return static_cast<double>(ticks) * kFlappers / spent;
+  }
+  flight::Fleet<float>& fleet() { return fleet_; }
+
+ private:
+  static flight::FleetOptions options(const std::string& configs, const std::string& sensors,
+                                      const std::string& controller) {
+    flight::FleetOptions o;
+    o.sensors = flight::read_sensors(table(configs + "/sensors/" + sensors + ".toml"));
+    o.controller = flight::read_controller(table(configs + "/controllers/" + controller + ".toml"));
+    o.task = flight::read_task(table(configs + "/tasks/hover.toml"), 1 / kControl_hz);
+    o.control_hz = kControl_hz;
+    o.batch.threads = 1;
+    return o;
+  }
+  flight::Fleet<float> fleet_;
+};
+
+}  // namespace
+
+LoopReport measure_closed_loop(const model::Vehicle& vehicle, const std::string& configs, const SpeedOptions& options) {
+  struct Candidate {
+    std::string name;
+    Loop loop;
+    std::vector<double> values;
+  };
+  std::vector<Candidate> candidates;
+  candidates.push_back({"PID, paper's sensors", Loop(vehicle, configs, "paper", "pid", false), {}});
+  candidates.push_back({"  with an actor 32-32", Loop(vehicle, configs, "paper", "pid", true), {}});
+  candidates.push_back({"ARC, paper's sensors", Loop(vehicle, configs, "paper", "arc", false), {}});
+  candidates.push_back({"PID, code's sensors", Loop(vehicle, configs, "code", "pid", false), {}});
+  for (int round = 0; round < options.rounds; ++round)
+    for (Candidate& c : candidates) c.values.push_back(c.loop.run(options.seconds));
+
+  LoopReport report;
+  for (Candidate& c : candidates) report.rows.push_back({c.name, summary(c.values)});
+  report.bytes_per_flapper = candidates[0].loop.fleet().bytes_per_flapper();
+  std::uint64_t cycles[flight::kStages] = {};
+  candidates[0].loop.fleet().count_cycles(cycles);
+  candidates[0].loop.run(options.seconds);
+  const char* names[flight::kStages] = {"controller", "physics", "sensors", "fusion", "reward, end and observation"};
+  double total = 0;
+  for (const std::uint64_t c : cycles) total += static_cast<double>(c);
+  for (int i = 0; i < flight::kStages; ++i) report.shares.emplace_back(names[i], static_cast<double>(cycles[i]) / total);
+  return report;
+}
+
+}  // namespace flappy::bench

@@ -1,0 +1,26 @@
+// Speed of the closed loop: physics, sensors, fusion, controller, reward and observation of every flapper.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "flappy/vehicle.hpp"
+#include "speed.hpp"
+
+namespace flappy::bench {
+
+struct LoopRow {
+  std::string name;
+  Figure control_steps_per_s;
+};
+
+struct LoopReport {
+  std::vector<LoopRow> rows;                           ///< the first is what the figure is about
+  std::vector<std::pair<std::string, double>> shares;  ///< of each stage in the first row's time
+  std::size_t bytes_per_flapper = 0;                   ///< beyond those of the body
+};
+
+/// Hovering flappers with the sensors, task and controllers of `configs`; one core, float.
+LoopReport measure_closed_loop(const model::Vehicle& vehicle, const std::string& configs, const SpeedOptions& options);
+
+}  // namespace flappy::bench

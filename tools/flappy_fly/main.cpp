@@ -1,0 +1,192 @@
+// flappy-fly: flies a configuration, once or many times over, and says how far off it was; writes flight logs.
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "flight/fly.hpp"
+#include "io/program.hpp"
+
+namespace flappy::fly {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using namespace flight;
+
+volatile std::sig_atomic_t interrupted = 0;
+
+/// The first Ctrl-C ends the flights, the second the program.
+void stop_on_interrupt() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted = 1; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+class ProgressLine {
+ public:
+  void show(double done) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!terminal_ || now - shown_ < std::chrono::milliseconds(200)) return;
+    shown_ = now;
+    std::fprintf(stderr, "\rflown %3.0f %%", 100 * done);
+  }
+  void clear() const {
+    if (terminal_) std::fprintf(stderr, "\r            \r");
+  }
+
+ private:
+  bool terminal_ = isatty(STDERR_FILENO) != 0;
+  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
+};
+
+constexpr const char* kAxes[6] = {"roll", "pitch", "yaw", "x", "y", "z"};
+constexpr const char* kEnds[6] = {"time_out", "contact", "not_finite", "out_of_bounds", "heading_late", "arrival_late"};
+constexpr const char* kKeys[6] = {"rms_roll_deg", "rms_pitch_deg", "rms_yaw_deg", "rms_x_mm", "rms_y_mm", "rms_z_mm"};
+
+/// Degrees and millimetres.
+Errors shown(Errors e) {
+  for (std::size_t k = 0; k < e.size(); ++k) e[k] *= k < 3 ? 180 / std::numbers::pi : 1000;
+  return e;
+}
+
+void print_row(const std::string& name, const Errors& e) {
+  std::printf("  %-22s", name.c_str());
+  for (std::size_t k = 0; k < e.size(); ++k) {
+    if (std::isfinite(e[k])) std::printf(k < 3 ? "%8.2f" : "%8.1f", e[k]);
+    else std::printf("%8s", "-");
+  }
+  std::printf("\n");
+}
+
+std::string hexadecimal(std::uint64_t value) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+  return text;
+}
+
+void print_score(const FlyConfig& config, const FlightSummary& s) {
+  std::printf("  %-22s", "rms in degrees and mm");
+  for (const char* axis : kAxes) std::printf("%8s", axis);
+  std::printf("\n");
+  char settled[40];
+  std::snprintf(settled, sizeof settled, "from %g s on", config.settle_s);
+  print_row(settled, shown(s.settled));
+  print_row("with take-off", shown(s.takeoff));
+  if (config.fleet.task.name == "hover") {
+    print_row("paper, experiment", {1.76, 3.95, 5.23, 34.9, 37.2, 24.4});
+    print_row("paper, simulation", {1.60, 3.86, 4.79, 36.5, 38.7, 26.9});
+  }
+  if (s.crashed > 0) std::printf("  over the %zu flights that did not crash\n", s.flights - s.crashed);
+  std::printf("  never farther than %g m: %.2f %%; crashed: %zu\n", kFarAway_m, 100 * s.within_share, s.crashed);
+  for (std::size_t k = 0; k < kFailures; ++k) {
+    const FailureCount& f = s.failures[k];
+    if (f.flights == 0) continue;
+    std::string name = name_of(static_cast<Failure>(k));
+    for (char& c : name)
+      if (c == '_') c = ' ';
+    std::printf("  %zu %s: flight %zu first, at %.2f s; half of them by %.2f s, the last at %.2f s\n", f.flights,
+                name.c_str(), config.fleet.first_flapper + f.first_flight, f.first_s, f.median_s, f.last_s);
+  }
+}
+
+void print(const FlyConfig& config, const FlyOptions& options, const FlyResult& r) {
+  const FlightSummary& s = r.summary;
+  if (r.stopped) std::printf("stopped: %zu of %zu flights, the last at %g s\n", s.flights, options.count, r.flown_s);
+  std::printf("%zu flight%s of %g s, task %s, seed %llu, %s\n", s.flights, s.flights == 1 ? "" : "s", config.duration_s,
+              config.fleet.task.name.c_str(), static_cast<unsigned long long>(config.fleet.seed),
+              config.precision.c_str());
+  if (config.welded) std::printf("  held on a stand: nothing to score\n");
+  else print_score(config, s);
+  for (std::size_t k = 1; k < 6 && !config.welded; ++k)
+    if (r.ended[k] > 0) std::printf("  the task ended by %s: %zu\n", kEnds[k], r.ended[k]);
+  if (r.handed_back > 0) std::printf("  handed back to the controller: %zu\n", r.handed_back);
+  if (!options.log_folder.empty()) {
+    std::printf("  %zu logs in %s\n", r.logs, options.log_folder.c_str());
+    if (r.logs < s.flights) std::printf("  %zu flights were too short for a log\n", s.flights - r.logs);
+  }
+  std::printf("  %.2f s, %.1f million steps/s, %.0f times real time, hash %s\n", r.wall_s, r.steps / r.wall_s / 1e6,
+              r.steps * config.fleet.batch.step_s / r.wall_s, hexadecimal(r.hash).c_str());
+}
+
+Json json_of(const FlyConfig& config, const FlyOptions& options, const FlyResult& r) {
+  const FlightSummary& s = r.summary;
+  Json json;
+  const Errors settled = shown(s.settled), takeoff = shown(s.takeoff);  // not a number becomes null
+  for (std::size_t k = 0; k < 6; ++k) json[kKeys[k]] = settled[k];
+  for (std::size_t k = 0; k < 6; ++k) json[std::string(kKeys[k]) + "_takeoff"] = takeoff[k];
+  json["crashed"] = s.crashed;
+  json["within_0p3m_fraction"] = config.welded ? Json(nullptr) : Json(s.within_share);
+  json["flights"] = s.flights;
+  json["duration_s"] = config.duration_s;
+  json["settle_s"] = config.settle_s;
+  json["seed"] = config.fleet.seed;
+  json["first_flapper"] = config.fleet.first_flapper;
+  json["task"] = config.fleet.task.name;
+  json["stopped"] = r.stopped;
+  json["failed"] = s.failed;
+  for (std::size_t k = 1; k < kFailures; ++k) {
+    const FailureCount& f = s.failures[k];
+    const auto when = [&](double t_s) { return f.flights > 0 ? Json(t_s) : Json(nullptr); };
+    json["failures"][name_of(static_cast<Failure>(k))] = {
+        {"flights", f.flights},
+        {"first_flight", f.flights > 0 ? Json(config.fleet.first_flapper + f.first_flight) : Json(nullptr)},
+        {"first_s", when(f.first_s)},
+        {"median_s", when(f.median_s)},
+        {"last_s", when(f.last_s)}};
+  }
+  for (std::size_t k = 0; k < 6; ++k) json["ended"][kEnds[k]] = r.ended[k];
+  json["handed_back"] = r.handed_back;
+  json["hash"] = hexadecimal(r.hash);
+  json["logs"] = options.log_folder.empty() ? Json(nullptr) : Json(r.logs);
+  json["wall"] = {{"total_s", r.wall_s},
+                  {"scoring_s", r.scoring_s},
+                  {"steps_per_s", r.steps / r.wall_s},
+                  {"times_real_time", r.steps * config.fleet.batch.step_s / r.wall_s}};
+  json["commit"] = io::commit();
+  json["config"] = config.resolved;
+  return json;
+}
+
+}  // namespace
+}  // namespace flappy::fly
+
+int main(int argc, char** argv) {
+  using namespace flappy;
+  io::Program program("flappy-fly", "Flies a configuration in closed loop, scores the flights, writes their logs.",
+                      {"instruction set " + sim::best_instruction_set()});
+  CLI::App& app = program.app();
+  std::string config_name, log;
+  std::vector<std::string> overrides;
+  std::uint64_t seed = 0;
+  flight::FlyOptions options;
+  app.add_option("config", config_name, "what to fly: configs/fly/*.toml")->required();
+  app.add_option("--count", options.count, "flights, each with noise of its own")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  app.add_option("--log", log, "folder for the log of the flight, or one folder in it for each of several");
+  app.add_option("--set", overrides, "override a key: flight.duration_s=2, controller.attitude.pitch.p=4")
+      ->allow_extra_args(false);
+  CLI::Option* seeded = app.add_option("--seed", seed, "in place of flight.seed")
+                            ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{INT64_MAX}));
+  return program.run(argc, argv, [&] {
+    if (*seeded) overrides.push_back("flight.seed=" + std::to_string(seed));
+    const flight::FlyConfig config = flight::read_fly_config(config_name, overrides);
+    options.log_folder = log;
+    fly::ProgressLine progress;
+    options.keep_going = [&](double done) {
+      progress.show(done);
+      return fly::interrupted == 0;
+    };
+    fly::stop_on_interrupt();
+    const flight::FlyResult result = flight::fly(config, options);
+    progress.clear();
+    fly::print(config, options, result);
+    program.write_json(fly::json_of(config, options, result));
+  });
+}

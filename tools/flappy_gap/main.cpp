@@ -1,0 +1,101 @@
+// flappy-gap: what a flight log says, and whether it can be believed.
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "gap/check.hpp"
+#include "io/program.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::ok:
+      return "ok";
+    case Verdict::warning:
+      return "warning";
+    case Verdict::not_tested:
+      return "not tested";
+  }
+  return "";
+}
+
+void print(const StreamStatistics& s) {
+  std::printf("  %-8s %9zu %9.3f %9.2f", s.name.c_str(), s.samples, s.duration_s, s.rate_hz);
+  if (s.declared_hz) std::printf(" %9.2f", *s.declared_hz);
+  else std::printf(" %9s", "-");
+  std::printf(" %12.2f", 1e3 * s.longest_gap_s);
+  if (s.declared_hz)
+    std::printf(" %9zu %5.2f %%", s.missing,
+                100.0 * static_cast<double>(s.missing) / static_cast<double>(s.samples + s.missing));
+  else std::printf(" %9s %7s", "-", "-");
+  std::printf(" %10.3f\n", 1e3 * s.jitter_s);
+}
+
+void print(const std::string& folder, const flight::FlightHeader& header, const CheckReport& report) {
+  std::printf("%s: %s, %g Hz\n", folder.c_str(), header.vehicle.c_str(), header.flapping_Hz);
+  std::printf("  %-8s %9s %9s %9s %9s %12s %17s %10s\n", "stream", "samples", "s", "Hz", "declared", "longest ms",
+              "missing", "jitter ms");
+  for (const StreamStatistics& s : report.streams) print(s);
+  for (const Finding& f : report.findings)
+    std::printf("  %-18s %s: %s\n", f.check.c_str(), name_of(f.verdict), f.text.c_str());
+}
+
+Json to_json(const std::string& folder, const flight::FlightHeader& header, const CheckReport& report) {
+  Json streams = Json::array(), findings = Json::array();
+  for (const StreamStatistics& s : report.streams)
+    streams.push_back({{"name", s.name},
+                       {"samples", s.samples},
+                       {"duration_s", s.duration_s},
+                       {"rate_hz", s.rate_hz},
+                       {"declared_hz", s.declared_hz ? Json(*s.declared_hz) : Json(nullptr)},
+                       {"longest_gap_s", s.longest_gap_s},
+                       {"missing", s.declared_hz ? Json(s.missing) : Json(nullptr)},
+                       {"jitter_s", s.jitter_s}});
+  for (const Finding& f : report.findings) {
+    Json values = Json::object();
+    for (const auto& [name, value] : f.values) values[name] = value;
+    findings.push_back({{"check", f.check}, {"verdict", name_of(f.verdict)}, {"text", f.text}, {"values", values}});
+  }
+  return {{"folder", folder},
+          {"vehicle", header.vehicle},
+          {"warnings", report.count(Verdict::warning)},
+          {"not_tested", report.count(Verdict::not_tested)},
+          {"streams", streams},
+          {"findings", findings}};
+}
+
+Json check(const std::vector<std::string>& folders) {
+  std::vector<std::pair<flight::FlightHeader, CheckReport>> checked;
+  for (const std::string& folder : folders) {
+    const flight::FlightLog log = flight::read_flight_log(folder);
+    checked.emplace_back(log.header, check_flight(log));
+  }
+  Json flights = Json::array();
+  std::size_t warnings = 0, not_tested = 0;
+  for (std::size_t i = 0; i < folders.size(); ++i) {
+    const auto& [header, report] = checked[i];
+    print(folders[i], header, report);
+    flights.push_back(to_json(folders[i], header, report));
+    warnings += report.count(Verdict::warning);
+    not_tested += report.count(Verdict::not_tested);
+  }
+  std::printf("%zu readable, warnings %zu, not tested %zu\n", folders.size(), warnings, not_tested);
+  return {{"flights", flights}, {"warnings", warnings}, {"not_tested", not_tested}};
+}
+
+}  // namespace
+}  // namespace flappy::gap
+
+int main(int argc, char** argv) {
+  using namespace flappy;
+  io::Program program("flappy-gap", "What a flight log says of the difference between a robot and its model.", {});
+  CLI::App* check =
+      program.app().add_subcommand("check", "axes, units, clocks and dropouts of logs, without a diagnosis");
+  std::vector<std::string> folders;
+  check->add_option("flight", folders, "folders of flight logs")->required();
+  program.app().require_subcommand(1);
+  return program.run(argc, argv, [&] { program.write_json(gap::check(folders)); });
+}

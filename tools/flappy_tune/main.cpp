@@ -1,0 +1,50 @@
+// flappy-tune: finds better gains for a controller on many flights at once, and writes its file.
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "flight/tune.hpp"
+#include "io/program.hpp"
+
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+std::string controller_text(flappy::flight::Controller c, const std::string& origin) {
+  std::string text = "# " + origin + "\nschema = 1\nkind = \"" + std::string(c.kind == flappy::flight::Controller::Kind::pid ? "pid" : "arc") + "\"\n";
+  for (const auto& f : flappy::flight::fields(c)) {
+    char number[32];
+    std::snprintf(number, sizeof number, "%.4g", *f.value);
+    text += f.path + " = " + number + (std::string(number).find_first_of(".en") == std::string::npos ? ".0\n" : "\n");
+  }
+  return text;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace flappy;
+  io::Program program("flappy-tune", "Tunes the gains of a controller by an evolution strategy (CMA-ES).", {});
+  std::string config_name, out;
+  std::vector<std::string> overrides;
+  program.app().add_option("config", config_name, "what to vary and how to judge: configs/tune/*.toml")->required();
+  program.app().add_option("out", out, "controller file to write")->required();
+  program.app().add_option("--set", overrides, "override a key: generations=10")->allow_extra_args(false);
+  return program.run(argc, argv, [&] {
+    const flight::TuneConfig config = flight::read_tune_config(config_name, overrides);
+    const auto start = std::chrono::steady_clock::now();
+    std::signal(SIGINT, [](int) { interrupted = 1; });
+    const double before = flight::cost_of(config, config.start);
+    std::printf("start: cost %.4f\n", before);
+    unsigned generation = 0;
+    const flight::TuneResult result = flight::tune(config, [&](const flight::TuneResult& r) {
+      const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      std::printf("generation %u of %u: cost %.4f, %.0f s\n", ++generation, config.generations, r.cost, wall_s);
+      std::fflush(stdout);
+      io::write_atomically(out, controller_text(r.best, "Tuned by flappy-tune, generation " + std::to_string(r.generations) + "."));
+      return interrupted == 0;
+    });
+    program.write_json({{"start_cost", before}, {"cost", result.cost}, {"generations", generation}});
+  });
+}
