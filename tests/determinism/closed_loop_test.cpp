@@ -24,7 +24,7 @@ constexpr int kPeriods = 10;
 
 model::Vehicle vehicle(std::size_t id) {
   static const sim::Randomisation randomisation = [] {
-    const auto config = io::Config::load(test::source_path("configs/sim/hover_batch.toml"));
+    const auto config = io::Config::load(test::source_path("configs/randomisation/published.toml"));
     return sim::Randomisation(test::identified(), config.root());
   }();
   model::Vehicle v = randomisation.sample({.seed = 11, .flapper = static_cast<std::uint32_t>(id), .episode = 2});
@@ -48,7 +48,7 @@ std::shared_ptr<const Actor> actor(const Task& task) {
   return std::make_shared<Actor>(std::move(a));
 }
 
-/// Rates that divide neither each other nor the control rate, delays, losses, a path, and every part of an observation. Gains
+/// Rates that divide neither each other nor the control rate, delays, losses, a path, and every part of an observation. All numbers
 /// stand here, so that tuning the shipped ones changes no hash.
 FleetOptions options(const std::string& name) {
   const bool adaptive = name == "arc";
@@ -67,9 +67,10 @@ FleetOptions options(const std::string& name) {
     for (auto* a : {&c.arc.roll_Nm, &c.arc.pitch_Nm, &c.arc.yaw_Nm}) *a = {1e-4, -1e-5, 1e-5};
     c.arc.disturbance_m_s2 = {5, -0.5, 0.5};
   }
-  const Sensors s = sensors("paper", {"imu.rate_hz=333.0", "imu.latency_s=0.0005", "imu.low_pass_hz=90.0",
-                                      "imu.position_m.x=0.01", "imu.position_m.z=-0.005", "mocap.rate_hz=470.0",
-                                      "mocap.latency_s=0.003", "mocap.loss_probability=0.3", "mocap.loss_length=2.0"});
+  Sensors s;
+  s.imu = {333, 0.0005, 90, {0.01, 0, -0.005}, 0.05235987755982989, 0.5, {0.02, 0.03, 0.015}};
+  s.mocap = {470, 0.003, 1e-4, 0.005, 0.3, 2};
+  s.fusion = {1e-3, 0.02, 1e-4, 0.1, 0.01, 0.01};
   const Task t = task(
       along(waypoint(0, 0, 0, 0.3) + waypoint(0.004, 0.1, 0.05, 0.4, 1) + waypoint(0.02, 0, 0, 0.3, -2),
             "kind = \"flying\"\n[start.position_m]\nx_half = 0.3\ny_half = 0.3\nz = 0.4\nz_half = 0.1\n"
