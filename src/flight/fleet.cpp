@@ -240,7 +240,9 @@ void Fleet<T>::Storage::start_fusion(std::size_t i, const Truth<double>& truth, 
   c.accel_bias = square(s.fusion.accel_bias_sd_m_s2);
   put(fusion, f.fusion, lane);
   const Vec3<double> weight = transpose_times(rotation_matrix(x.attitude), Vec3<double>{0, 0, gravity});
-  for (const Advance& a : schedule.pending()) {
+  std::vector<Advance> past = schedule.pending();
+  if (schedule.newest().slot >= 0) past.push_back(schedule.newest());
+  for (const Advance& a : past) {
     T* rows = &ring[i / kLanes<T> * ring_size + static_cast<std::size_t>(a.slot * kIncrementRows * kLanes<T>)];
     put(Increment<double>{{0, 0, 0}, a.duration_s * weight}, reinterpret_cast<T(*)[kLanes<T>]>(rows), lane);
   }

@@ -57,6 +57,8 @@ class Schedule {
 
   /// Increments that lie between the horizon and the end of the last period; what a new flight starts from.
   std::vector<Advance> pending() const;
+  /// The newest increment that has arrived, which the horizon may already have passed; slot -1: none yet.
+  const Advance& newest() const { return period_.newest; }
   /// From the horizon, and from the last replayed increment, to the end of the last period.
   double horizon_age_s() const { return now_s() - horizon_s_; }
   double present_age_s() const { return now_s() - present_s_; }

@@ -81,6 +81,21 @@ TEST(Reward, IsItsFormula) {
   }
 }
 
+TEST(Reward, SeesHowTheActionChanges) {
+  std::string text = staying("kind = \"standing\"");
+  text.replace(text.find("alive = 1.0\nposition_1_m = 2.0"), 30, "cost = 1.0\naction_change = 1.0");
+  FleetOptions o = fleet_options(sensors("paper"), {}, task(text));
+  o.batch.world.ground_z_m = 0;
+  Fleet<double> fleet(1, test::nominal(), o);
+  const double expected[4] = {-0.5, 0, -0.25, 0};
+  for (int period = 0; period < 4; ++period) {
+    if (period == 0) fleet.set_action(0, {0.5, 0, -0.5, 0});
+    if (period == 2) fleet.set_action(0, {0, 0, -0.5, 0});
+    fleet.step();
+    EXPECT_NEAR(fleet.reward(0), expected[period], 1e-12) << period;
+  }
+}
+
 /// Bits of the ends at a position relative to the set point, 1 s into the episode unless told.
 std::uint32_t ends(const Limits<double>& k, const V& p, double facing = 1, double time_s = 1) {
   Score<double> s{};

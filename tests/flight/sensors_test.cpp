@@ -155,20 +155,10 @@ Fleet<T> standing(std::size_t count, const Sensors& s) {
   return Fleet<T>(count, test::nominal(), o);
 }
 
-/// Sums over samples of one noise: how wide, how much like the one before, like its neighbour's, like another axis'.
+/// Sums over samples of one noise: how wide, and how much like its neighbour's.
 struct Statistic {
-  double n = 0, sum = 0, square = 0, lagged = 0, neighbour = 0, other = 0;
+  double n = 0, sum = 0, square = 0, neighbour = 0;
 };
-
-/// sd within its sampling error, mean zero, all correlations zero: 1/sqrt(n) each.
-void expect_white(const Statistic& s, double sd, const std::string& what) {
-  const double root = std::sqrt(s.n);
-  EXPECT_NEAR(std::sqrt(s.square / s.n) / sd, 1, kSigmas / root / std::sqrt(2)) << what;
-  EXPECT_NEAR(s.sum / s.n / sd, 0, kSigmas / root) << what;
-  EXPECT_NEAR(s.lagged / s.square, 0, 1.02 * kSigmas / root) << what << ": like the sample before";
-  EXPECT_NEAR(s.neighbour / s.square, 0, 1.02 * kSigmas / root) << what << ": like the next flapper's";
-  EXPECT_NEAR(s.other / s.square, 0, 1.02 * kSigmas / root) << what << ": like the next noise of the same flapper";
-}
 
 class Presets : public testing::TestWithParam<const char*> {};
 
@@ -201,6 +191,7 @@ TEST_P(Presets, NoiseIsWhiteAndAsWideAsStated) {
   // a flight's gyro bias is its mean, which noise blurs; mean over flights 0
   const double bias_sd[3] = {s.imu.gyro_bias_sd_rad_s.x, s.imu.gyro_bias_sd_rad_s.y, s.imu.gyro_bias_sd_rad_s.z};
   Statistic bias[3];
+  double other_axis[3] = {0, 0, 0};
   std::vector<std::array<double, 3>> mean(kCount);
   for (std::size_t i = 0; i < kCount; ++i)
     for (std::size_t k = 0; k < 3; ++k) {
@@ -213,40 +204,52 @@ TEST_P(Presets, NoiseIsWhiteAndAsWideAsStated) {
     for (std::size_t k = 0; k < 3; ++k) {
       const double x = mean[i][k];
       bias[k].n += 1, bias[k].sum += x, bias[k].square += x * x;
-      bias[k].neighbour += x * mean[(i + 1) % kCount][k], bias[k].other += x * mean[i][(k + 1) % 3];
+      bias[k].neighbour += x * mean[(i + 1) % kCount][k];
+      other_axis[k] += x * mean[i][(k + 1) % 3];
     }
   const double blur = s.imu.gyro_noise_rad_s / std::sqrt(imu_samples);
   for (std::size_t k = 0; k < 3; ++k) {
-    const double sd = std::hypot(bias_sd[k], blur);
-    EXPECT_NEAR(std::sqrt(bias[k].square / kCount) / sd, 1, kSigmas / std::sqrt(2.0 * kCount)) << "bias " << k;
-    EXPECT_NEAR(bias[k].sum / kCount / sd, 0, kSigmas / std::sqrt(kCount)) << "bias " << k;
+    const double wide = std::hypot(bias_sd[k], blur);
+    EXPECT_NEAR(std::sqrt(bias[k].square / kCount) / wide, 1, kSigmas / std::sqrt(2.0 * kCount)) << "bias " << k;
+    EXPECT_NEAR(bias[k].sum / kCount / wide, 0, kSigmas / std::sqrt(kCount)) << "bias " << k;
     EXPECT_NEAR(bias[k].neighbour / bias[k].square, 0, 1.1 * kSigmas / std::sqrt(kCount)) << "bias " << k;
     const double other_sd = std::hypot(bias_sd[(k + 1) % 3], blur);
-    EXPECT_NEAR(bias[k].other / (kCount * sd * other_sd), 0, 1.1 * kSigmas / std::sqrt(kCount)) << "bias " << k;
+    EXPECT_NEAR(other_axis[k] / (kCount * wide * other_sd), 0, 1.1 * kSigmas / std::sqrt(kCount)) << "bias " << k;
   }
 
+  const double stated[4] = {s.imu.gyro_noise_rad_s, s.imu.accel_noise_m_s2, s.mocap.position_noise_m,
+                            s.mocap.attitude_noise_rad};
+  const std::string what = std::string(GetParam()) + ", noise ";
+  double sd[kNoises];
   for (std::size_t k = 0; k < kNoises; ++k) {
     Statistic all;
-    const std::size_t other = k + 1 == 6 ? 0 : k + 1 == kNoises ? 6 : k + 1;  // one of as many samples
-    const auto n = static_cast<double>(seen[0][k].size());
-    const double shown[4] = {s.imu.gyro_noise_rad_s, s.imu.accel_noise_m_s2, s.mocap.position_noise_m,
-                             s.mocap.attitude_noise_rad};
     for (std::size_t i = 0; i < kCount; ++i)
       for (std::size_t j = 0; j < seen[i][k].size(); ++j) {
         const double x = seen[i][k][j];
         all.n += 1, all.sum += x, all.square += x * x;
-        if (j > 0) all.lagged += x * seen[i][k][j - 1];
         all.neighbour += x * seen[(i + 1) % kCount][k][j];
-        all.other += x * seen[i][other][j] * shown[k / 3] / shown[other / 3];
       }
-    double sd = shown[k / 3];
-    if (k <
-        3) {  // its own mean was taken out: one degree of freedom for each flight, and x_j x_j-1 loses sd^2/n on the way
-      sd *= std::sqrt(1 - 1 / n);
-      all.lagged += all.square / n * (1 - 1 / n);
-    }
-    expect_white(all, sd, std::string(GetParam()) + ", noise " + std::to_string(k));
+    sd[k] = stated[k / 3];
+    if (k < 3)
+      sd[k] *= std::sqrt(1 - 1 / imu_samples);  // its own mean was taken out: one degree of freedom for each flight
+    const double root = std::sqrt(all.n);
+    EXPECT_NEAR(std::sqrt(all.square / all.n) / sd[k], 1, kSigmas / root / std::sqrt(2)) << what << k;
+    EXPECT_NEAR(all.sum / all.n / sd[k], 0, kSigmas / root) << what << k;
+    EXPECT_NEAR(all.neighbour / all.square, 0, 1.02 * kSigmas / root) << what << k << ": like the next flapper's";
   }
+  // no noise is like another, or like any of the sample before: correlations of 0 within 1/sqrt(n)
+  for (std::size_t k = 0; k < kNoises; ++k)
+    for (std::size_t m = 0; m < kNoises; ++m)
+      for (const std::size_t lag : {std::size_t{0}, std::size_t{1}}) {
+        if (lag == 0 && m >= k) continue;
+        double n = 0, product = 0;
+        for (std::size_t i = 0; i < kCount; ++i)
+          for (std::size_t j = lag; j < std::min(seen[i][k].size(), seen[i][m].size()); ++j)
+            n += 1, product += seen[i][k][j] * seen[i][m][j - lag];
+        const double own_mean = k == m && k < 3 ? 1 / imu_samples : 0;  // what is left of a mean taken out
+        EXPECT_NEAR(product / n / (sd[k] * sd[m]) + own_mean, 0, 1.02 * kSigmas / std::sqrt(n))
+            << what << k << " and " << m << ", lag " << lag;
+      }
 }
 
 TEST_P(Presets, SamplesArriveLateAsStated) {
