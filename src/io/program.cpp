@@ -1,12 +1,27 @@
 #include "io/program.hpp"
 
+#include <unistd.h>
+
 #include <cstdio>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "io/files.hpp"
 #include "io/version.hpp"  // made by the build
 
 namespace flappy::io {
+
+namespace {
+
+/// Threads that wait for their team spin for milliseconds by default: whoever shares the processors with us, and then we
+/// ourselves, stand still. OpenMP reads its environment before main, so the program starts itself anew.
+void spin_briefly(char** argv) {
+  if (std::getenv("GOMP_SPINCOUNT") != nullptr || std::getenv("OMP_WAIT_POLICY") != nullptr) return;
+  setenv("GOMP_SPINCOUNT", "10000", 1);  // some tens of microseconds
+  execv("/proc/self/exe", argv);
+}
+
+}  // namespace
 
 std::string commit() { return FLAPPY_COMMIT; }
 
@@ -22,6 +37,7 @@ Program::Program(const std::string& name, const std::string& description, const 
 }
 
 int Program::run(int argc, char** argv, const std::function<void()>& job) {
+  spin_briefly(argv);
   try {
     app_.parse(argc, argv);
     if (!json_path_.empty()) AtomicFile refused_before_the_work(json_path_);

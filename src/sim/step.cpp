@@ -106,7 +106,7 @@ class Prefetch {
   Prefetch(const void* from, std::size_t bytes, int steps)
       : at_(static_cast<const char*>(from)),
         end_(at_ + (from != nullptr ? bytes : 0)),
-        share_((bytes / kLine + steps - 1) / steps * kLine) {}
+        share_(from != nullptr ? (bytes / kLine + steps - 1) / steps * kLine : 0) {}
   void step() {
     for (const char* until = at_ + share_; at_ < until && at_ < end_; at_ += kLine) __builtin_prefetch(at_, 1);
   }
