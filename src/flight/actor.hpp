@@ -14,12 +14,12 @@ inline constexpr int kMaxLayers = 6, kMaxWidth = 256;
 /// the last is tanh.
 template <class T>
 struct ActorView {
-  int layers = 0;                 // 0: no actor
-  int widths[kMaxLayers + 1]{};   // inputs, then outputs of each layer
+  int layers = 0;                // 0: no actor
+  int widths[kMaxLayers + 1]{};  // inputs, then outputs of each layer
   Activation hidden = Activation::relu;
-  const T* weights = nullptr;     // of all layers, one after the other
-  const T* mean = nullptr;        // of each input
-  const T* scale = nullptr;       // input = clamp((observation - mean) * scale, +-clip)
+  const T* weights = nullptr;  // of all layers, one after the other
+  const T* mean = nullptr;     // of each input
+  const T* scale = nullptr;    // input = clamp((observation - mean) * scale, +-clip)
   T clip = 0;
 };
 

@@ -86,16 +86,17 @@ FLAPPY_INLINE WingBeat<T> control(const ArcConstants<Element<T>>& k, Arc<T>& m, 
   struct Errors {
     T position, velocity, acceleration, jerk;
   };
-  const auto errors = [&](const T& p, const T& p_ref, const T& v, const T& v_ref, const T& a, const T& a_ref, const T& j) {
+  const auto errors = [&](const T& p, const T& p_ref, const T& v, const T& v_ref, const T& a, const T& a_ref,
+                          const T& j) {
     return Errors{within(T(p - p_ref), k.position_error_limit_m), within(T(v - v_ref), k.velocity_error_limit_m_s),
                   a - a_ref, j};
   };
-  const Errors ex = errors(x.position_m.x, ref.position_m.x, m.velocity_m_s.x, ref.velocity_m_s.x,
-                           T(lean_x + m.disturbance_x_m_s2), ref.acceleration_m_s2.x,
-                           T(g * T(R.row_x.x * w.y - R.row_x.y * w.x)));
-  const Errors ey = errors(x.position_m.y, ref.position_m.y, m.velocity_m_s.y, ref.velocity_m_s.y,
-                           T(lean_y + m.disturbance_y_m_s2), ref.acceleration_m_s2.y,
-                           T(g * T(R.row_y.x * w.y - R.row_y.y * w.x)));
+  const Errors ex =
+      errors(x.position_m.x, ref.position_m.x, m.velocity_m_s.x, ref.velocity_m_s.x, T(lean_x + m.disturbance_x_m_s2),
+             ref.acceleration_m_s2.x, T(g * T(R.row_x.x * w.y - R.row_x.y * w.x)));
+  const Errors ey =
+      errors(x.position_m.y, ref.position_m.y, m.velocity_m_s.y, ref.velocity_m_s.y, T(lean_y + m.disturbance_y_m_s2),
+             ref.acceleration_m_s2.y, T(g * T(R.row_y.x * w.y - R.row_y.y * w.x)));
   const T lambda(k.horizontal.lambda_1_s), rate(k.horizontal.k_1_s);
   const T c2 = T(3) * lambda, c1 = c2 * lambda, c0 = T(T(lambda * lambda) * lambda);
   const auto sliding = [&](const Errors& e) {
@@ -117,8 +118,8 @@ FLAPPY_INLINE WingBeat<T> control(const ArcConstants<Element<T>>& k, Arc<T>& m, 
   const T per_g = T(1) / g;
   u.bias_V = drive(m.pitch_Nm, k.pitch_Nm, T(T(k.inertia_y_kg_m2) * T(forward(snap_x, snap_y) * per_g)), k.pitch_Nm_V,
                    k.bias_limit_V, forward(sx, sy));
-  u.difference_V = drive(m.roll_Nm, k.roll_Nm, T(-T(T(k.inertia_x_kg_m2) * T(left(snap_x, snap_y) * per_g))), k.roll_Nm_V,
-                         k.difference_limit_V, T(-left(sx, sy)));
+  u.difference_V = drive(m.roll_Nm, k.roll_Nm, T(-T(T(k.inertia_x_kg_m2) * T(left(snap_x, snap_y) * per_g))),
+                         k.roll_Nm_V, k.difference_limit_V, T(-left(sx, sy)));
 
   // heading
   const T turn = within(T(-atan2(T(ref.heading.sin * yaw.cos - ref.heading.cos * yaw.sin),

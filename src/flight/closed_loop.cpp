@@ -1,7 +1,6 @@
 // The closed loop: what a block of flappers does in one control period, stage by stage. Compiled once for each
 // instruction set (FLAPPY_ISA); the bits are the same on all of them.
 #include "flight/flight_block.hpp"
-
 #include "sim/rows.hpp"
 
 namespace flappy::flight {
@@ -66,16 +65,18 @@ template <class T>
 FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Slice& slice, int imu_samples,
                          int mocap_samples, int first) {
   FlightBlock<T>& f = s.flight;
-  const auto truth = truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first),
-                              load_rows<State<L<T>>>(s.body.state, first));
+  const auto truth =
+      truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first), load_rows<State<L<T>>>(s.body.state, first));
   const auto draw = [&](sim::Stream stream, std::uint32_t index) {
-    return sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(stream), index, f.flapper + first, f.flight + first);
+    return sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(stream), index, f.flapper + first,
+                              f.flight + first);
   };
   if (slice.imu) {
     auto imu = load_rows<Imu<L<T>>>(f.imu, first);
     const L<T> interval(slice.imu_interval_s);
-    const auto sample = sample_imu(plan.imu, L<T>(L<T>(1) / interval), truth, imu, draw(sim::Stream::imu, 2 * slice.imu_index),
-                                   draw(sim::Stream::imu, 2 * slice.imu_index + 1));
+    const auto sample =
+        sample_imu(plan.imu, L<T>(L<T>(1) / interval), truth, imu, draw(sim::Stream::imu, 2 * slice.imu_index),
+                   draw(sim::Stream::imu, 2 * slice.imu_index + 1));
     store_rows(imu, f.imu, first);
     auto fusion = load_rows<Fusion<L<T>>>(f.fusion, first);
     gather(fusion.gathered, sample, interval);
@@ -86,8 +87,9 @@ FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
     const std::uint32_t index = 3 * slice.mocap_index;
     L<T> seen = L<T>::load(f.seen[0] + first), chance(1);
     if (plan.losses)
-      chance = sim::uniforms<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap), index + 2, f.flapper + first,
-                                   f.flight + first).u[0];
+      chance = sim::uniforms<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap), index + 2,
+                                   f.flapper + first, f.flight + first)
+                   .u[0];
     const auto sample = sample_mocap(plan.mocap, truth, seen, draw(sim::Stream::mocap, index),
                                      draw(sim::Stream::mocap, index + 1), chance);
     seen.store(f.seen[0] + first);
@@ -102,9 +104,12 @@ FLAPPY_INLINE void fuse(const FlightSpace<T>& s, const FlightPlan<T>& plan, int 
   FlightBlock<T>& f = s.flight;
   auto fusion = load_rows<Fusion<L<T>>>(f.fusion, first);
   const L<T> zero(0), gravity(plan.fusion.gravity_m_s2);
-  const auto increment = [&](int index) { return load_rows<Increment<L<T>>>(slot(s.ring, index, kIncrementRows), first); };
+  const auto increment = [&](int index) {
+    return load_rows<Increment<L<T>>>(slot(s.ring, index, kIncrementRows), first);
+  };
   const auto move = [&](Pose<L<T>>& pose, const Advance& a) {
-    advance(pose, increment(a.slot), fusion.gyro_bias_rad_s, fusion.accel_bias_m_s2, L<T>(a.share), L<T>(a.duration_s), gravity);
+    advance(pose, increment(a.slot), fusion.gyro_bias_rad_s, fusion.accel_bias_m_s2, L<T>(a.share), L<T>(a.duration_s),
+            gravity);
   };
   if (plan.push_slot >= 0) {
     store_rows(fusion.gathered, slot(s.ring, plan.push_slot, kIncrementRows), first);
@@ -125,9 +130,10 @@ FLAPPY_INLINE void fuse(const FlightSpace<T>& s, const FlightPlan<T>& plan, int 
   if (plan.newest.slot >= 0) {
     const L<T> per_duration(1 / plan.newest.duration_s);
     fusion.body_rate_rad_s = per_duration * increment(plan.newest.slot).turn_rad - fusion.gyro_bias_rad_s;
-    if (plan.ahead_s > 0) move(ahead, {plan.newest.slot, plan.ahead_s / plan.newest.duration_s, plan.newest.duration_s});
+    if (plan.ahead_s > 0)
+      move(ahead, {plan.newest.slot, plan.ahead_s / plan.newest.duration_s, plan.newest.duration_s});
   }
-  store_rows(Estimate<L<T>>{ahead.position_m, ahead.attitude, ahead.velocity_m_s, fusion.body_rate_rad_s}, f.estimate, first);
+  store_rows(torso(plan.fusion, ahead, fusion.body_rate_rad_s), f.estimate, first);
   store_rows(fusion, f.fusion, first);
 }
 
@@ -135,8 +141,8 @@ FLAPPY_INLINE void fuse(const FlightSpace<T>& s, const FlightPlan<T>& plan, int 
 template <class T>
 FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;
-  const auto truth = truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first),
-                              load_rows<State<L<T>>>(s.body.state, first));
+  const auto truth =
+      truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first), load_rows<State<L<T>>>(s.body.state, first));
   store_rows(truth, f.truth, first);
   auto episode = load_rows<Episode<L<T>>>(f.episode, first);
   T time[kWidth<T>], fraction[kWidth<T>];
@@ -161,8 +167,8 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
     if (plan.task.contact_ends > 0 && (status & ~std::uint32_t{sim::kFrozen})) f.ended[first + i] |= kContact;
   }
   L<T> row[kMaxObservation];
-  const int rows = observe(plan.parts, load_rows<Estimate<L<T>>>(f.estimate, first), ref, episode,
-                           L<T>::load(fraction), row);
+  const int rows =
+      observe(plan.parts, load_rows<Estimate<L<T>>>(f.estimate, first), ref, episode, L<T>::load(fraction), row);
   for (int i = 0; i < rows; ++i) row[i].store(f.observation[i] + first);
   store_rows(episode, f.episode, first);
 }

@@ -42,8 +42,13 @@ FLAPPY_INLINE Score<T> score_of(const Truth<T>& t, const Setpoint<T>& ref) {
   const Matrix3<T> R = rotation_matrix(t.attitude);
   const T facing = ref.heading.cos * R.row_x.x + ref.heading.sin * R.row_y.x;
   const T aside = ref.heading.cos * R.row_y.x - ref.heading.sin * R.row_x.x;
-  return {t.position_m - ref.position_m, t.velocity_m_s - ref.velocity_m_s, atan2(R.row_z.y, R.row_z.z),
-          T(-asin(R.row_z.x)), atan2(aside, facing), facing, R.row_z.z};
+  return {t.position_m - ref.position_m,
+          t.velocity_m_s - ref.velocity_m_s,
+          atan2(R.row_z.y, R.row_z.z),
+          T(-asin(R.row_z.x)),
+          atan2(aside, facing),
+          facing,
+          R.row_z.z};
 }
 
 template <class T>
@@ -56,11 +61,13 @@ FLAPPY_INLINE T reward_of(const Reward<Element<T>>& k, const Score<T>& s, const 
   }
   const auto length = [](const Vec3<T>& v) { return sqrt(dot(v, v)); };
   const T angles = sqrt(T(s.roll_rad * s.roll_rad + (s.pitch_rad * s.pitch_rad + s.yaw_rad * s.yaw_rad)));
-  const T c = T(k.action) * effort + (T(k.action_change) * change + (T(k.position) * length(s.position_m) +
-              (T(k.angles) * angles + (T(k.velocity) * length(s.velocity_m_s) + T(k.body_rate) * length(t.body_rate_rad_s)))));
+  const T c = T(k.action) * effort +
+              (T(k.action_change) * change + (T(k.position) * length(s.position_m) +
+                                              (T(k.angles) * angles + (T(k.velocity) * length(s.velocity_m_s) +
+                                                                       T(k.body_rate) * length(t.body_rate_rad_s)))));
   return T(k.inverse_square) / T(c * c + T(1e-6)) - T(k.cost) * c +
          (T(k.facing) * s.facing + (T(k.upright) * min(T(0), s.upright) +
-          (T(k.behind) * min(T(0), T(s.position_m.x + T(k.behind_m))) + T(k.alive))));
+                                    (T(k.behind) * min(T(0), T(s.position_m.x + T(k.behind_m))) + T(k.alive))));
 }
 
 /// Lanes where the policy's work is done.
@@ -68,8 +75,8 @@ template <class T>
 FLAPPY_INLINE auto arrived(const HandBack<Element<T>>& k, const Score<T>& s, const Truth<T>& t) {
   const auto below = [](const Vec3<T>& v, auto limit) { return dot(v, v) < T(limit) * T(limit); };
   return (T(k.enabled) > T(0)) & (s.position_m.x > T(k.x_m)) & below(s.position_m, k.distance_m) &
-         (abs(s.velocity_m_s.x) < T(k.speed_x_m_s)) & below(s.velocity_m_s, k.speed_m_s) & (s.facing > T(k.heading_cos)) &
-         (s.upright > T(k.tilt_cos)) & below(t.body_rate_rad_s, k.body_rate_rad_s);
+         (abs(s.velocity_m_s.x) < T(k.speed_x_m_s)) & below(s.velocity_m_s, k.speed_m_s) &
+         (s.facing > T(k.heading_cos)) & (s.upright > T(k.tilt_cos)) & below(t.body_rate_rad_s, k.body_rate_rad_s);
 }
 
 /// Calls mark(mask, bit) for each end.

@@ -11,8 +11,8 @@
 
 namespace flappy::flight {
 
-#define FLAPPY_DECLARE_LOOP(isa)           \
-  inline namespace isa {                   \
+#define FLAPPY_DECLARE_LOOP(isa)            \
+  inline namespace isa {                    \
   extern const FlyBlock<float> fly_float;   \
   extern const FlyBlock<double> fly_double; \
   }
@@ -82,8 +82,11 @@ struct Fleet<T>::Storage {
   bool recording = false;
 
   Storage(std::size_t count, const model::Vehicle& vehicle, const FleetOptions& o, int steps)
-      : options(o), batch(count, vehicle, o.batch), schedule(o.sensors, o.batch.step_s, steps),
-        fly(loop_named<T>(o.batch.instruction_set)), period_steps(steps) {
+      : options(o),
+        batch(count, vehicle, o.batch),
+        schedule(o.sensors, o.batch.step_s, steps),
+        fly(loop_named<T>(o.batch.instruction_set)),
+        period_steps(steps) {
     const std::size_t n = batch.storage().blocks.size();
     blocks.resize(n);
     ring_size = static_cast<std::size_t>(schedule.ring_slots() * kIncrementRows * kLanes<T>);
@@ -106,16 +109,23 @@ struct Fleet<T>::Storage {
     plan.seed = options.seed;
     plan.losses = s.mocap.loss_probability > 0;
     const auto& at = s.imu.position_m;
-    plan.imu = rounded<T>(
-        ImuConstants<double>{{at.x, at.y, at.z}, s.imu.gyro_noise_rad_s, s.imu.accel_noise_m_s2,
-                             low_pass_share(s.imu.low_pass_hz, 1 / s.imu.rate_hz), gravity});
-    plan.mocap = rounded<T>(MocapConstants<double>{
-        s.mocap.position_noise_m, s.mocap.attitude_noise_rad, s.mocap.loss_probability, 1 / s.mocap.loss_length});
+    plan.imu = rounded<T>(ImuConstants<double>{{at.x, at.y, at.z},
+                                               s.imu.gyro_noise_rad_s,
+                                               s.imu.accel_noise_m_s2,
+                                               low_pass_share(s.imu.low_pass_hz, 1 / s.imu.rate_hz),
+                                               gravity});
+    plan.mocap = rounded<T>(MocapConstants<double>{s.mocap.position_noise_m, s.mocap.attitude_noise_rad,
+                                                   s.mocap.loss_probability, 1 / s.mocap.loss_length});
     const FusionNoise& f = s.fusion;
-    plan.fusion = rounded<T>(FusionConstants<double>{
-        square(s.imu.gyro_noise_rad_s) / s.imu.rate_hz + square(f.angle_drift_rad_sqrt_s), square(f.gyro_bias_drift_rad_s_sqrt_s),
-        square(s.imu.accel_noise_m_s2) / s.imu.rate_hz + square(f.velocity_drift_m_s_sqrt_s),
-        square(f.accel_bias_drift_m_s2_sqrt_s), square(s.mocap.attitude_noise_rad), square(s.mocap.position_noise_m), gravity});
+    plan.fusion = rounded<T>(
+        FusionConstants<double>{square(s.imu.gyro_noise_rad_s) / s.imu.rate_hz + square(f.angle_drift_rad_sqrt_s),
+                                square(f.gyro_bias_drift_rad_s_sqrt_s),
+                                square(s.imu.accel_noise_m_s2) / s.imu.rate_hz + square(f.velocity_drift_m_s_sqrt_s),
+                                square(f.accel_bias_drift_m_s2_sqrt_s),
+                                square(s.mocap.attitude_noise_rad),
+                                square(s.mocap.position_noise_m),
+                                gravity,
+                                {at.x, at.y, at.z}});
     const Controller& c = options.controller;
     const auto fill = [&](auto constants) {
       constants.velocity_share = low_pass_share(c.velocity_low_pass_hz, period_s);
@@ -183,8 +193,8 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const sim::F
   imu.attitude = truth.attitude;
   const auto& at_m = options.sensors.imu.position_m;
   imu.velocity_m_s = point_velocity(truth, {at_m.x, at_m.y, at_m.z});
-  imu.low_passed = {truth.body_rate_rad_s,
-                    transpose_times(rotation_matrix(truth.attitude), Vec3<double>{0, 0, options.batch.world.gravity_m_s2})};
+  imu.low_passed = {truth.body_rate_rad_s, transpose_times(rotation_matrix(truth.attitude),
+                                                           Vec3<double>{0, 0, options.batch.world.gravity_m_s2})};
   imu.gyro_bias_rad_s = {sd.x * sim::normal(key, 0), sd.y * sim::normal(key, 1), sd.z * sim::normal(key, 2)};
   put(imu, f.imu, lane);
   start_fusion(i, truth, key);
@@ -217,7 +227,8 @@ void Fleet<T>::Storage::start_fusion(std::size_t i, const Truth<double>& truth, 
   const auto [f, lane] = at(i);
   const Sensors& s = options.sensors;
   const auto noise = [&](double sd, std::uint32_t first) {
-    return Vec3<double>{sd * sim::normal(key, first), sd * sim::normal(key, first + 1), sd * sim::normal(key, first + 2)};
+    return Vec3<double>{sd * sim::normal(key, first), sd * sim::normal(key, first + 1),
+                        sd * sim::normal(key, first + 2)};
   };
   key.stream = sim::Stream::start_estimate;
   Estimate<double> x{truth.position_m + noise(s.mocap.position_noise_m, 0),
@@ -227,9 +238,14 @@ void Fleet<T>::Storage::start_fusion(std::size_t i, const Truth<double>& truth, 
 
   const double gravity = options.batch.world.gravity_m_s2;
   Fusion<double> fusion{};
-  fusion.horizon = fusion.now = {x.attitude, x.position_m, x.velocity_m_s};
-  fusion.horizon.position_m = add_scaled(x.position_m, -schedule.horizon_age_s(), x.velocity_m_s);
-  fusion.now.position_m = add_scaled(x.position_m, -schedule.present_age_s(), x.velocity_m_s);
+  FusionConstants<double> place{};
+  place.imu_position_m[0] = s.imu.position_m.x;
+  place.imu_position_m[1] = s.imu.position_m.y;
+  place.imu_position_m[2] = s.imu.position_m.z;
+  const Pose<double> imu = imu_pose(place, x);
+  fusion.horizon = fusion.now = imu;
+  fusion.horizon.position_m = add_scaled(imu.position_m, -schedule.horizon_age_s(), imu.velocity_m_s);
+  fusion.now.position_m = add_scaled(imu.position_m, -schedule.present_age_s(), imu.velocity_m_s);
   fusion.body_rate_rad_s = x.body_rate_rad_s;
   const auto& bias = s.imu.gyro_bias_sd_rad_s;
   Covariance<double>& c = fusion.covariance;
@@ -266,7 +282,8 @@ Fleet<T>::Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOpt
     FlightBlock<T>& f = s.blocks.back();
     const int from = static_cast<int>((count - 1) % kLanes<T>), to = static_cast<int>(i % kLanes<T>);
     T(*rows)[kLanes<T>] = f.imu;
-    for (std::size_t r = 0; r < offsetof(FlightBlock<T>, flapper) / sizeof(T[kLanes<T>]); ++r) rows[r][to] = rows[r][from];
+    for (std::size_t r = 0; r < offsetof(FlightBlock<T>, flapper) / sizeof(T[kLanes<T>]); ++r)
+      rows[r][to] = rows[r][from];
   }
 }
 
@@ -495,8 +512,10 @@ auto Fleet<T>::imu_samples(std::size_t i) const -> std::vector<ImuRecord> {
   for (const Slice& slice : s.period->slices) {
     time += slice.steps * s.options.batch.step_s;
     if (!slice.imu) continue;
-    const T* rows = &s.imu_tap[i / kLanes<T> * s.imu_tap_size + static_cast<std::size_t>(sample++ * kImuSampleRows * kLanes<T>)];
-    const auto x = get<ImuSample<double>>(reinterpret_cast<const T(*)[kLanes<T>]>(rows), static_cast<int>(i % kLanes<T>));
+    const T* rows =
+        &s.imu_tap[i / kLanes<T> * s.imu_tap_size + static_cast<std::size_t>(sample++ * kImuSampleRows * kLanes<T>)];
+    const auto x =
+        get<ImuSample<double>>(reinterpret_cast<const T(*)[kLanes<T>]>(rows), static_cast<int>(i % kLanes<T>));
     list.push_back({time + s.options.sensors.imu.latency_s,
                     {x.gyro_rad_s.x, x.gyro_rad_s.y, x.gyro_rad_s.z},
                     {x.accel_m_s2.x, x.accel_m_s2.y, x.accel_m_s2.z}});
@@ -515,8 +534,10 @@ auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
   for (const Slice& slice : s.period->slices) {
     time += slice.steps * s.options.batch.step_s;
     if (!slice.mocap) continue;
-    const T* rows = &s.mocap_tap[i / kLanes<T> * s.mocap_tap_size + static_cast<std::size_t>(sample++ * kMocapRows * kLanes<T>)];
-    const auto x = get<MocapSample<double>>(reinterpret_cast<const T(*)[kLanes<T>]>(rows), static_cast<int>(i % kLanes<T>));
+    const T* rows =
+        &s.mocap_tap[i / kLanes<T> * s.mocap_tap_size + static_cast<std::size_t>(sample++ * kMocapRows * kLanes<T>)];
+    const auto x =
+        get<MocapSample<double>>(reinterpret_cast<const T(*)[kLanes<T>]>(rows), static_cast<int>(i % kLanes<T>));
     if (x.valid <= 0) continue;
     list.push_back({time + s.options.sensors.mocap.latency_s,
                     {x.position_m.x, x.position_m.y, x.position_m.z},

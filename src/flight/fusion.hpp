@@ -23,6 +23,7 @@ struct FusionConstants {
   T velocity_noise_m2_s3, accel_bias_drift_m2_s5;
   T mocap_angle_rad2, mocap_position_m2;
   T gravity_m_s2;
+  T imu_position_m[3];  // in B
 };
 
 inline namespace FLAPPY_ISA {
@@ -46,7 +47,7 @@ struct Covariance {
   T position, position_velocity, position_bias, velocity, velocity_bias, accel_bias;
 };
 
-/// The filter, as rows.
+/// The filter, as rows. Its poses are those of the point where the IMU sits: no lever arm turns its readings into motion.
 template <class T>
 struct Fusion {
   Pose<T> horizon, now;
@@ -69,15 +70,15 @@ template <class T>
 FLAPPY_INLINE void gather(Increment<T>& sum, const ImuSample<T>& sample, const T& interval_s) {
   const Vec3<T> turn = interval_s * sample.gyro_rad_s, gained = interval_s * sample.accel_m_s2;
   // the later sample, seen from the frame of the earlier ones
-  sum.velocity_m_s = sum.velocity_m_s + (gained + T(0.5) * cross(sum.turn_rad, gained)) -
-                     T(0.5) * cross(turn, sum.velocity_m_s);
+  sum.velocity_m_s =
+      sum.velocity_m_s + (gained + T(0.5) * cross(sum.turn_rad, gained)) - T(0.5) * cross(turn, sum.velocity_m_s);
   sum.turn_rad = sum.turn_rad + turn;
 }
 
 /// Moves a pose by `share` of an increment that took `duration_s` in all.
 template <class T>
-FLAPPY_INLINE void advance(Pose<T>& x, const Increment<T>& increment, const Vec3<T>& gyro_bias, const Vec3<T>& accel_bias,
-                           const T& share, const T& duration_s, const T& gravity_m_s2) {
+FLAPPY_INLINE void advance(Pose<T>& x, const Increment<T>& increment, const Vec3<T>& gyro_bias,
+                           const Vec3<T>& accel_bias, const T& share, const T& duration_s, const T& gravity_m_s2) {
   const T time = share * duration_s;
   const Vec3<T> quarter = T(T(0.25) * share) * (increment.turn_rad - duration_s * gyro_bias);
   const Quaternion<T> middle = turned(x.attitude, quarter);
@@ -101,6 +102,27 @@ FLAPPY_INLINE void spread(Covariance<T>& c, const FusionConstants<Element<T>>& k
   c.accel_bias += time * T(k.accel_bias_drift_m2_s5);
 }
 
+template <class T>
+FLAPPY_INLINE Vec3<T> imu_position(const FusionConstants<Element<T>>& k) {
+  return {T(k.imu_position_m[0]), T(k.imu_position_m[1]), T(k.imu_position_m[2])};
+}
+
+/// Motion of the torso origin.
+template <class T>
+FLAPPY_INLINE Estimate<T> torso(const FusionConstants<Element<T>>& k, const Pose<T>& imu, const Vec3<T>& body_rate) {
+  const Matrix3<T> R = rotation_matrix(imu.attitude);
+  const Vec3<T> arm = imu_position<T>(k);
+  return {imu.position_m - R * arm, imu.attitude, imu.velocity_m_s - R * cross(body_rate, arm), body_rate};
+}
+
+/// The pose of the IMU.
+template <class T>
+FLAPPY_INLINE Pose<T> imu_pose(const FusionConstants<Element<T>>& k, const Estimate<T>& torso) {
+  const Matrix3<T> R = rotation_matrix(torso.attitude);
+  const Vec3<T> arm = imu_position<T>(k);
+  return {torso.attitude, torso.position_m + R * arm, torso.velocity_m_s + R * cross(torso.body_rate_rad_s, arm)};
+}
+
 /// Corrects the horizon by a pose taken at its time; a lost pose changes nothing.
 template <class T>
 FLAPPY_INLINE void correct(Fusion<T>& f, const FusionConstants<Element<T>>& k, const MocapSample<T>& z) {
@@ -119,7 +141,8 @@ FLAPPY_INLINE void correct(Fusion<T>& f, const FusionConstants<Element<T>>& k, c
   c.angle_bias -= to_angle * c.angle_bias;
   c.angle -= to_angle * c.angle;
 
-  const Vec3<T> offset = z.position_m - f.horizon.position_m;
+  const Vec3<T> tracked = f.horizon.position_m - rotation_matrix(f.horizon.attitude) * imu_position<T>(k);
+  const Vec3<T> offset = z.position_m - tracked;
   const T per_position = T(1) / T(c.position + T(k.mocap_position_m2));
   f.position_innovation = where(lost, f.position_innovation, T(dot(offset, offset) * per_position));
   const T to_position = where(lost, none, T(c.position * per_position));

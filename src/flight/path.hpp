@@ -59,8 +59,11 @@ FLAPPY_INLINE Setpoint<L> setpoint_at(const PathView<T>& path, const std::uint32
     rate[c] = ((((L(5) * a[5]) * t + L(4) * a[4]) * t + L(3) * a[3]) * t + L(2) * a[2]) * t + a[1];
     bend[c] = (((L(20) * a[5]) * t + L(12) * a[4]) * t + L(6) * a[3]) * t + L(2) * a[2];
   }
-  return {{value[0], value[1], value[2]}, {rate[0], rate[1], rate[2]}, {bend[0], bend[1], bend[2]},
-          sin_cos_wide(value[3]), rate[3]};
+  return {{value[0], value[1], value[2]},
+          {rate[0], rate[1], rate[2]},
+          {bend[0], bend[1], bend[2]},
+          sin_cos_wide(value[3]),
+          rate[3]};
 }
 
 }  // namespace FLAPPY_ISA

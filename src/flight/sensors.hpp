@@ -43,8 +43,8 @@ struct Truth {
 
 template <class T>
 FLAPPY_INLINE Truth<T> truth_of(const Parameters<T>& p, const State<T>& x) {
-  const auto whole = whole_vehicle<T>(p, {place_wing<+1>(p.left, x.left, x.body_rate_rad_s),
-                                          place_wing<-1>(p.right, x.right, x.body_rate_rad_s)});
+  const auto whole = whole_vehicle<T>(
+      p, {place_wing<+1>(p.left, x.left, x.body_rate_rad_s), place_wing<-1>(p.right, x.right, x.body_rate_rad_s)});
   const Vec3<T> of_com = cross(x.body_rate_rad_s, whole.com) + whole.com_rate;
   const Vec3<T> velocity = x.com_velocity_m_s - rotation_matrix(x.attitude) * of_com;
   const Vec3<T> none{T(0), T(0), T(0)};
@@ -87,8 +87,8 @@ FLAPPY_INLINE Vec3<T> point_velocity(const Truth<T>& t, const Vec3<T>& point_m) 
 }
 
 template <class T>
-FLAPPY_INLINE ImuSample<T> sample_imu(const ImuConstants<Element<T>>& k, const T& per_interval, const Truth<T>& t, Imu<T>& imu,
-                                      const sim::Normals4<T>& a, const sim::Normals4<T>& b) {
+FLAPPY_INLINE ImuSample<T> sample_imu(const ImuConstants<Element<T>>& k, const T& per_interval, const Truth<T>& t,
+                                      Imu<T>& imu, const sim::Normals4<T>& a, const sim::Normals4<T>& b) {
   const Vec3<T> turn = rotation_vector(from_to(imu.attitude, t.attitude));
   const Vec3<T> velocity = point_velocity(t, {T(k.position_m[0]), T(k.position_m[1]), T(k.position_m[2])});
   Vec3<T> force = per_interval * (velocity - imu.velocity_m_s);

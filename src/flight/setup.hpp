@@ -11,17 +11,17 @@ namespace flappy::flight {
 
 struct ImuSensor {
   double rate_hz = 0, latency_s = 0;
-  double low_pass_hz = 0;  ///< 0: none beyond the mean over a sample's interval
-  model::Triple position_m;  ///< in B
+  double low_pass_hz = 0;                             ///< 0: none beyond the mean over a sample's interval
+  model::Triple position_m;                           ///< in B
   double gyro_noise_rad_s = 0, accel_noise_m_s2 = 0;  ///< standard deviation of a sample, each axis
-  model::Triple gyro_bias_sd_rad_s;  ///< drawn once for each flight
+  model::Triple gyro_bias_sd_rad_s;                   ///< drawn once for each flight
 };
 
 struct MocapSensor {
   double rate_hz = 0, latency_s = 0;
   double position_noise_m = 0, attitude_noise_rad = 0;  ///< standard deviation, each axis
-  double loss_probability = 0;  ///< that a sample begins a burst of losses
-  double loss_length = 1;       ///< mean samples in a burst
+  double loss_probability = 0;                          ///< that a sample begins a burst of losses
+  double loss_length = 1;                               ///< mean samples in a burst
 };
 
 /// What the estimator is told about noise besides what the sensors declare.

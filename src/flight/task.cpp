@@ -22,7 +22,8 @@ const std::vector<PartInfo>& part_infos() {
         {"rotation_matrix", {}},
         {"position_error", {{"x_error", "m", -1, 1}, {"y_error", "m", -1, 1}, {"z_error", "m", -1, 1}}},
         {"velocity", {{"x_velocity", "m/s", -3, 3}, {"y_velocity", "m/s", -3, 3}, {"z_velocity", "m/s", -3, 3}}},
-        {"body_rate", {{"roll_rate", "rad/s", -50, 50}, {"pitch_rate", "rad/s", -50, 50}, {"yaw_rate", "rad/s", -50, 50}}},
+        {"body_rate",
+         {{"roll_rate", "rad/s", -50, 50}, {"pitch_rate", "rad/s", -50, 50}, {"yaw_rate", "rad/s", -50, 50}}},
         {"beat_phase", {{"beat_sin", "1", -1, 1}, {"beat_cos", "1", -1, 1}}},
         {"heading_error", {{"heading_sin", "1", -1, 1}, {"heading_cos", "1", -1, 1}}},
         {"previous_action", {}}};
@@ -37,12 +38,14 @@ const std::vector<PartInfo>& part_infos() {
 }
 
 /// Quintic from rest to rest (minimum jerk).
-Segment<double> rest_to_rest(std::uint32_t start_tick, double duration_s, const double (&from)[4], const double (&to)[4]) {
+Segment<double> rest_to_rest(std::uint32_t start_tick, double duration_s, const double (&from)[4],
+                             const double (&to)[4]) {
   Segment<double> s{start_tick, {}};
   const double d3 = duration_s * duration_s * duration_s;
   for (int c = 0; c < 4; ++c) {
     const double way = to[c] - from[c];
-    const double a[6] = {from[c], 0, 0, 10 * way / d3, -15 * way / (d3 * duration_s), 6 * way / (d3 * duration_s * duration_s)};
+    const double a[6] = {
+        from[c], 0, 0, 10 * way / d3, -15 * way / (d3 * duration_s), 6 * way / (d3 * duration_s * duration_s)};
     std::copy(a, a + 6, s.coefficients[c]);
   }
   return s;
@@ -83,7 +86,8 @@ std::vector<Segment<double>> spline(const std::vector<Knot>& knots, double tick_
     const std::vector<double> v = spline_velocities(knots, c, tick_s);
     for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
       const double h = tick_s * (knots[i + 1].tick - knots[i].tick), d = (knots[i + 1].at[c] - knots[i].at[c]) / h;
-      const double a[6] = {knots[i].at[c], v[i], (3 * d - 2 * v[i] - v[i + 1]) / h, (v[i] + v[i + 1] - 2 * d) / (h * h), 0, 0};
+      const double a[6] = {
+          knots[i].at[c], v[i], (3 * d - 2 * v[i] - v[i + 1]) / h, (v[i] + v[i + 1] - 2 * d) / (h * h), 0, 0};
       std::copy(a, a + 6, path[i].coefficients[c]);
     }
   }
@@ -103,12 +107,14 @@ std::vector<Segment<double>> read_path(const io::Table& table, double tick_s) {
   if (kind == "waypoints") {
     for (const io::Table& p : table.tables("path.waypoint"))
       add(p.number("t_s", {0, 1e5}), p.number("x_m", kPlace), p.number("y_m", kPlace), p.number("z_m", kPlace),
-          p.number_or("heading_rad", 0, {-100, 100}), [&] { p.fail("t_s", "is not after the one before", "times that increase"); });
+          p.number_or("heading_rad", 0, {-100, 100}),
+          [&] { p.fail("t_s", "is not after the one before", "times that increase"); });
     if (knots.empty()) table.fail("path", "has no waypoint", "at least one [[path.waypoint]]");
     if (knots[0].tick != 0) table.fail("path", "does not start at t_s = 0", "a first waypoint at 0");
     std::vector<Segment<double>> path;
     for (std::size_t i = 0; i + 1 < knots.size(); ++i)
-      path.push_back(rest_to_rest(knots[i].tick, tick_s * (knots[i + 1].tick - knots[i].tick), knots[i].at, knots[i + 1].at));
+      path.push_back(
+          rest_to_rest(knots[i].tick, tick_s * (knots[i + 1].tick - knots[i].tick), knots[i].at, knots[i + 1].at));
     path.push_back(hold(knots.back().tick, knots.back().at));
     return path;
   }
@@ -117,7 +123,8 @@ std::vector<Segment<double>> read_path(const io::Table& table, double tick_s) {
              &heading = csv.column("heading_rad");
   for (std::size_t i = 0; i < t.size(); ++i)
     add(t[i], x[i], y[i], z[i], heading[i], [&] {
-      throw io::InputError(csv.name + ":" + std::to_string(i + 2) + ": t_s is not a control period after the one before; times that increase");
+      throw io::InputError(csv.name + ":" + std::to_string(i + 2) +
+                           ": t_s is not a control period after the one before; times that increase");
     });
   if (knots.size() < 2 || knots[0].tick != 0)
     throw io::InputError(csv.name + ": is no path; at least two rows, the first at t_s = 0");
@@ -185,7 +192,9 @@ std::vector<Signal> Task::action() const {
 sim::FlapperState Task::sample_start(sim::RandomKey key) const {
   key.stream = sim::Stream::start;
   std::uint32_t index = 0;
-  const auto draw = [&](const Spread& s) { return s.centre + s.half * (2 * sim::uniform_pair(key, index++).first - 1); };
+  const auto draw = [&](const Spread& s) {
+    return s.centre + s.half * (2 * sim::uniform_pair(key, index++).first - 1);
+  };
   sim::FlapperState s;
   double turn[3];
   for (int i = 0; i < 3; ++i) s.position_m[i] = draw(start.position_m[i]);
@@ -213,7 +222,8 @@ Task read_task(const io::Table& table, double tick_s) {
     const auto found = std::ranges::find(names, name);
     std::string known;
     for (const std::string& n : names) known += (known.empty() ? "" : ", ") + n;
-    if (found == names.end()) table.fail("observation", "no part \"" + name + "\"", known + io::did_you_mean(name, names));
+    if (found == names.end())
+      table.fail("observation", "no part \"" + name + "\"", known + io::did_you_mean(name, names));
     const auto bit = std::uint32_t{1} << (found - names.begin());
     if (task.parts & bit) table.fail("observation", name + " is given twice", "each part once");
     task.parts |= bit;
@@ -234,16 +244,23 @@ Task read_task(const io::Table& table, double tick_s) {
     return table.number_or(std::string("end.") + name, otherwise, {-kFar, kFar});
   };
   k.contact_ends = table.boolean_or("end.contact", true) ? 1 : 0;
-  k.limits = {table.number("end.time_s", {tick_s, 1e6}), limit("x_low_m", -kFar), limit("x_high_m", kFar), limit("y_m", kFar),
-              limit("z_m", kFar), limit("distance_m", kFar), limit("faced_by_s", kFar), limit("arrived_by_s", kFar),
+  k.limits = {table.number("end.time_s", {tick_s, 1e6}),
+              limit("x_low_m", -kFar),
+              limit("x_high_m", kFar),
+              limit("y_m", kFar),
+              limit("z_m", kFar),
+              limit("distance_m", kFar),
+              limit("faced_by_s", kFar),
+              limit("arrived_by_s", kFar),
               limit("arrived_x_m", -kFar)};
 
   const auto back = table.optional_table("hand_back");
   const auto bound = [&](const char* name, double otherwise) {
     return back ? back->number_or(name, otherwise, {-kFar, kFar}) : otherwise;
   };
-  k.hand_back = {back ? 1.0 : 0.0, bound("x_m", -kFar), bound("distance_m", kFar), bound("speed_x_m_s", kFar),
-                 bound("speed_m_s", kFar), bound("heading_rad", 4), bound("tilt_rad", 4), bound("body_rate_rad_s", kFar)};
+  k.hand_back = {back ? 1.0 : 0.0,           bound("x_m", -kFar),           bound("distance_m", kFar),
+                 bound("speed_x_m_s", kFar), bound("speed_m_s", kFar),      bound("heading_rad", 4),
+                 bound("tilt_rad", 4),       bound("body_rate_rad_s", kFar)};
   for (double* angle : {&k.hand_back.heading_cos, &k.hand_back.tilt_cos})
     *angle = *angle > std::numbers::pi ? -2 : model::sin_cos_wide(*angle).cos;
   table.finish();

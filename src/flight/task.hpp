@@ -50,7 +50,7 @@ template <class T>
 struct Limits {
   T time_s;
   T x_low_m, x_high_m, y_m, z_m, distance_m;
-  T faced_by_s;              // after it, R'_00 < 0 ends the episode
+  T faced_by_s;                 // after it, R'_00 < 0 ends the episode
   T arrived_by_s, arrived_x_m;  // after it, x < arrived_x_m does
 };
 

@@ -13,8 +13,8 @@ namespace flappy::flight {
 namespace {
 
 constexpr double kStray_m = 0.3;
-constexpr int kLook = 5;  // control periods between looks
-constexpr double kReach = 3;          // gains stay within e^+-3 of where they start
+constexpr int kLook = 5;             // control periods between looks
+constexpr double kReach = 3;         // gains stay within e^+-3 of where they start
 constexpr double kFirstStep = 0.05;  // of the whole range 2 kReach: 0.3
 
 struct Score {
@@ -148,7 +148,8 @@ TuneResult tune(const TuneConfig& config, const std::function<bool(const TuneRes
     population = algorithm.evolve(population);
     ++result.generations;
     const double cost = population.get_f()[population.best_idx()][0];
-    if (cost < result.cost) result = {problem.controller(population.get_x()[population.best_idx()]), cost, result.generations};
+    if (cost < result.cost)
+      result = {problem.controller(population.get_x()[population.best_idx()]), cost, result.generations};
     if (!progress(result)) break;
   }
   return result;

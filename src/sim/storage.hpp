@@ -61,8 +61,13 @@ struct Batch<T>::Storage {
     return {blocks[i / kLanes<T>], static_cast<int>(i % kLanes<T>)};
   }
   StepPlan plan() const {
-    return {step_s,          steps_per_update, world.gravity_m_s2, world.ground_z_m, world.ceiling_z_m,
-            world.walls.data(), world.walls.size()};
+    return {step_s,
+            steps_per_update,
+            world.gravity_m_s2,
+            world.ground_z_m,
+            world.ceiling_z_m,
+            world.walls.data(),
+            world.walls.size()};
   }
   BlockEffects<T> effects_of(std::size_t b) const {
     if (block_effects.empty()) return {};

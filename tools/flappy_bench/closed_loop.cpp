@@ -2,8 +2,8 @@
 
 #include <ctime>
 
-#include "flight/flight_block.hpp"
 #include "flight/fleet.hpp"
+#include "flight/flight_block.hpp"
 
 namespace flappy::bench {
 namespace {
@@ -23,6 +23,8 @@ io::Table table(const std::string& path) { return io::Config::load(path).root();
 std::shared_ptr<const flight::Actor> idle_actor(const flight::Task& task) {
   auto actor = std::make_shared<flight::Actor>();
   const int inputs = static_cast<int>(task.observation().size());
+  for (const flight::Signal& s : task.observation()) actor->observation.push_back(s.name);
+  for (const flight::Signal& s : task.action()) actor->action.push_back(s.name);
   actor->widths = {inputs, 32, 32, flight::kActions};
   actor->weights.assign(flight::weight_count(actor->widths), 0);
   actor->mean.assign(static_cast<std::size_t>(inputs), 0);
@@ -91,7 +93,8 @@ LoopReport measure_closed_loop(const model::Vehicle& vehicle, const std::string&
   const char* names[flight::kStages] = {"controller", "physics", "sensors", "fusion", "reward, end and observation"};
   double total = 0;
   for (const std::uint64_t c : cycles) total += static_cast<double>(c);
-  for (int i = 0; i < flight::kStages; ++i) report.shares.emplace_back(names[i], static_cast<double>(cycles[i]) / total);
+  for (int i = 0; i < flight::kStages; ++i)
+    report.shares.emplace_back(names[i], static_cast<double>(cycles[i]) / total);
   return report;
 }
 

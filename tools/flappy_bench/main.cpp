@@ -76,7 +76,8 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
                 row.control_steps_per_s.median / 1e6, row.control_steps_per_s.low / 1e6,
                 row.control_steps_per_s.high / 1e6);
   std::printf("  of the first row's time:");
-  for (const auto& [name, share] : loop.shares) std::printf(" %s %.1f %%%s", name.c_str(), 100 * share, name == loop.shares.back().first ? "\n" : ",");
+  for (const auto& [name, share] : loop.shares)
+    std::printf(" %s %.1f %%%s", name.c_str(), 100 * share, name == loop.shares.back().first ? "\n" : ",");
   std::printf("  %zu bytes per float flapper beyond its body\n", loop.bytes_per_flapper);
 
   const auto or_null = [&](const char* name) {

@@ -12,7 +12,8 @@ namespace {
 volatile std::sig_atomic_t interrupted = 0;
 
 std::string controller_text(flappy::flight::Controller c, const std::string& origin) {
-  std::string text = "# " + origin + "\nschema = 1\nkind = \"" + std::string(c.kind == flappy::flight::Controller::Kind::pid ? "pid" : "arc") + "\"\n";
+  std::string text = "# " + origin + "\nschema = 1\nkind = \"" +
+                     std::string(c.kind == flappy::flight::Controller::Kind::pid ? "pid" : "arc") + "\"\n";
   for (const auto& f : flappy::flight::fields(c)) {
     char number[32];
     std::snprintf(number, sizeof number, "%.4g", *f.value);
@@ -42,7 +43,8 @@ int main(int argc, char** argv) {
       const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       std::printf("generation %u of %u: cost %.4f, %.0f s\n", ++generation, config.generations, r.cost, wall_s);
       std::fflush(stdout);
-      io::write_atomically(out, controller_text(r.best, "Tuned by flappy-tune, generation " + std::to_string(r.generations) + "."));
+      io::write_atomically(
+          out, controller_text(r.best, "Tuned by flappy-tune, generation " + std::to_string(r.generations) + "."));
       return interrupted == 0;
     });
     program.write_json({{"start_cost", before}, {"cost", result.cost}, {"generations", generation}});
