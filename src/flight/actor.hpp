@@ -33,10 +33,11 @@ FLAPPY_INLINE T activated(Activation kind, const T& x) {
 /// kOutputs neurons at once, so that an input is fetched once for all of them.
 template <int kOutputs, class L>
 FLAPPY_INLINE void neurons(const Element<L>* weights, int inputs, const L* in, L* out) {
+  const std::ptrdiff_t row = inputs + 1;
   L sum[kOutputs];
-  for (int o = 0; o < kOutputs; ++o) sum[o] = L(weights[o * (inputs + 1)]);
+  for (int o = 0; o < kOutputs; ++o) sum[o] = L(weights[o * row]);
   for (int i = 0; i < inputs; ++i)
-    for (int o = 0; o < kOutputs; ++o) sum[o] += L(weights[o * (inputs + 1) + 1 + i]) * in[i];
+    for (int o = 0; o < kOutputs; ++o) sum[o] += L(weights[o * row + 1 + i]) * in[i];
   for (int o = 0; o < kOutputs; ++o) out[o] = sum[o];
 }
 
@@ -52,9 +53,10 @@ FLAPPY_INLINE void evaluate(const ActorView<Element<L>>& actor, const L* observa
     const int inputs = actor.widths[layer], outputs = actor.widths[layer + 1];
     const L* in = values[layer % 2];
     L* out = values[(layer + 1) % 2];
+    const std::ptrdiff_t row = inputs + 1;
     int o = 0;
-    for (; o + 8 <= outputs; o += 8, weights += 8 * (inputs + 1)) neurons<8>(weights, inputs, in, out + o);
-    for (; o < outputs; ++o, weights += inputs + 1) neurons<1>(weights, inputs, in, out + o);
+    for (; o + 8 <= outputs; o += 8, weights += 8 * row) neurons<8>(weights, inputs, in, out + o);
+    for (; o < outputs; ++o, weights += row) neurons<1>(weights, inputs, in, out + o);
     const bool last = layer + 1 == actor.layers;
     for (o = 0; o < outputs; ++o) out[o] = activated(last ? Activation::tanh : actor.hidden, out[o]);
   }

@@ -89,8 +89,8 @@ struct Fleet<T>::Storage {
         period_steps(steps) {
     const std::size_t n = batch.storage().blocks.size();
     blocks.resize(n);
-    ring_size = static_cast<std::size_t>(schedule.ring_slots() * kIncrementRows * kLanes<T>);
-    queue_size = static_cast<std::size_t>(schedule.queue_slots() * kMocapRows * kLanes<T>);
+    ring_size = static_cast<std::size_t>(schedule.ring_slots()) * kIncrementRows * kLanes<T>;
+    queue_size = static_cast<std::size_t>(schedule.queue_slots()) * kMocapRows * kLanes<T>;
     ring.assign(n * ring_size, T(0));
     queue.assign(n * queue_size, T(0));
     for (const Segment<double>& s : o.task.path) {
@@ -333,7 +333,7 @@ void Fleet<T>::start(std::size_t i, std::uint32_t episode, const sim::FlapperSta
 }
 
 template <class T>
-void Fleet<T>::set_actor(std::shared_ptr<const Actor> actor) {
+void Fleet<T>::set_actor(const std::shared_ptr<const Actor>& actor) {
   Storage& s = *storage_;
   if (actor) {
     const auto same = [](const std::vector<std::string>& names, const std::vector<Signal>& signals) {

@@ -56,7 +56,7 @@ class Fleet {
 
   /// The actor that acts from now on, or none: then the last actions stay. std::invalid_argument unless its observation and
   /// action are those of the task.
-  void set_actor(std::shared_ptr<const Actor> actor);
+  void set_actor(const std::shared_ptr<const Actor>& actor);
   /// Action of flapper `i` for the next period, each in [-1, 1]; an actor would overwrite it.
   void set_action(std::size_t i, const double (&action)[kActions]);
   /// Adds to the controller's output from now on: open-loop flight, excitation.

@@ -1,29 +1,7 @@
 # flappy-bench as a person meets it: what it prints, writes and refuses, and its exit codes.
 #   cmake -DPROGRAM=flappy-bench -DSOURCE=the project -DWORK=a folder to use -P bench_test.cmake
 cmake_minimum_required(VERSION 3.25)
-file(REMOVE_RECURSE ${WORK})
-file(MAKE_DIRECTORY ${WORK})
-
-# Runs the program; leaves `out`, `err`, `code`.
-macro(run)
-  execute_process(COMMAND ${PROGRAM} ${ARGN} OUTPUT_VARIABLE out ERROR_VARIABLE err RESULT_VARIABLE code)
-endmacro()
-
-function(expect_equal what actual expected)
-  if(NOT "${actual}" STREQUAL "${expected}")
-    message(SEND_ERROR "${what}:\n  is       ${actual}\n  expected ${expected}")
-  endif()
-endfunction()
-
-# Exit code 2, `line` alone on stderr, nothing on stdout, no file (not even a temporary one) where --json pointed.
-function(expect_refused line)
-  run(${ARGN} --json ${WORK}/refused.json)
-  expect_equal("stderr" "${err}" "${line}\n")
-  expect_equal("stdout of: ${line}" "${out}" "")
-  expect_equal("exit code of: ${line}" "${code}" 2)
-  file(GLOB left ${WORK}/refused.json*)
-  expect_equal("files left by: ${line}" "${left}" "")
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/program.cmake)
 
 # ---- a batch
 
@@ -65,18 +43,6 @@ if(hash STREQUAL hash1)
   message(SEND_ERROR "another seed, the same hash ${hash}")
 endif()
 
-# These keys are there, and are what they say; others may join them.
-function(expect_keys file)
-  file(READ ${file} json)
-  foreach(pair IN LISTS ARGN)
-    string(REPLACE "=" " " pair "${pair}")
-    separate_arguments(pair)
-    list(GET pair 0 key)
-    list(GET pair 1 type)
-    string(JSON actual ERROR_VARIABLE missing TYPE "${json}" ${key})
-    expect_equal("${key} in ${file}" "${actual}" "${type}")
-  endforeach()
-endfunction()
 expect_keys(${WORK}/batch1.json flappers=NUMBER steps=NUMBER wall_s=NUMBER steps_per_s=NUMBER climb_median_m=NUMBER
   drift_median_m=NUMBER frozen=NUMBER hash=STRING)
 
@@ -84,7 +50,8 @@ expect_keys(${WORK}/batch1.json flappers=NUMBER steps=NUMBER wall_s=NUMBER steps
 
 run(--rounds 1 --seconds 0.01 --no-peers --json ${WORK}/speed.json)
 expect_equal("exit code" "${code}" 0)
-expect_keys(${WORK}/speed.json float_steps_per_s=NUMBER double_steps_per_s=NUMBER two_thread_scaling=NUMBER
+expect_keys(${WORK}/speed.json closed_loop_control_steps_per_s=NUMBER bytes_per_flapper_closed_loop=NUMBER
+  closed_loop_shares=OBJECT float_steps_per_s=NUMBER double_steps_per_s=NUMBER two_thread_scaling=NUMBER
   dart_steps_per_s=NULL mujoco_steps_per_s=NULL thrust_error_100us=NUMBER position_error_100us_m=NUMBER
   bytes_per_flapper=NUMBER ns_per_step_1000=NUMBER ns_per_step_100000=NUMBER flops_per_step=NUMBER
   roof_steps_per_s=NUMBER instruction_set=STRING)

@@ -1,47 +1,8 @@
 # flappy-fly as a person meets it: what it prints, writes and refuses, and its exit codes.
 #   cmake -DPROGRAM=flappy-fly -DSOURCE=the project -DWORK=a folder to use -P fly_test.cmake
 cmake_minimum_required(VERSION 3.25)
-file(REMOVE_RECURSE ${WORK})
-file(MAKE_DIRECTORY ${WORK})
+include(${CMAKE_CURRENT_LIST_DIR}/program.cmake)
 set(hover ${SOURCE}/configs/fly/hover.toml)
-
-# Runs the program; leaves `out`, `err`, `code`.
-macro(run)
-  execute_process(COMMAND ${PROGRAM} ${ARGN} OUTPUT_VARIABLE out ERROR_VARIABLE err RESULT_VARIABLE code)
-endmacro()
-
-function(expect_equal what actual expected)
-  if(NOT "${actual}" STREQUAL "${expected}")
-    message(SEND_ERROR "${what}:\n  is       ${actual}\n  expected ${expected}")
-  endif()
-endfunction()
-
-function(expect_match what actual pattern)
-  if(NOT "${actual}" MATCHES "${pattern}")
-    message(SEND_ERROR "${what} lacks ${pattern}:\n${actual}")
-  endif()
-endfunction()
-
-# Exit code 2, `line` alone on stderr, nothing on stdout, no results.
-function(expect_refused line)
-  run(${ARGN} --json ${WORK}/refused.json)
-  expect_equal("stderr" "${err}" "${line}\n")
-  expect_equal("stdout of: ${line}" "${out}" "")
-  expect_equal("exit code of: ${line}" "${code}" 2)
-  file(GLOB left ${WORK}/refused.json*)
-  expect_equal("files left by: ${line}" "${left}" "")
-endfunction()
-
-function(expect_keys json)
-  foreach(pair IN LISTS ARGN)
-    string(REPLACE "=" ";" pair "${pair}")
-    list(GET pair 0 key)
-    list(GET pair 1 type)
-    string(REPLACE "." ";" path "${key}")
-    string(JSON actual ERROR_VARIABLE missing TYPE "${json}" ${path})
-    expect_equal("${key}" "${actual}" "${type}")
-  endforeach()
-endfunction()
 
 # ---- two flights of a second: figures and logs
 
@@ -62,7 +23,7 @@ set(keys crashed=NUMBER within_0p3m_fraction=NUMBER flights=NUMBER duration_s=NU
 foreach(axis IN ITEMS roll_deg pitch_deg yaw_deg x_mm y_mm z_mm)
   list(APPEND keys rms_${axis}=NUMBER rms_${axis}_takeoff=NUMBER)
 endforeach()
-expect_keys("${json}" ${keys})
+expect_keys(${WORK}/hover.json ${keys})
 string(JSON hash GET "${json}" hash)
 foreach(text IN ITEMS fly vehicle task sensors controller)
   string(JSON actual TYPE "${json}" config ${text}.toml)

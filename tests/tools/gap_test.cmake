@@ -1,35 +1,13 @@
 # flappy-gap as a person meets it: what it prints, writes and refuses, and its exit codes.
 #   cmake -DPROGRAM=flappy-gap -DSOURCE=the project -DWORK=a folder to use -P gap_test.cmake
 cmake_minimum_required(VERSION 3.25)
-file(REMOVE_RECURSE ${WORK})
-file(MAKE_DIRECTORY ${WORK})
-
-# Runs the program; leaves `out`, `err`, `code`.
-macro(run)
-  execute_process(COMMAND ${PROGRAM} ${ARGN} OUTPUT_VARIABLE out ERROR_VARIABLE err RESULT_VARIABLE code)
-endmacro()
-
-function(expect_equal what actual expected)
-  if(NOT "${actual}" STREQUAL "${expected}")
-    message(SEND_ERROR "${what}:\n  is       ${actual}\n  expected ${expected}")
-  endif()
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/program.cmake)
 
 function(expect_line text)
   string(FIND "${out}" "${text}\n" at)
   if(at EQUAL -1)
     message(SEND_ERROR "no line \"${text}\" in\n${out}")
   endif()
-endfunction()
-
-# Exit code 2, `line` alone on stderr, nothing on stdout, no file (not even a temporary one) where --json pointed.
-function(expect_refused line)
-  run(${ARGN} --json ${WORK}/refused.json)
-  expect_equal("stderr" "${err}" "${line}\n")
-  expect_equal("stdout of: ${line}" "${out}" "")
-  expect_equal("exit code of: ${line}" "${code}" 2)
-  file(GLOB left ${WORK}/refused.json*)
-  expect_equal("files left by: ${line}" "${left}" "")
 endfunction()
 
 # Three seconds standing still, in `folder`, with this gravity in the accelerometer.

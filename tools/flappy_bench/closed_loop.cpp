@@ -38,7 +38,7 @@ class Loop {
        const std::string& controller, bool actor)
       : fleet_(kFlappers, vehicle, options(configs, sensors, controller)) {
     if (actor) fleet_.set_actor(idle_actor(fleet_.options().task));
-    run(1);  // everyone is in the air
+    for (int i = 0; i < 300; ++i) fleet_.step();  // 0.6 s: everyone is in the air
   }
   /// Control steps per second over `seconds` of computing.
   double run(double seconds) {
