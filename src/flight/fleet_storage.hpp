@@ -1,0 +1,237 @@
+// What a Fleet holds, and how a flight starts in it.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "flight/fleet.hpp"
+#include "flight/flight_block.hpp"
+#include "sim/storage.hpp"
+
+namespace flappy::flight {
+
+using model::Vec3;
+using sim::get;
+using sim::put;
+using One = model::Lanes<double, 1>;
+
+/// The same numbers in another precision.
+template <class T, template <class> class S>
+S<T> rounded(const S<double>& from) {
+  static_assert(sizeof(S<T>) / sizeof(T) == sizeof(from) / sizeof(double));
+  S<T> to;
+  for (std::size_t i = 0; i < sizeof to / sizeof(T); ++i)
+    reinterpret_cast<T*>(&to)[i] = static_cast<T>(reinterpret_cast<const double*>(&from)[i]);
+  return to;
+}
+
+inline double square(double x) { return x * x; }
+
+template <class T>
+struct Fleet<T>::Storage {
+  FleetOptions options;
+  sim::Batch<T> batch;
+  Schedule schedule;
+  FlightPlan<T> plan{};
+  sim::StepPlan physics{};
+  FlyBlock<T> fly;
+  int period_steps;
+  std::vector<FlightBlock<T>> blocks;
+  std::vector<T> ring, queue;  // [block][slot][row][lane]
+  std::size_t ring_size, queue_size;
+  std::vector<Segment<T>> path;
+  std::shared_ptr<const Actor> actor;
+  std::vector<T> actor_numbers;
+  const Period* period = nullptr;
+  std::vector<T> imu_tap, mocap_tap;
+  std::size_t imu_tap_size = 0, mocap_tap_size = 0;
+  bool recording = false;
+
+  Storage(std::size_t count, const model::Vehicle& vehicle, const FleetOptions& o, int steps, FlyBlock<T> loop)
+      : options(o),
+        batch(count, vehicle, o.batch),
+        schedule(o.sensors, o.batch.step_s, steps),
+        fly(loop),
+        period_steps(steps) {
+    const std::size_t n = batch.storage().blocks.size();
+    blocks.resize(n);
+    ring_size = static_cast<std::size_t>(schedule.ring_slots()) * kIncrementRows * kLanes<T>;
+    queue_size = static_cast<std::size_t>(schedule.queue_slots()) * kMocapRows * kLanes<T>;
+    ring.assign(n * ring_size, T(0));
+    queue.assign(n * queue_size, T(0));
+    for (const Segment<double>& s : o.task.path) {
+      Segment<T> to{s.start_tick, {}};
+      for (int c = 0; c < 4; ++c)
+        for (int k = 0; k < 6; ++k) to.coefficients[c][k] = static_cast<T>(s.coefficients[c][k]);
+      path.push_back(to);
+    }
+    fill_plan();
+  }
+
+  void fill_plan() {
+    const Sensors& s = options.sensors;
+    const double gravity = options.batch.world.gravity_m_s2, period_s = period_steps * options.batch.step_s;
+    plan.step = batch.storage().kernel;
+    plan.seed = options.seed;
+    plan.losses = s.mocap.loss_probability > 0;
+    const auto& at = s.imu.position_m;
+    plan.imu = rounded<T>(ImuConstants<double>{{at.x, at.y, at.z},
+                                               s.imu.gyro_noise_rad_s,
+                                               s.imu.accel_noise_m_s2,
+                                               low_pass_share(s.imu.low_pass_hz, 1 / s.imu.rate_hz),
+                                               gravity});
+    plan.mocap = rounded<T>(MocapConstants<double>{s.mocap.position_noise_m, s.mocap.attitude_noise_rad,
+                                                   s.mocap.loss_probability, 1 / s.mocap.loss_length});
+    const FusionNoise& f = s.fusion;
+    plan.fusion = rounded<T>(
+        FusionConstants<double>{square(s.imu.gyro_noise_rad_s) / s.imu.rate_hz + square(f.angle_drift_rad_sqrt_s),
+                                square(f.gyro_bias_drift_rad_s_sqrt_s),
+                                square(s.imu.accel_noise_m_s2) / s.imu.rate_hz + square(f.velocity_drift_m_s_sqrt_s),
+                                square(f.accel_bias_drift_m_s2_sqrt_s),
+                                square(s.mocap.attitude_noise_rad),
+                                square(s.mocap.position_noise_m),
+                                gravity,
+                                {at.x, at.y, at.z}});
+    const Controller& c = options.controller;
+    const auto fill = [&](auto constants) {
+      constants.velocity_share = low_pass_share(c.velocity_low_pass_hz, period_s);
+      constants.rate_share = low_pass_share(c.body_rate_low_pass_hz, period_s);
+      constants.period_s = period_s;
+      constants.gravity_m_s2 = gravity;
+      return constants;
+    };
+    PidConstants<double> pid = fill(c.pid);
+    pid.per_period_Hz = 1 / period_s;
+    plan.controller = static_cast<int>(c.kind);
+    plan.pid = rounded<T>(pid);
+    plan.arc = rounded<T>(fill(c.arc));
+    TaskConstants<double> task = options.task.constants;
+    task.tick_s = period_s;
+    // half-way between ticks, so that rounding cannot move an end by one
+    task.limits.time_s = (std::ceil(task.limits.time_s / period_s - 1e-6) - 0.5) * period_s;
+    for (double* after : {&task.limits.faced_by_s, &task.limits.arrived_by_s})
+      *after = (std::floor(*after / period_s + 1e-6) + 0.5) * period_s;
+    plan.task = rounded<T>(task);
+    plan.parts = options.task.parts;
+    plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(period_s)};
+  }
+
+  struct Place {
+    FlightBlock<T>& block;
+    int lane;
+  };
+  Place at(std::size_t i) {
+    const auto place = batch.storage().at(i);
+    return {blocks[i / kLanes<T>], place.lane};
+  }
+
+  Setpoint<double> setpoint(FlightBlock<T>& f, int lane) const {
+    const std::vector<Segment<double>>& p = options.task.path;
+    const PathView<double> view{p.data(), static_cast<std::uint32_t>(p.size()), period_steps * options.batch.step_s};
+    std::uint32_t segment = f.segment[lane];
+    const Setpoint<One> s = setpoint_at<One>(view, &f.tick[lane], &segment);
+    Setpoint<double> out;
+    for (std::size_t k = 0; k < sizeof out / sizeof(double); ++k)
+      reinterpret_cast<double*>(&out)[k] = reinterpret_cast<const One*>(&s)[k].raw[0];
+    return out;
+  }
+
+  void start(std::size_t i, std::uint32_t episode, const sim::FlapperState& state, sim::Start kind);
+  void start_fusion(std::size_t i, const Truth<double>& truth, sim::RandomKey key);
+};
+
+template <class T>
+void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const sim::FlapperState& s, sim::Start kind) {
+  batch.reset(i, s, kind);
+  const auto [f, lane] = at(i);
+  f.flapper[lane] = options.first_flapper + static_cast<std::uint32_t>(i);
+  f.flight[lane] = episode;
+  f.tick[lane] = f.segment[lane] = f.ended[lane] = 0;
+  const Truth<double> truth{{s.position_m[0], s.position_m[1], s.position_m[2]},
+                            {s.attitude[0], s.attitude[1], s.attitude[2], s.attitude[3]},
+                            {s.velocity_m_s[0], s.velocity_m_s[1], s.velocity_m_s[2]},
+                            {s.body_rate_rad_s[0], s.body_rate_rad_s[1], s.body_rate_rad_s[2]}};
+  put(truth, f.truth, lane);
+  f.seen[0][lane] = 1;
+  const sim::RandomKey key{options.seed, f.flapper[lane], episode, sim::Stream::sensor_bias};
+  const auto& sd = options.sensors.imu.gyro_bias_sd_rad_s;
+  Imu<double> imu{};
+  imu.attitude = truth.attitude;
+  const auto& at_m = options.sensors.imu.position_m;
+  imu.velocity_m_s = point_velocity(truth, {at_m.x, at_m.y, at_m.z});
+  imu.low_passed = {truth.body_rate_rad_s, transpose_times(rotation_matrix(truth.attitude),
+                                                           Vec3<double>{0, 0, options.batch.world.gravity_m_s2})};
+  imu.gyro_bias_rad_s = {sd.x * sim::normal(key, 0), sd.y * sim::normal(key, 1), sd.z * sim::normal(key, 2)};
+  put(imu, f.imu, lane);
+  start_fusion(i, truth, key);
+
+  const auto x = get<Estimate<double>>(f.estimate, lane);
+  for (auto& row : f.controller) row[lane] = 0;
+  if (options.controller.kind == Controller::Kind::pid) {
+    Pid<double> pid{};
+    pid.velocity_m_s = x.velocity_m_s;
+    pid.body_rate_rad_s = x.body_rate_rad_s;
+    put(pid, f.controller, lane);
+  } else if (options.controller.kind == Controller::Kind::arc) {
+    Arc<double> arc{};
+    arc.predicted_x_m_s = x.velocity_m_s.x;
+    arc.predicted_y_m_s = x.velocity_m_s.y;
+    arc.velocity_m_s = x.velocity_m_s;
+    arc.body_rate_rad_s = x.body_rate_rad_s;
+    put(arc, f.controller, lane);
+  }
+  put(Episode<double>{}, f.episode, lane);
+  double row[kMaxObservation] = {};
+  observe(options.task.parts, x, setpoint(f, lane), Episode<double>{}, 0.0, row);
+  for (int k = 0; k < kMaxObservation; ++k) f.observation[k][lane] = static_cast<T>(row[k]);
+}
+
+/// The estimator has watched the flapper before its start, as well as one pose shows it: what it has in store is a past of
+/// steady motion.
+template <class T>
+void Fleet<T>::Storage::start_fusion(std::size_t i, const Truth<double>& truth, sim::RandomKey key) {
+  const auto [f, lane] = at(i);
+  const Sensors& s = options.sensors;
+  const auto noise = [&](double sd, std::uint32_t first) {
+    return Vec3<double>{sd * sim::normal(key, first), sd * sim::normal(key, first + 1),
+                        sd * sim::normal(key, first + 2)};
+  };
+  key.stream = sim::Stream::start_estimate;
+  Estimate<double> x{truth.position_m + noise(s.mocap.position_noise_m, 0),
+                     turned(truth.attitude, noise(s.mocap.attitude_noise_rad / 2, 3)),
+                     truth.velocity_m_s + noise(s.fusion.initial_velocity_sd_m_s, 6), truth.body_rate_rad_s};
+  put(x, f.estimate, lane);
+
+  const double gravity = options.batch.world.gravity_m_s2;
+  Fusion<double> fusion{};
+  FusionConstants<double> place{};
+  place.imu_position_m[0] = s.imu.position_m.x;
+  place.imu_position_m[1] = s.imu.position_m.y;
+  place.imu_position_m[2] = s.imu.position_m.z;
+  const Pose<double> imu = imu_pose(place, x);
+  fusion.horizon = fusion.now = imu;
+  fusion.horizon.position_m = add_scaled(imu.position_m, -schedule.horizon_age_s(), imu.velocity_m_s);
+  fusion.now.position_m = add_scaled(imu.position_m, -schedule.present_age_s(), imu.velocity_m_s);
+  fusion.body_rate_rad_s = x.body_rate_rad_s;
+  const auto& bias = s.imu.gyro_bias_sd_rad_s;
+  Covariance<double>& c = fusion.covariance;
+  c.angle = square(s.mocap.attitude_noise_rad);
+  c.gyro_bias = (square(bias.x) + square(bias.y) + square(bias.z)) / 3;
+  c.position = square(s.mocap.position_noise_m);
+  c.velocity = square(s.fusion.initial_velocity_sd_m_s);
+  c.accel_bias = square(s.fusion.accel_bias_sd_m_s2);
+  put(fusion, f.fusion, lane);
+  const Vec3<double> weight = transpose_times(rotation_matrix(x.attitude), Vec3<double>{0, 0, gravity});
+  std::vector<Advance> past = schedule.pending();
+  if (schedule.newest().slot >= 0) past.push_back(schedule.newest());
+  for (const Advance& a : past) {
+    T* rows = &ring[i / kLanes<T> * ring_size + static_cast<std::size_t>(a.slot * kIncrementRows * kLanes<T>)];
+    put(Increment<double>{{0, 0, 0}, a.duration_s * weight}, reinterpret_cast<T(*)[kLanes<T>]>(rows), lane);
+  }
+  for (int slot = 0; slot < schedule.queue_slots(); ++slot) {  // poses from before the start are not its own
+    T* rows = &queue[i / kLanes<T> * queue_size + static_cast<std::size_t>(slot * kMocapRows * kLanes<T>)];
+    put(MocapSample<double>{truth.position_m, truth.attitude, 0}, reinterpret_cast<T(*)[kLanes<T>]>(rows), lane);
+  }
+}
+
+}  // namespace flappy::flight
