@@ -52,6 +52,23 @@ struct Arc {
   Vec3<T> velocity_m_s, body_rate_rad_s;  // low-passed
 };
 
+/// The inputs that its adaptation has learnt: those of a settled vehicle.
+template <class T>
+FLAPPY_INLINE WingBeat<T> trim(const ArcConstants<Element<T>>& k, const Arc<T>& m) {
+  const T weight = T(k.gravity_m_s2) * where(m.mass_kg > T(0), m.mass_kg, T(k.initial_mass_kg));
+  return {weight / T(k.thrust_N_V) + T(k.thrust_offset_V), -T(m.roll_Nm / T(k.roll_Nm_V)),
+          -T(m.pitch_Nm / T(k.pitch_Nm_V)), -T(m.yaw_Nm / T(k.yaw_Nm_split))};
+}
+
+/// Takes back what it learnt in the last period, but for its low-passes and prediction, where `held`.
+template <class T>
+FLAPPY_INLINE void unlearn(auto held, const Arc<T>& before, Arc<T>& now) {
+  constexpr T Arc<T>::*kLearnt[] = {
+      &Arc<T>::mass_kg,           &Arc<T>::roll_Nm, &Arc<T>::pitch_Nm, &Arc<T>::yaw_Nm, &Arc<T>::disturbance_x_m_s2,
+      &Arc<T>::disturbance_y_m_s2};
+  for (const auto learnt : kLearnt) now.*learnt = where(held, before.*learnt, now.*learnt);
+}
+
 /// Projected adaptation; it stands still while it would push an input further past its limit.
 template <class T, class K>
 FLAPPY_INLINE T adapted(const Adapted<K>& k, const T& value, const T& rate, const T& period, const T& blocked_towards) {

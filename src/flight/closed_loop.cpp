@@ -46,15 +46,21 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   const auto ref = setpoint(f, plan, first);
   const L<T> zero(0);
   WingBeat<L<T>> base{zero, zero, zero, zero};
-  if (plan.controller == static_cast<int>(Controller::Kind::pid)) {
-    auto memory = load_rows<Pid<L<T>>>(f.controller, first);
-    base = control(plan.pid, memory, estimate, ref);
+  const auto fly = [&]<template <class> class Memory>(const auto& constants, Memory<L<T>>) {
+    const auto before = load_rows<Memory<L<T>>>(f.controller, first);
+    auto memory = before;
+    base = control(constants, memory, estimate, ref);
+    if (plan.task.holds_trim > 0) {
+      const auto held = episode.handed_back <= zero;
+      const WingBeat<L<T>> learnt = trim(constants, before);
+      base = {where(held, learnt.amplitude_V, base.amplitude_V), where(held, learnt.difference_V, base.difference_V),
+              where(held, learnt.bias_V, base.bias_V), where(held, learnt.split_cycle, base.split_cycle)};
+      unlearn(held, before, memory);
+    }
     store_rows(memory, f.controller, first);
-  } else if (plan.controller == static_cast<int>(Controller::Kind::arc)) {
-    auto memory = load_rows<Arc<L<T>>>(f.controller, first);
-    base = control(plan.arc, memory, estimate, ref);
-    store_rows(memory, f.controller, first);
-  }
+  };
+  if (plan.controller == static_cast<int>(Controller::Kind::pid)) fly(plan.pid, Pid<L<T>>{});
+  else if (plan.controller == static_cast<int>(Controller::Kind::arc)) fly(plan.arc, Arc<L<T>>{});
   auto drive = load_rows<sim::Drive<L<T>>>(s.body.drive, first);
   drive.input = add_action(plan.task, episode, base);
   store_rows(drive, s.body.drive, first);
@@ -153,10 +159,20 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   const auto ref = setpoint(f, plan, first);
   const auto score = score_of(truth, ref);
   episode.reward = reward_of(plan.task.reward, score, truth, episode);
-  episode.handed_back = where(arrived(plan.task.hand_back, score, truth), L<T>(1), episode.handed_back);
+  const L<T> now = L<T>::load(time);
+  const auto estimate = load_rows<Estimate<L<T>>>(f.estimate, first);
+  const bool by_estimate = plan.task.hand_back.on_estimate > 0;
+  const auto judged = by_estimate ? score_of(Truth<L<T>>{estimate.position_m, estimate.attitude, estimate.velocity_m_s,
+                                                         estimate.body_rate_rad_s},
+                                             ref)
+                                  : score;
+  const auto done =
+      arrived(plan.task.hand_back, judged, by_estimate ? estimate.body_rate_rad_s : truth.body_rate_rad_s, now);
+  episode.handed_back = where(done, L<T>(1), episode.handed_back);
+  note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode);
   for (int i = 0; i < kActions; ++i) episode.previous[i] = episode.action[i];
 
-  look_for_ends(plan.task.limits, score, L<T>::load(time), [&](typename L<T>::Mask mask, std::uint32_t bit) {
+  look_for_ends(plan.task.limits, score, now, [&](typename L<T>::Mask mask, std::uint32_t bit) {
     if (!rarely(mask)) return;
     for (int i = 0; i < kWidth<T>; ++i)
       if (mask.raw[i]) f.ended[first + i] |= bit;
@@ -167,8 +183,7 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
     if (plan.task.contact_ends > 0 && (status & ~std::uint32_t{sim::kFrozen})) f.ended[first + i] |= kContact;
   }
   L<T> row[kMaxObservation];
-  const int rows =
-      observe(plan.parts, load_rows<Estimate<L<T>>>(f.estimate, first), ref, episode, L<T>::load(fraction), row);
+  const int rows = observe(plan.parts, estimate, ref, episode, L<T>::load(fraction), row);
   for (int i = 0; i < rows; ++i) row[i].store(f.observation[i] + first);
   store_rows(episode, f.episode, first);
 }

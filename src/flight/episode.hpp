@@ -15,6 +15,8 @@ struct Episode {
   T added[kActions];     // besides: V, V, V, split cycle
   T handed_back;         // 0 or 1
   T reward;              // of the last control period
+  T captured_s;          // when the goal was captured first; 0: not yet
+  T lost_s;              // when it was not kept first; 0: never
 };
 
 /// What a policy and whoever else may add do to the controller's output.
@@ -34,7 +36,8 @@ template <class T>
 struct Score {
   Vec3<T> position_m, velocity_m_s;
   T roll_rad, pitch_rad, yaw_rad;
-  T facing, upright;  // cosines of heading error and tilt
+  T facing, upright;  // R_00 as seen from the set point's heading, and R_22: the cosine of tilt
+  T heading_cos;      // of the heading error: the body's x axis projected on the level
 };
 
 template <class T>
@@ -48,7 +51,8 @@ FLAPPY_INLINE Score<T> score_of(const Truth<T>& t, const Setpoint<T>& ref) {
           T(-asin(R.row_z.x)),
           atan2(aside, facing),
           facing,
-          R.row_z.z};
+          R.row_z.z,
+          facing / sqrt(max(T(facing * facing + aside * aside), T(1e-12)))};
 }
 
 template <class T>
@@ -70,13 +74,34 @@ FLAPPY_INLINE T reward_of(const Reward<Element<T>>& k, const Score<T>& s, const 
                                     (T(k.behind) * min(T(0), T(s.position_m.x + T(k.behind_m))) + T(k.alive))));
 }
 
+template <class T>
+FLAPPY_INLINE auto shorter(const Vec3<T>& v, const Element<T>& limit) {
+  return dot(v, v) < T(limit) * T(limit);
+}
+
 /// Lanes where the policy's work is done.
 template <class T>
-FLAPPY_INLINE auto arrived(const HandBack<Element<T>>& k, const Score<T>& s, const Truth<T>& t) {
-  const auto below = [](const Vec3<T>& v, auto limit) { return dot(v, v) < T(limit) * T(limit); };
-  return (T(k.enabled) > T(0)) & (s.position_m.x > T(k.x_m)) & below(s.position_m, k.distance_m) &
-         (abs(s.velocity_m_s.x) < T(k.speed_x_m_s)) & below(s.velocity_m_s, k.speed_m_s) &
-         (s.facing > T(k.heading_cos)) & (s.upright > T(k.tilt_cos)) & below(t.body_rate_rad_s, k.body_rate_rad_s);
+FLAPPY_INLINE auto arrived(const HandBack<Element<T>>& k, const Score<T>& s, const Vec3<T>& body_rate,
+                           const T& time_s) {
+  const auto there = (s.position_m.x > T(k.x_m)) & shorter(s.position_m, k.distance_m) &
+                     (abs(s.velocity_m_s.x) < T(k.speed_x_m_s)) & shorter(s.velocity_m_s, k.speed_m_s) &
+                     (s.heading_cos > T(k.heading_cos)) & (s.upright > T(k.tilt_cos)) &
+                     shorter(body_rate, k.body_rate_rad_s);
+  return (T(k.enabled) > T(0)) & (there | (time_s >= T(k.at_s)));
+}
+
+/// Notes when the goal was first captured, and when it was first not kept.
+template <class T>
+FLAPPY_INLINE void note_success(const Success<Element<T>>& k, const Score<T>& s, const Vec3<T>& body_rate,
+                                const T& time_s, Episode<T>& e) {
+  const auto captures = shorter(s.position_m, k.distance_m) & shorter(s.velocity_m_s, k.speed_m_s) &
+                        shorter(body_rate, k.body_rate_rad_s) & (s.upright > T(k.tilt_cos)) &
+                        (s.heading_cos > T(k.heading_cos));
+  e.captured_s = where(captures & (e.captured_s == T(0)), time_s, e.captured_s);
+  const auto keeps = shorter(s.position_m, k.keep_distance_m) & (s.upright > T(k.keep_tilt_cos)) &
+                     (s.heading_cos > T(k.keep_heading_cos));
+  const auto asked = (time_s > T(k.keep_from_s)) & (time_s < T(k.keep_until_s));
+  e.lost_s = where(asked & !keeps & (e.lost_s == T(0)), time_s, e.lost_s);
 }
 
 /// Calls mark(mask, bit) for each end.
@@ -115,6 +140,13 @@ FLAPPY_INLINE int observe(std::uint32_t parts, const Estimate<T>& x, const Setpo
   }
   if (observes(Part::previous_action))
     for (int i = 0; i < kActions; ++i) row[n++] = e.action[i];
+  if (observes(Part::goal_rotation)) {
+    const auto turned_back = [&](const Vec3<T>& x_row, const Vec3<T>& y_row) {
+      return add_scaled(ref.heading.cos * x_row, ref.heading.sin, y_row);
+    };
+    const Vec3<T> minus_x{-R.row_x.x, -R.row_x.y, -R.row_x.z};
+    add(turned_back(R.row_x, R.row_y)), add(turned_back(R.row_y, minus_x)), add(R.row_z);
+  }
   return n;
 }
 

@@ -58,9 +58,7 @@ Fleet<T>::Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOpt
   for (std::size_t i = count; count > 0 && i < s.blocks.size() * kLanes<T>; ++i) {
     FlightBlock<T>& f = s.blocks.back();
     const int from = static_cast<int>((count - 1) % kLanes<T>), to = static_cast<int>(i % kLanes<T>);
-    T(*rows)[kLanes<T>] = f.imu;
-    for (std::size_t r = 0; r < offsetof(FlightBlock<T>, flapper) / sizeof(T[kLanes<T>]); ++r)
-      rows[r][to] = rows[r][from];
+    for (int r = 0; r < kFlightRows<T>; ++r) rows_of<T>(f)[r][to] = rows_of<T>(f)[r][from];
   }
 }
 
@@ -107,6 +105,16 @@ void Fleet<T>::start(std::size_t i, std::uint32_t episode) {
 template <class T>
 void Fleet<T>::start(std::size_t i, std::uint32_t episode, const sim::FlapperState& state, sim::Start kind) {
   storage_->start(i, episode, state, kind);
+}
+
+template <class T>
+void Fleet<T>::start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot) {
+  storage_->start(i, episode, snapshot);
+}
+
+template <class T>
+Snapshot<T> Fleet<T>::snapshot(std::size_t i) const {
+  return storage_->snapshot(i, target(i));
 }
 
 template <class T>
@@ -236,6 +244,16 @@ bool Fleet<T>::handed_back(std::size_t i) const {
   return get<Episode<double>>(f.episode, lane).handed_back > 0;
 }
 template <class T>
+double Fleet<T>::captured_s(std::size_t i) const {
+  const auto [f, lane] = storage_->at(i);
+  return get<Episode<double>>(f.episode, lane).captured_s;
+}
+template <class T>
+double Fleet<T>::lost_s(std::size_t i) const {
+  const auto [f, lane] = storage_->at(i);
+  return get<Episode<double>>(f.episode, lane).lost_s;
+}
+template <class T>
 std::uint32_t Fleet<T>::ended(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
   return f.ended[lane];
@@ -329,9 +347,7 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
   for (std::size_t i = first; i < last; ++i) {
     const auto [f, lane] = storage_->at(i);
     std::uint64_t h = 0;
-    const T(*rows)[kLanes<T>] = f.imu;
-    for (std::size_t r = 0; r < offsetof(FlightBlock<T>, flapper) / sizeof(T[kLanes<T>]); ++r)
-      h = sim::mixed(h, sim::bits_of(rows[r][lane]));
+    for (int r = 0; r < kFlightRows<T>; ++r) h = sim::mixed(h, sim::bits_of(rows_of<T>(f)[r][lane]));
     for (const std::uint32_t word : {f.flapper[lane], f.flight[lane], f.tick[lane], f.segment[lane], f.ended[lane]})
       h = sim::mixed(h, word);
     const auto add = [&, lane = lane](const std::vector<T>& rows_of_all, std::size_t size) {

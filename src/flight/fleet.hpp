@@ -36,6 +36,14 @@ struct Target {
   double heading_cos, heading_sin, heading_rate_rad_s;
 };
 
+/// A flapper in mid-flight: its vehicle without effects, state, sensors' biases, and what estimator and controller have learnt.
+template <class T>
+struct Snapshot {
+  std::vector<T> body, flight;  ///< rows of Block and FlightBlock
+  std::uint32_t phase, phase_per_update;
+  Target target;  ///< where it was meant to be
+};
+
 template <class T>
 class Fleet {
  public:
@@ -53,6 +61,10 @@ class Fleet {
   /// Starts flapper `i` anew where its task starts episode `episode`, or at `state`.
   void start(std::size_t i, std::uint32_t episode);
   void start(std::size_t i, std::uint32_t episode, const sim::FlapperState& state, sim::Start kind);
+  /// Starts flapper `i` as the snapshot flew, moved and turned about z to where its task starts the episode.
+  void start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot);
+  /// std::invalid_argument for a vehicle with effects.
+  Snapshot<T> snapshot(std::size_t i) const;
 
   /// The actor that acts from now on, or none: then the last actions stay. std::invalid_argument unless its observation and
   /// action are those of the task.
@@ -73,6 +85,8 @@ class Fleet {
   std::uint32_t ended(std::size_t i) const;  ///< bits of Ended, since the start
   std::uint32_t tick(std::size_t i) const;   ///< control periods since the start
   bool handed_back(std::size_t i) const;
+  double captured_s(std::size_t i) const;  ///< when the goal was first captured; 0: not yet
+  double lost_s(std::size_t i) const;      ///< when it was first not kept, as the task asks; 0: never
   std::vector<double> observation(std::size_t i) const;
   /// Squared innovations of the last pose over their variance: angle and position, three degrees of freedom each.
   std::pair<double, double> innovation(std::size_t i) const;

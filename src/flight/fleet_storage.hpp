@@ -10,10 +10,22 @@
 
 namespace flappy::flight {
 
+using model::Quaternion;
 using model::Vec3;
 using sim::get;
 using sim::put;
 using One = model::Lanes<double, 1>;
+
+/// Numbers of a lane in each kind of block, up to its integers.
+inline constexpr int kBodyRows = sim::kParameterRows + sim::kStateRows + sim::kDriveRows;
+template <class T>
+inline constexpr int kFlightRows = offsetof(FlightBlock<T>, flapper) / sizeof(T[kLanes<T>]);
+
+/// The rows of a block, from its first to its last.
+template <class T, class B>
+auto rows_of(B& block) {
+  return reinterpret_cast<std::conditional_t<std::is_const_v<B>, const T, T>(*)[kLanes<T>]>(&block);
+}
 
 /// The same numbers in another precision.
 template <class T, template <class> class S>
@@ -108,8 +120,9 @@ struct Fleet<T>::Storage {
     TaskConstants<double> task = options.task.constants;
     task.tick_s = period_s;
     // half-way between ticks, so that rounding cannot move an end by one
-    task.limits.time_s = (std::ceil(task.limits.time_s / period_s - 1e-6) - 0.5) * period_s;
-    for (double* after : {&task.limits.faced_by_s, &task.limits.arrived_by_s})
+    for (double* from : {&task.limits.time_s, &task.hand_back.at_s, &task.success.keep_from_s})
+      *from = (std::ceil(*from / period_s - 1e-6) - 0.5) * period_s;
+    for (double* after : {&task.limits.faced_by_s, &task.limits.arrived_by_s, &task.success.keep_until_s})
       *after = (std::floor(*after / period_s + 1e-6) + 0.5) * period_s;
     plan.task = rounded<T>(task);
     plan.parts = options.task.parts;
@@ -137,20 +150,20 @@ struct Fleet<T>::Storage {
   }
 
   void start(std::size_t i, std::uint32_t episode, const sim::FlapperState& state, sim::Start kind);
+  void start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot);
+  Snapshot<T> snapshot(std::size_t i, const Target& target);
+  void start_lane(std::size_t i, std::uint32_t episode, const Truth<double>& truth);
+  void show(std::size_t i);
   void start_fusion(std::size_t i, const Truth<double>& truth, sim::RandomKey key);
 };
 
+/// What every start has in common: numbers, sensors, estimator, a fresh episode.
 template <class T>
-void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const sim::FlapperState& s, sim::Start kind) {
-  batch.reset(i, s, kind);
+void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const Truth<double>& truth) {
   const auto [f, lane] = at(i);
   f.flapper[lane] = options.first_flapper + static_cast<std::uint32_t>(i);
   f.flight[lane] = episode;
   f.tick[lane] = f.segment[lane] = f.ended[lane] = 0;
-  const Truth<double> truth{{s.position_m[0], s.position_m[1], s.position_m[2]},
-                            {s.attitude[0], s.attitude[1], s.attitude[2], s.attitude[3]},
-                            {s.velocity_m_s[0], s.velocity_m_s[1], s.velocity_m_s[2]},
-                            {s.body_rate_rad_s[0], s.body_rate_rad_s[1], s.body_rate_rad_s[2]}};
   put(truth, f.truth, lane);
   f.seen[0][lane] = 1;
   const sim::RandomKey key{options.seed, f.flapper[lane], episode, sim::Stream::sensor_bias};
@@ -164,7 +177,30 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const sim::F
   imu.gyro_bias_rad_s = {sd.x * sim::normal(key, 0), sd.y * sim::normal(key, 1), sd.z * sim::normal(key, 2)};
   put(imu, f.imu, lane);
   start_fusion(i, truth, key);
+  put(Episode<double>{}, f.episode, lane);
+}
 
+/// The observation before the first period.
+template <class T>
+void Fleet<T>::Storage::show(std::size_t i) {
+  const auto [f, lane] = at(i);
+  const double phase =
+      static_cast<double>(static_cast<std::int32_t>(batch.storage().at(i).block.phase[lane])) * 0x1p-32;
+  double row[kMaxObservation] = {};
+  observe(options.task.parts, get<Estimate<double>>(f.estimate, lane), setpoint(f, lane), Episode<double>{}, phase,
+          row);
+  for (int k = 0; k < kMaxObservation; ++k) f.observation[k][lane] = static_cast<T>(row[k]);
+}
+
+template <class T>
+void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const sim::FlapperState& s, sim::Start kind) {
+  batch.reset(i, s, kind);
+  start_lane(i, episode,
+             {{s.position_m[0], s.position_m[1], s.position_m[2]},
+              {s.attitude[0], s.attitude[1], s.attitude[2], s.attitude[3]},
+              {s.velocity_m_s[0], s.velocity_m_s[1], s.velocity_m_s[2]},
+              {s.body_rate_rad_s[0], s.body_rate_rad_s[1], s.body_rate_rad_s[2]}});
+  const auto [f, lane] = at(i);
   const auto x = get<Estimate<double>>(f.estimate, lane);
   for (auto& row : f.controller) row[lane] = 0;
   if (options.controller.kind == Controller::Kind::pid) {
@@ -180,10 +216,85 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const sim::F
     arc.body_rate_rad_s = x.body_rate_rad_s;
     put(arc, f.controller, lane);
   }
-  put(Episode<double>{}, f.episode, lane);
-  double row[kMaxObservation] = {};
-  observe(options.task.parts, x, setpoint(f, lane), Episode<double>{}, 0.0, row);
-  for (int k = 0; k < kMaxObservation; ++k) f.observation[k][lane] = static_cast<T>(row[k]);
+  show(i);
+}
+
+template <class T>
+Snapshot<T> Fleet<T>::Storage::snapshot(std::size_t i, const Target& target) {
+  auto& body = batch.storage();
+  if (!body.lane_effects.empty() && body.lane_effects[i] != 0)
+    throw std::invalid_argument("a vehicle with effects has no snapshot");
+  const auto [block, lane] = body.at(i);
+  const FlightBlock<T>& f = at(i).block;
+  Snapshot<T> s{{}, {}, block.phase[lane], block.phase_per_update[lane], target};
+  for (int r = 0; r < kBodyRows; ++r) s.body.push_back(rows_of<T>(block)[r][lane]);
+  for (int r = 0; r < kFlightRows<T>; ++r) s.flight.push_back(rows_of<T>(f)[r][lane]);
+  return s;
+}
+
+template <class T>
+void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapshot<T>& s) {
+  const auto [block, lane] = batch.storage().at(i);
+  FlightBlock<T>& f = at(i).block;
+  for (int r = 0; r < kBodyRows; ++r) rows_of<T>(block)[r][lane] = s.body[static_cast<std::size_t>(r)];
+  for (int r = 0; r < kFlightRows<T>; ++r) rows_of<T>(f)[r][lane] = s.flight[static_cast<std::size_t>(r)];
+  block.phase[lane] = s.phase;
+  block.phase_per_update[lane] = s.phase_per_update;
+  block.status[lane] = 0;
+
+  // from where it was meant to be to where it starts now
+  const std::uint32_t flapper = options.first_flapper + static_cast<std::uint32_t>(i);
+  const sim::FlapperState to = options.task.sample_start({options.seed, flapper, episode, sim::Stream::start});
+  const auto now =
+      heading_of(rotation_matrix(Quaternion<double>{to.attitude[0], to.attitude[1], to.attitude[2], to.attitude[3]}));
+  const SinCos<double> turn{now.sin * s.target.heading_cos - now.cos * s.target.heading_sin,
+                            now.cos * s.target.heading_cos + now.sin * s.target.heading_sin};
+  const double half = atan2(turn.sin, turn.cos) / 2;
+  const SinCos<double> h = sin_cos_wide(half);
+  const auto turned_z = [&](const Vec3<double>& v) { return turn_z(turn.sin, turn.cos, v); };
+  const auto turned_q = [&](const Quaternion<double>& q) {
+    return Quaternion<double>{h.cos * q.w - h.sin * q.z, h.cos * q.x - h.sin * q.y, h.cos * q.y + h.sin * q.x,
+                              h.cos * q.z + h.sin * q.w};
+  };
+  const Vec3<double> from{s.target.position_m[0], s.target.position_m[1], s.target.position_m[2]};
+  const Vec3<double> at_m{to.position_m[0], to.position_m[1], to.position_m[2]};
+  auto x = get<State<double>>(block.state, lane);
+  x.position_m = at_m + turned_z(x.position_m - from);
+  x.attitude = turned_q(x.attitude);
+  x.com_velocity_m_s = turned_z(x.com_velocity_m_s);
+  put(x, block.state, lane);
+
+  const auto imu = get<Imu<double>>(f.imu, lane);
+  const auto learnt = get<Fusion<double>>(f.fusion, lane);
+  const auto flown = get<Truth<double>>(f.truth, lane);
+  start_lane(i, episode, {x.position_m, x.attitude, turned_z(flown.velocity_m_s), flown.body_rate_rad_s});
+  auto fresh_imu = get<Imu<double>>(f.imu, lane);
+  fresh_imu.gyro_bias_rad_s = imu.gyro_bias_rad_s;
+  fresh_imu.low_passed = imu.low_passed;
+  put(fresh_imu, f.imu, lane);
+  auto fusion = get<Fusion<double>>(f.fusion, lane);
+  fusion.gyro_bias_rad_s = learnt.gyro_bias_rad_s;
+  fusion.accel_bias_m_s2 = learnt.accel_bias_m_s2;
+  fusion.covariance.gyro_bias = learnt.covariance.gyro_bias;
+  fusion.covariance.accel_bias = learnt.covariance.accel_bias;
+  put(fusion, f.fusion, lane);
+  if (options.controller.kind == Controller::Kind::pid) {
+    auto pid = get<Pid<double>>(f.controller, lane);
+    const Vec3<double> integral = turned_z({pid.integral_x, pid.integral_y, 0});
+    pid.integral_x = integral.x;
+    pid.integral_y = integral.y;
+    pid.velocity_m_s = turned_z(pid.velocity_m_s);
+    put(pid, f.controller, lane);
+  } else if (options.controller.kind == Controller::Kind::arc) {
+    auto arc = get<Arc<double>>(f.controller, lane);
+    const Vec3<double> push = turned_z({arc.disturbance_x_m_s2, arc.disturbance_y_m_s2, 0});
+    const Vec3<double> predicted = turned_z({arc.predicted_x_m_s, arc.predicted_y_m_s, 0});
+    arc.disturbance_x_m_s2 = push.x, arc.disturbance_y_m_s2 = push.y;
+    arc.predicted_x_m_s = predicted.x, arc.predicted_y_m_s = predicted.y;
+    arc.velocity_m_s = turned_z(arc.velocity_m_s);
+    put(arc, f.controller, lane);
+  }
+  show(i);
 }
 
 /// The estimator has watched the flapper before its start, as well as one pose shows it: what it has in store is a past of

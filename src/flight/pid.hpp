@@ -51,6 +51,20 @@ FLAPPY_INLINE SinCos<T> heading_of(const Matrix3<T>& R) {
   return {s * scale, c * scale};
 }
 
+/// The inputs that its integrators have learnt: those of a settled vehicle.
+template <class T>
+FLAPPY_INLINE WingBeat<T> trim(const PidConstants<Element<T>>& k, const Pid<T>& m) {
+  return {T(k.hover_V) + m.integral_z, m.integral_roll, m.integral_pitch, m.integral_yaw};
+}
+
+/// Takes back what it learnt in the last period, but for its low-passes, where `held`.
+template <class T>
+FLAPPY_INLINE void unlearn(auto held, const Pid<T>& before, Pid<T>& now) {
+  constexpr T Pid<T>::*kLearnt[] = {&Pid<T>::integral_x,    &Pid<T>::integral_y,     &Pid<T>::integral_z,
+                                    &Pid<T>::integral_roll, &Pid<T>::integral_pitch, &Pid<T>::integral_yaw};
+  for (const auto learnt : kLearnt) now.*learnt = where(held, before.*learnt, now.*learnt);
+}
+
 /// Adds to an integral in the unit of the output, within its limit, and not further out while `blocked`.
 template <class T>
 FLAPPY_INLINE T integrated(const T& integral, const T& gain_and_time, const T& error, const T& limit,

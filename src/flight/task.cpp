@@ -26,10 +26,13 @@ const std::vector<PartInfo>& part_infos() {
          {{"roll_rate", "rad/s", -50, 50}, {"pitch_rate", "rad/s", -50, 50}, {"yaw_rate", "rad/s", -50, 50}}},
         {"beat_phase", {{"beat_sin", "1", -1, 1}, {"beat_cos", "1", -1, 1}}},
         {"heading_error", {{"heading_sin", "1", -1, 1}, {"heading_cos", "1", -1, 1}}},
-        {"previous_action", {}}};
+        {"previous_action", {}},
+        {"goal_rotation", {}}};
     for (const char* row : {"x", "y", "z"})
       for (const char* column : {"x", "y", "z"})
-        list[0].signals.push_back({std::string("R_") + row + column, "1", -1, 1});
+        for (const auto& [part, name] :
+             {std::pair{Part::rotation_matrix, "R_"}, std::pair{Part::goal_rotation, "goal_R_"}})
+          list[static_cast<std::size_t>(part)].signals.push_back({name + std::string(row) + column, "1", -1, 1});
     for (const char* input : {"amplitude", "difference", "bias", "split_cycle"})
       list[6].signals.push_back({std::string("previous_") + input, "1", -1, 1});
     return list;
@@ -143,7 +146,10 @@ void read_spread(const io::Table& table, const std::string& key, Spread (&to)[3]
 
 StartRange read_start(const io::Table& table) {
   StartRange s;
-  s.kind = table.choice("start.kind", {"standing", "flying"}) == "standing" ? sim::Start::standing : sim::Start::flying;
+  s.kind = sim::Start::flying;
+  const std::string kind = table.choice("start.kind", {"standing", "flying", "settled"});
+  if (kind == "standing") s.kind = sim::Start::standing;
+  s.settled = kind == "settled";
   read_spread(table, "start.position_m", s.position_m);
   read_spread(table, "start.rotation_rad", s.rotation_rad);
   read_spread(table, "start.velocity_m_s", s.velocity_m_s);
@@ -170,6 +176,44 @@ Reward<double> read_reward(const io::Table& table) {
   r.behind_m = weight("behind_m");
   r.alive = weight("alive");
   return r;
+}
+
+/// Cosine of an angle that may not be exceeded; angles above pi do not limit.
+double cosine_limit(double angle_rad) { return angle_rad > std::numbers::pi ? -2 : model::sin_cos_wide(angle_rad).cos; }
+
+void read_hand_back(const io::Table& table, HandBack<double>& h) {
+  h = {0, 0, -kFar, kFar, kFar, kFar, -2, -2, kFar, kFar};
+  const auto t = table.optional_table("hand_back");
+  if (!t) return;
+  const auto bound = [&](const char* name, double otherwise) { return t->number_or(name, otherwise, {-kFar, kFar}); };
+  const std::string on = t->string_or("on", "truth");
+  if (on != "truth" && on != "estimate") t->fail("on", "is not known", "\"truth\" or \"estimate\"");
+  h = {1,
+       on == "estimate" ? 1.0 : 0.0,
+       bound("x_m", -kFar),
+       bound("distance_m", kFar),
+       bound("speed_x_m_s", kFar),
+       bound("speed_m_s", kFar),
+       cosine_limit(bound("heading_rad", 4)),
+       cosine_limit(bound("tilt_rad", 4)),
+       bound("body_rate_rad_s", kFar),
+       bound("at_s", kFar)};
+}
+
+void read_success(const io::Table& table, Success<double>& s) {
+  const auto t = table.optional_table("success");
+  if (!t) return;  // never captured, nothing to keep
+  const auto angle = [&](const char* name) { return cosine_limit(t->number(name, io::positive(4))); };
+  s = {t->number("capture.distance_m", io::positive()),
+       t->number("capture.speed_m_s", io::positive()),
+       t->number("capture.body_rate_rad_s", io::positive()),
+       angle("capture.tilt_rad"),
+       angle("capture.heading_rad"),
+       t->number("keep.from_s", io::non_negative()),
+       t->number("keep.until_s", io::non_negative()),
+       t->number("keep.distance_m", io::positive()),
+       angle("keep.tilt_rad"),
+       angle("keep.heading_rad")};
 }
 
 }  // namespace
@@ -254,15 +298,11 @@ Task read_task(const io::Table& table, double tick_s) {
               limit("arrived_by_s", kFar),
               limit("arrived_x_m", -kFar)};
 
-  const auto back = table.optional_table("hand_back");
-  const auto bound = [&](const char* name, double otherwise) {
-    return back ? back->number_or(name, otherwise, {-kFar, kFar}) : otherwise;
-  };
-  k.hand_back = {back ? 1.0 : 0.0,           bound("x_m", -kFar),           bound("distance_m", kFar),
-                 bound("speed_x_m_s", kFar), bound("speed_m_s", kFar),      bound("heading_rad", 4),
-                 bound("tilt_rad", 4),       bound("body_rate_rad_s", kFar)};
-  for (double* angle : {&k.hand_back.heading_cos, &k.hand_back.tilt_cos})
-    *angle = *angle > std::numbers::pi ? -2 : model::sin_cos_wide(*angle).cos;
+  k.holds_trim = table.string_or("base", "controller") == "trim" ? 1 : 0;
+  if (k.holds_trim == 0 && table.string_or("base", "controller") != "controller")
+    table.fail("base", "is not known", "\"controller\", or \"trim\": what it has learnt, until it is handed back to");
+  read_hand_back(table, k.hand_back);
+  read_success(table, k.success);
   table.finish();
   return task;
 }

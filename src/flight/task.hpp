@@ -22,8 +22,18 @@ struct Signal {
   double low, high;  ///< expected range; values outside are possible
 };
 
-/// Parts an observation may have, in the order of their bits. Those of a flapper's state are estimated.
-enum class Part { rotation_matrix, position_error, velocity, body_rate, beat_phase, heading_error, previous_action };
+/// Parts an observation may have, in the order of their bits. Those of a flapper's state are estimated; goal_rotation is the
+/// attitude seen from the heading of the set point.
+enum class Part {
+  rotation_matrix,
+  position_error,
+  velocity,
+  body_rate,
+  beat_phase,
+  heading_error,
+  previous_action,
+  goal_rotation
+};
 
 /// Why an episode ended; bits. A time-out is a truncation, all others are terminations.
 enum Ended : std::uint32_t {
@@ -54,11 +64,19 @@ struct Limits {
   T arrived_by_s, arrived_x_m;  // after it, x < arrived_x_m does
 };
 
-/// When a policy is done for good and the controller flies alone, on the true state.
+/// When a policy is done for good and the controller flies alone: all at once, or at a time.
 template <class T>
 struct HandBack {
-  T enabled;  // 0 or 1
+  T enabled, on_estimate;  // 0 or 1; judged on the true state otherwise
   T x_m, distance_m, speed_x_m_s, speed_m_s, heading_cos, tilt_cos, body_rate_rad_s;
+  T at_s;
+};
+
+/// What makes a flight a success, on the true state at each control tick: it captures the goal, all at once, and later keeps it.
+template <class T>
+struct Success {
+  T distance_m, speed_m_s, body_rate_rad_s, tilt_cos, heading_cos;                // capture
+  T keep_from_s, keep_until_s, keep_distance_m, keep_tilt_cos, keep_heading_cos;  // and after
 };
 
 template <class T>
@@ -67,7 +85,9 @@ struct TaskConstants {
   Reward<T> reward;
   Limits<T> limits;
   HandBack<T> hand_back;
+  Success<T> success;
   T contact_ends;  // 0 or 1
+  T holds_trim;    // 0 or 1: until it is handed back to, the controller adds no more than the trim it has learnt
   T tick_s;
 };
 
@@ -79,6 +99,7 @@ struct Spread {
 /// Where episodes start.
 struct StartRange {
   sim::Start kind = sim::Start::flying;
+  bool settled = false;  ///< in hover, as a snapshot has it: position and heading are drawn, the rest is the snapshot's
   Spread position_m[3], rotation_rad[3], velocity_m_s[3], body_rate_rad_s[3];
   double x_low_m = -1e9, x_high_m = 1e9;  ///< x is clamped to it
 };

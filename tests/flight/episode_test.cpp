@@ -187,29 +187,31 @@ TEST(Ends, ContactAndImplausibleFlightsEndByTheirOwnBits) {
 }
 
 TEST(HandBack, NeedsEveryConditionAndLatches) {
-  const HandBack<double> k{1, -0.1, 0.3, 0.5, 0.8, std::cos(0.4), std::cos(0.3), 2};
+  const HandBack<double> k{1, 0, -0.1, 0.3, 0.5, 0.8, std::cos(0.4), std::cos(0.3), 2, 0.35};
+  const double early = 0.1;
   Truth<double> t{{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
   Score<double> good{};
-  good.facing = good.upright = 1;
+  good.heading_cos = good.upright = 1;
   const auto changed = [&](const auto& change) {
     Score<double> s = good;
     change(s);
-    return arrived(k, s, t);
+    return arrived(k, s, t.body_rate_rad_s, early);
   };
-  EXPECT_TRUE(arrived(k, good, t));
+  EXPECT_TRUE(arrived(k, good, t.body_rate_rad_s, early));
   EXPECT_TRUE(changed([](Score<double>& s) { s.position_m = {-0.09, 0.2, 0.2}; }));
   EXPECT_FALSE(changed([](Score<double>& s) { s.position_m = {-0.11, 0, 0}; }));
   EXPECT_FALSE(changed([](Score<double>& s) { s.position_m = {0, 0.25, 0.25}; }));
   EXPECT_FALSE(changed([](Score<double>& s) { s.velocity_m_s = {-0.51, 0, 0}; }));
   EXPECT_FALSE(changed([](Score<double>& s) { s.velocity_m_s = {0, 0, 0.81}; }));
-  EXPECT_FALSE(changed([](Score<double>& s) { s.facing = std::cos(0.41); }));
+  EXPECT_FALSE(changed([](Score<double>& s) { s.heading_cos = std::cos(0.41); }));
   EXPECT_FALSE(changed([](Score<double>& s) { s.upright = std::cos(0.31); }));
   t.body_rate_rad_s = {1.5, 1.5, 0};
-  EXPECT_FALSE(arrived(k, good, t));
+  EXPECT_FALSE(arrived(k, good, t.body_rate_rad_s, early));
   t.body_rate_rad_s = {0, 0, 0};
   HandBack<double> off = k;
   off.enabled = 0;
-  EXPECT_FALSE(arrived(off, good, t));
+  EXPECT_FALSE(arrived(off, good, t.body_rate_rad_s, early));
+  EXPECT_TRUE(arrived(k, Score<double>{}, t.body_rate_rad_s, 0.35));  // done or not: it is time
 
   // it falls through the place where it is handed back, and stays handed back below
   Task task_back = task(staying() + "[hand_back]\ndistance_m = 0.05\n");

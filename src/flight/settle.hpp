@@ -1,0 +1,22 @@
+// Settled flappers: each vehicle is stood up, takes off on the spot and hovers until its controller has learnt its trim.
+#pragma once
+
+#include <functional>
+
+#include "flight/fleet.hpp"
+
+namespace flappy::flight {
+
+/// Snapshots of `count` vehicles after `seconds` of hover, each at a phase of the wing beat of its own. `options`: sensors,
+/// controller and world of the flights to come; its task is not used. Bytes depend on the vehicles, the options and the
+/// number of each flapper alone.
+template <class T>
+std::vector<Snapshot<T>> settle(const FleetOptions& options, std::size_t count, double seconds,
+                                const std::function<model::Vehicle(std::uint32_t flapper)>& vehicle);
+
+extern template std::vector<Snapshot<float>> settle(const FleetOptions&, std::size_t, double,
+                                                    const std::function<model::Vehicle(std::uint32_t)>&);
+extern template std::vector<Snapshot<double>> settle(const FleetOptions&, std::size_t, double,
+                                                     const std::function<model::Vehicle(std::uint32_t)>&);
+
+}  // namespace flappy::flight

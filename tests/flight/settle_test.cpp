@@ -1,0 +1,131 @@
+#include "flight/settle.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fleets.hpp"
+#include "sim/randomise.hpp"
+
+namespace flappy::flight {
+namespace {
+
+constexpr std::size_t kCount = 48;
+
+sim::Randomisation randomisation() {
+  return sim::read_randomisation(test::nominal(),
+                                 io::Config::load(test::source_path("configs/randomisation/published.toml")).root());
+}
+
+/// Holds a place and heading, from settled flight there or elsewhere.
+std::string holding(double x_m, double heading_rad) {
+  return "schema = 1\nname = \"hold\"\nobservation = [\"position_error\", \"beat_phase\"]\n[start]\nkind = "
+         "\"settled\"\n"
+         "position_m = { x = " +
+         std::to_string(x_m) + ", y = 0.3 }\nrotation_rad = { z = " + std::to_string(heading_rad) +
+         " }\n[path]\nkind = \"waypoints\"\n" + waypoint(0, x_m, 0.3, 0, heading_rad) + kPlainTask;
+}
+
+double far_off_m(const Motion& m, const Target& t) {
+  return std::hypot(m.position_m[0] - t.position_m[0], m.position_m[1] - t.position_m[1],
+                    m.position_m[2] - t.position_m[2]);
+}
+
+template <class T>
+void goes_on(const std::string& name) {
+  const sim::Randomisation vehicles = randomisation();
+  const auto vehicle = [&](std::uint32_t flapper) { return vehicles.sample({.seed = 4, .flapper = flapper}); };
+  FleetOptions o = fleet_options(sensors("paper"), controller(name), task(holding(-0.2, 1.5)));
+  const std::vector<Snapshot<T>> pool = settle<T>(o, kCount, 3, vehicle);
+  Fleet<T> fleet(kCount, vehicle(0), o);
+  for (int i = 0; i < 137; ++i) fleet.step();  // not at the beginning of any schedule
+  for (std::size_t i = 0; i < kCount; ++i) fleet.start(i, 1, pool[(i + 7) % kCount]);
+  for (std::size_t i = 0; i < kCount; ++i) {
+    EXPECT_EQ(fleet.batch().status(i), 0u);
+    EXPECT_LT(far_off_m(fleet.truth(i), fleet.target(i)), 0.03) << i;
+  }
+  // A fresh flight at rest falls 0.1 m before its controller has learnt its trim; a settled one goes on as it was.
+  double worst = 0, angle = 0, position = 0, ticks = 0;
+  for (int tick = 0; tick < 250; ++tick) {
+    fleet.step();
+    for (std::size_t i = 0; i < kCount; ++i) {
+      worst = std::max(worst, far_off_m(fleet.truth(i), fleet.target(i)));
+      if (fleet.innovation(i).second == 0) continue;
+      angle += fleet.innovation(i).first, position += fleet.innovation(i).second, ++ticks;
+    }
+  }
+  EXPECT_LT(worst, 0.02);
+  // of 48 x 75 poses: 3 +- 0.04, and what flight adds
+  EXPECT_NEAR(angle / ticks, 3, 0.3);
+  EXPECT_NEAR(position / ticks, 3, 0.5);
+}
+
+TEST(Settle, FlightsGoOnWhereTheyArePut) {
+  goes_on<float>("pid");
+  goes_on<double>("arc");
+}
+
+TEST(Settle, SnapshotsDependOnTheFlapperAlone) {
+  const sim::Randomisation vehicles = randomisation();
+  const auto vehicle = [&](std::uint32_t flapper) { return vehicles.sample({.seed = 4, .flapper = flapper}); };
+  FleetOptions o = fleet_options(sensors("paper"), controller("pid"), task(holding(0, 0)));
+  const auto all = settle<float>(o, 20, 0.3, vehicle);
+  o.first_flapper = 17;
+  const auto some = settle<float>(o, 3, 0.3, vehicle);
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    EXPECT_EQ(some[i].body, all[17 + i].body);
+    EXPECT_EQ(some[i].flight, all[17 + i].flight);
+    EXPECT_EQ(some[i].phase, all[17 + i].phase);
+  }
+  EXPECT_NE(all[0].phase, all[1].phase);
+}
+
+TEST(Trim, IsAllThatActsUntilHandedBack) {
+  const std::string base = "base = \"trim\"\n";
+  std::string text = holding(0, 0);
+  text.insert(text.find("[start]"), base);
+  text += "[hand_back]\non = \"estimate\"\nat_s = 0.1\ndistance_m = 1e-6\n";
+  FleetOptions o = fleet_options(sensors("paper"), controller("pid"), task(text));
+  const auto vehicle = [](std::uint32_t) { return test::identified(); };
+  const auto pool = settle<double>(o, 1, 3, vehicle);
+  Fleet<double> fleet(1, test::identified(), o);
+  fleet.start(0, 0, pool[0]);
+  sim::Input first{};
+  for (int tick = 1; tick <= 80; ++tick) {
+    fleet.step();
+    const sim::Input u = fleet.input(0);
+    if (tick == 1) first = u;
+    if (tick <= 50) {  // nothing the controller sees moves it; at_s = 0.1 is the end of period 50
+      EXPECT_EQ(u.amplitude_V, first.amplitude_V) << tick;
+      EXPECT_EQ(u.bias_V, first.bias_V) << tick;
+      EXPECT_EQ(fleet.handed_back(0), tick == 50);
+    }
+  }
+  EXPECT_NE(fleet.input(0).bias_V, first.bias_V);
+  EXPECT_NEAR(first.amplitude_V, 9.8, 0.6);  // what carries the vehicle
+}
+
+TEST(Success, NotesCaptureAndLossOnTheTrueState) {
+  const std::string success =
+      "[success.capture]\ndistance_m = 0.06\nspeed_m_s = 1.0\nbody_rate_rad_s = 15.0\ntilt_rad = 0.7\nheading_rad = "
+      "0.8\n"
+      "[success.keep]\nfrom_s = 0.1\nuntil_s = 0.3\ndistance_m = 0.1\ntilt_rad = 0.8\nheading_rad = 0.8\n";
+  FleetOptions o = fleet_options(sensors("paper"), controller("none"), task(staying() + success));
+  Fleet<double> fleet(3, test::nominal(), o);
+  sim::FlapperState s;
+  s.velocity_m_s[2] = 0.5;  // thrown up: back at the goal by 0.1 s, 0.29 m below it by 0.3 s
+  fleet.start(0, 0, s, sim::Start::flying);
+  s.attitude[0] = 0, s.attitude[3] = 1;  // the same, looking away
+  fleet.start(1, 0, s, sim::Start::flying);
+  s = {};
+  s.position_m[0] = 0.2;  // never there
+  fleet.start(2, 0, s, sim::Start::flying);
+  for (int tick = 0; tick < 200; ++tick) fleet.step();
+  EXPECT_NEAR(fleet.captured_s(0), 0.002, 1e-9);
+  EXPECT_NEAR(fleet.lost_s(0), 0.204, 0.03);  // 0.5 t - g/2 t^2 = -0.1, but for the air
+  EXPECT_EQ(fleet.captured_s(1), 0);
+  EXPECT_NEAR(fleet.lost_s(1), 0.1, 1e-9);  // the first sample that is asked for
+  EXPECT_EQ(fleet.captured_s(2), 0);
+  EXPECT_NEAR(fleet.lost_s(2), 0.1, 1e-9);
+}
+
+}  // namespace
+}  // namespace flappy::flight
