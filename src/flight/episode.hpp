@@ -97,7 +97,8 @@ FLAPPY_INLINE void note_success(const Success<Element<T>>& k, const Score<T>& s,
   const auto captures = shorter(s.position_m, k.distance_m) & shorter(s.velocity_m_s, k.speed_m_s) &
                         shorter(body_rate, k.body_rate_rad_s) & (s.upright > T(k.tilt_cos)) &
                         (s.heading_cos > T(k.heading_cos));
-  e.captured_s = where(captures & (e.captured_s == T(0)), time_s, e.captured_s);
+  const auto first = (e.captured_s == T(0)) & (time_s < T(k.by_s));
+  e.captured_s = where(captures & first, time_s, e.captured_s);
   const auto keeps = shorter(s.position_m, k.keep_distance_m) & (s.upright > T(k.keep_tilt_cos)) &
                      (s.heading_cos > T(k.keep_heading_cos));
   const auto asked = (time_s > T(k.keep_from_s)) & (time_s < T(k.keep_until_s));

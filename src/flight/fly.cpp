@@ -9,12 +9,15 @@
 #include <set>
 
 #include "flight/recorder.hpp"
+#include "flight/settle.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::flight {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kSettle_s = 3;  // of hover before a flight that starts settled
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -60,6 +63,7 @@ class Part {
       const auto flapper = config.fleet.first_flapper + static_cast<std::uint32_t>(first + i);
       const model::Vehicle vehicle = config.vehicle_of(flapper);
       if (config.randomisation) fleet_.set_vehicle(i, vehicle);
+      if (config.fleet.task.start.settled) continue;
       if (config.welded) {
         const sim::RandomKey key{config.fleet.seed, flapper, 0, sim::Stream::start};
         fleet_.start(i, 0, config.fleet.task.sample_start(key), sim::Start::welded);
@@ -68,6 +72,7 @@ class Part {
       }
       if (logged) recorders_.emplace_back(config, fleet_, i, vehicle);
     }
+    if (config.fleet.task.start.settled) start_settled(logged);
     fleet_.set_actor(config.actor);
     fleet_.record(logged);
   }
@@ -97,6 +102,9 @@ class Part {
       result.hash = sim::mixed(result.hash, fleet_.hash(i, i + 1));
       for (std::size_t k = 0; k < result.ended.size(); ++k) result.ended[k] += ended_[i] >> k & 1;
       result.handed_back += fleet_.handed_back(i);
+      const double captured_s = fleet_.captured_s(i);
+      if (captured_s > 0) result.capture_s.push_back(captured_s);
+      result.successes += captured_s > 0 && fleet_.lost_s(i) == 0 && !scores_[i].crashed;
     }
     result.flown_s = tick_ * fleet_.period_s();
     result.steps += static_cast<double>(fleet_.batch().storage().steps) * static_cast<double>(scores_.size());
@@ -125,6 +133,17 @@ class Part {
   const std::vector<FlightScore>& scores() const { return scores_; }
 
  private:
+  void start_settled(bool logged) {
+    const auto vehicle = [&](std::uint32_t flapper) { return config_.vehicle_of(flapper); };
+    const auto pool = settle<T>(fleet_.options(), fleet_.size(), kSettle_s, vehicle);
+    for (std::size_t i = 0; i < fleet_.size(); ++i) {
+      fleet_.start(i, 0, pool[i]);
+      if (logged)
+        recorders_.emplace_back(config_, fleet_, i,
+                                vehicle(fleet_.options().first_flapper + static_cast<std::uint32_t>(i)));
+    }
+  }
+
   static Fleet<T> make_fleet(const FlyConfig& config, std::size_t first, std::size_t count) {
     FleetOptions o = config.fleet;
     o.first_flapper += static_cast<std::uint32_t>(first);

@@ -26,6 +26,8 @@ struct FlyResult {
   double flown_s = 0;                  ///< by each flight; where stopped, by the last ones
   std::array<std::size_t, 6> ended{};  ///< flights whose task ended by each bit of Ended; they fly on
   std::size_t handed_back = 0;
+  std::vector<double> capture_s;  ///< when each flight that captured its goal did so
+  std::size_t successes = 0;      ///< captured it, kept it as the task asks, and did not crash
   std::size_t logs = 0;
   std::uint64_t hash = 0;  ///< of all that moves, of each flight in order
   double wall_s = 0, scoring_s = 0, steps = 0;

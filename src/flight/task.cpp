@@ -204,7 +204,8 @@ void read_success(const io::Table& table, Success<double>& s) {
   const auto t = table.optional_table("success");
   if (!t) return;  // never captured, nothing to keep
   const auto angle = [&](const char* name) { return cosine_limit(t->number(name, io::positive(4))); };
-  s = {t->number("capture.distance_m", io::positive()),
+  s = {t->number("capture.by_s", io::positive()),
+       t->number("capture.distance_m", io::positive()),
        t->number("capture.speed_m_s", io::positive()),
        t->number("capture.body_rate_rad_s", io::positive()),
        angle("capture.tilt_rad"),

@@ -75,7 +75,7 @@ struct HandBack {
 /// What makes a flight a success, on the true state at each control tick: it captures the goal, all at once, and later keeps it.
 template <class T>
 struct Success {
-  T distance_m, speed_m_s, body_rate_rad_s, tilt_cos, heading_cos;                // capture
+  T by_s, distance_m, speed_m_s, body_rate_rad_s, tilt_cos, heading_cos;          // capture
   T keep_from_s, keep_until_s, keep_distance_m, keep_tilt_cos, keep_heading_cos;  // and after
 };
 

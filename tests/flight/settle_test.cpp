@@ -105,7 +105,8 @@ TEST(Trim, IsAllThatActsUntilHandedBack) {
 
 TEST(Success, NotesCaptureAndLossOnTheTrueState) {
   const std::string success =
-      "[success.capture]\ndistance_m = 0.06\nspeed_m_s = 1.0\nbody_rate_rad_s = 15.0\ntilt_rad = 0.7\nheading_rad = "
+      "[success.capture]\nby_s = 0.35\ndistance_m = 0.06\nspeed_m_s = 1.0\nbody_rate_rad_s = 15.0\ntilt_rad = "
+      "0.7\nheading_rad = "
       "0.8\n"
       "[success.keep]\nfrom_s = 0.1\nuntil_s = 0.3\ndistance_m = 0.1\ntilt_rad = 0.8\nheading_rad = 0.8\n";
   FleetOptions o = fleet_options(sensors("paper"), controller("none"), task(staying() + success));

@@ -1,12 +1,14 @@
 // flappy-fly: flies a configuration, once or many times over, and says how far off it was; writes flight logs.
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 
 #include "flight/fly.hpp"
 #include "io/program.hpp"
@@ -95,6 +97,22 @@ void print_score(const FlyConfig& config, const FlightSummary& s) {
   }
 }
 
+/// Empty for an empty list.
+std::optional<double> quantile(std::vector<double> list, double q) {
+  if (list.empty()) return std::nullopt;
+  std::ranges::sort(list);
+  return list[static_cast<std::size_t>(q * static_cast<double>(list.size() - 1))];
+}
+
+void print_success(const FlyResult& r) {
+  const auto n = static_cast<double>(r.summary.flights);
+  std::printf("  captured the goal: %.2f %%; and kept it: %.2f %%\n", 100 * static_cast<double>(r.capture_s.size()) / n,
+              100 * static_cast<double>(r.successes) / n);
+  if (!r.capture_s.empty())
+    std::printf("  time to capture, 10 / 50 / 90 %%: %.3f %.3f %.3f s\n", *quantile(r.capture_s, 0.1),
+                *quantile(r.capture_s, 0.5), *quantile(r.capture_s, 0.9));
+}
+
 void print(const FlyConfig& config, const FlyOptions& options, const FlyResult& r) {
   const FlightSummary& s = r.summary;
   if (r.stopped) std::printf("stopped: %zu of %zu flights, the last at %g s\n", s.flights, options.count, r.flown_s);
@@ -105,6 +123,7 @@ void print(const FlyConfig& config, const FlyOptions& options, const FlyResult& 
   else print_score(config, s);
   for (std::size_t k = 1; k < 6 && !config.welded; ++k)
     if (r.ended[k] > 0) std::printf("  the task ended by %s: %zu\n", kEnds[k], r.ended[k]);
+  if (config.fleet.task.constants.success.by_s > 0) print_success(r);
   if (r.handed_back > 0) std::printf("  handed back to the controller: %zu\n", r.handed_back);
   if (!options.log_folder.empty()) {
     std::printf("  %zu logs in %s\n", r.logs, options.log_folder.c_str());
@@ -142,6 +161,13 @@ Json json_of(const FlyConfig& config, const FlyOptions& options, const FlyResult
   }
   for (std::size_t k = 0; k < 6; ++k) json["ended"][kEnds[k]] = r.ended[k];
   json["handed_back"] = r.handed_back;
+  if (config.fleet.task.constants.success.by_s > 0) {
+    const auto or_null = [](std::optional<double> x) { return x ? Json(*x) : Json(nullptr); };
+    json["success_rate"] = static_cast<double>(r.successes) / static_cast<double>(s.flights);
+    json["time_to_capture_p10_s"] = or_null(quantile(r.capture_s, 0.1));
+    json["time_to_capture_median_s"] = or_null(quantile(r.capture_s, 0.5));
+    json["time_to_capture_p90_s"] = or_null(quantile(r.capture_s, 0.9));
+  }
   json["hash"] = hexadecimal(r.hash);
   json["logs"] = options.log_folder.empty() ? Json(nullptr) : Json(r.logs);
   json["wall"] = {{"total_s", r.wall_s},
