@@ -66,13 +66,20 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   store_rows(drive, s.body.drive, first);
 }
 
+/// Where everything is at the end of a slice: what sensors see, and what is scored.
+template <class T>
+FLAPPY_INLINE void look(const FlightSpace<T>& s, int first) {
+  const auto truth =
+      truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first), load_rows<State<L<T>>>(s.body.state, first));
+  store_rows(truth, s.flight.truth, first);
+}
+
 /// Sensors sample the true state at the end of a slice.
 template <class T>
 FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Slice& slice, int imu_samples,
                          int mocap_samples, int first) {
   FlightBlock<T>& f = s.flight;
-  const auto truth =
-      truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first), load_rows<State<L<T>>>(s.body.state, first));
+  const auto truth = load_rows<Truth<L<T>>>(f.truth, first);
   const auto draw = [&](sim::Stream stream, std::uint32_t index) {
     return sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(stream), index, f.flapper + first,
                               f.flight + first);
@@ -147,14 +154,12 @@ FLAPPY_INLINE void fuse(const FlightSpace<T>& s, const FlightPlan<T>& plan, int 
 template <class T>
 FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;
-  const auto truth =
-      truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first), load_rows<State<L<T>>>(s.body.state, first));
-  store_rows(truth, f.truth, first);
+  const auto truth = load_rows<Truth<L<T>>>(f.truth, first);
   auto episode = load_rows<Episode<L<T>>>(f.episode, first);
   T time[kWidth<T>], fraction[kWidth<T>];
   for (int i = 0; i < kWidth<T>; ++i) {
     time[i] = static_cast<T>(++f.tick[first + i]) * plan.task.tick_s;
-    fraction[i] = static_cast<T>(static_cast<std::int32_t>(s.body.phase[first + i])) * static_cast<T>(0x1p-32);
+    fraction[i] = beat_fraction<T>(s.body.phase[first + i]);
   }
   const auto ref = setpoint(f, plan, first);
   const auto score = score_of(truth, ref);
@@ -162,12 +167,8 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   const L<T> now = L<T>::load(time);
   const auto estimate = load_rows<Estimate<L<T>>>(f.estimate, first);
   const bool by_estimate = plan.task.hand_back.on_estimate > 0;
-  const auto judged = by_estimate ? score_of(Truth<L<T>>{estimate.position_m, estimate.attitude, estimate.velocity_m_s,
-                                                         estimate.body_rate_rad_s},
-                                             ref)
-                                  : score;
-  const auto done =
-      arrived(plan.task.hand_back, judged, by_estimate ? estimate.body_rate_rad_s : truth.body_rate_rad_s, now);
+  const auto done = by_estimate ? arrived(plan.task.hand_back, score_of(estimate, ref), estimate.body_rate_rad_s, now)
+                                : arrived(plan.task.hand_back, score, truth.body_rate_rad_s, now);
   episode.handed_back = where(done, L<T>(1), episode.handed_back);
   note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode);
   for (int i = 0; i < kActions; ++i) episode.previous[i] = episode.action[i];
@@ -216,8 +217,9 @@ void fly_block(const FlightSpace<T>& s, const FlightPlan<T>& plan) {
     plan.step(s.body, s.effects, *plan.physics, step, slice.steps, i == 0 ? s.next : nullptr);
     watch.lap(kPhysics);
     step += slice.steps;
-    if (slice.imu || slice.mocap)
-      for_lanes<T>([&](int first) { sense(s, plan, slice, imu_samples, mocap_samples, first); });
+    const bool sampled = slice.imu || slice.mocap, last = i + 1 == plan.slice_count;
+    if (sampled || last) for_lanes<T>([&](int first) { look(s, first); });
+    if (sampled) for_lanes<T>([&](int first) { sense(s, plan, slice, imu_samples, mocap_samples, first); });
     imu_samples += slice.imu;
     mocap_samples += slice.mocap;
     watch.lap(kSense);

@@ -300,21 +300,11 @@ template <class T>
 auto Fleet<T>::imu_samples(std::size_t i) const -> std::vector<ImuRecord> {
   const Storage& s = *storage_;
   std::vector<ImuRecord> list;
-  if (s.imu_tap.empty()) return list;
-  storage_->at(i);
-  double time = static_cast<double>(s.period->first_step) * s.options.batch.step_s;
-  int sample = 0;
-  for (const Slice& slice : s.period->slices) {
-    time += slice.steps * s.options.batch.step_s;
-    if (!slice.imu) continue;
-    const T* rows =
-        &s.imu_tap[i / kLanes<T> * s.imu_tap_size + static_cast<std::size_t>(sample++ * kImuSampleRows * kLanes<T>)];
-    const auto x =
-        get<ImuSample<double>>(reinterpret_cast<const T(*)[kLanes<T>]>(rows), static_cast<int>(i % kLanes<T>));
-    list.push_back({time + s.options.sensors.imu.latency_s,
+  s.template for_samples<ImuSample>(i, s.imu_tap, s.imu_tap_size, &Slice::imu, [&](double time_s, const auto& x) {
+    list.push_back({time_s + s.options.sensors.imu.latency_s,
                     {x.gyro_rad_s.x, x.gyro_rad_s.y, x.gyro_rad_s.z},
                     {x.accel_m_s2.x, x.accel_m_s2.y, x.accel_m_s2.z}});
-  }
+  });
   return list;
 }
 
@@ -322,22 +312,13 @@ template <class T>
 auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
   const Storage& s = *storage_;
   std::vector<MocapRecord> list;
-  if (s.mocap_tap.empty()) return list;
-  storage_->at(i);
-  double time = static_cast<double>(s.period->first_step) * s.options.batch.step_s;
-  int sample = 0;
-  for (const Slice& slice : s.period->slices) {
-    time += slice.steps * s.options.batch.step_s;
-    if (!slice.mocap) continue;
-    const T* rows =
-        &s.mocap_tap[i / kLanes<T> * s.mocap_tap_size + static_cast<std::size_t>(sample++ * kMocapRows * kLanes<T>)];
-    const auto x =
-        get<MocapSample<double>>(reinterpret_cast<const T(*)[kLanes<T>]>(rows), static_cast<int>(i % kLanes<T>));
-    if (x.valid <= 0) continue;
-    list.push_back({time + s.options.sensors.mocap.latency_s,
-                    {x.position_m.x, x.position_m.y, x.position_m.z},
-                    {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z}});
-  }
+  s.template for_samples<MocapSample>(i, s.mocap_tap, s.mocap_tap_size, &Slice::mocap,
+                                      [&](double time_s, const auto& x) {
+                                        if (x.valid <= 0) return;
+                                        list.push_back({time_s + s.options.sensors.mocap.latency_s,
+                                                        {x.position_m.x, x.position_m.y, x.position_m.z},
+                                                        {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z}});
+                                      });
   return list;
 }
 

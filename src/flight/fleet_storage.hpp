@@ -150,6 +150,22 @@ struct Fleet<T>::Storage {
     return out;
   }
 
+  /// Calls `add(time taken, sample)` for what the tap holds of flapper `i`; `taken`: by which slices.
+  template <template <class> class Sample>
+  void for_samples(std::size_t i, const std::vector<T>& tap, std::size_t tap_size, bool Slice::*taken,
+                   const auto& add) const {
+    if (tap.empty()) return;
+    if (i >= batch.size()) throw std::out_of_range("no flapper " + std::to_string(i) + " in the fleet");
+    const auto* rows = reinterpret_cast<const T(*)[kLanes<T>]>(&tap[i / kLanes<T> * tap_size]);
+    double time_s = static_cast<double>(period->first_step) * options.batch.step_s;
+    for (const Slice& slice : period->slices) {
+      time_s += slice.steps * options.batch.step_s;
+      if (!(slice.*taken)) continue;
+      add(time_s, get<Sample<double>>(rows, static_cast<int>(i % kLanes<T>)));
+      rows += model::kRows<Sample>;
+    }
+  }
+
   void start(std::size_t i, std::uint32_t episode, const sim::FlapperState& state, sim::Start kind);
   void start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot);
   Snapshot<T> snapshot(std::size_t i, const Target& target);
@@ -185,8 +201,7 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
 template <class T>
 void Fleet<T>::Storage::show(std::size_t i) {
   const auto [f, lane] = at(i);
-  const double phase =
-      static_cast<double>(static_cast<std::int32_t>(batch.storage().at(i).block.phase[lane])) * 0x1p-32;
+  const double phase = model::beat_fraction<double>(batch.storage().at(i).block.phase[lane]);
   double row[kMaxObservation] = {};
   observe(options.task.parts, get<Estimate<double>>(f.estimate, lane), setpoint(f, lane), Episode<double>{}, phase,
           row);

@@ -58,13 +58,9 @@ struct Fusion {
   T angle_innovation, position_innovation;  // of the last pose: r.r/S, three degrees of freedom each
 };
 
-/// What the controllers and the observation know of a flapper.
+/// What the controllers and the observation know of a flapper: the same numbers as the truth, not the same values.
 template <class T>
-struct Estimate {
-  Vec3<T> position_m;
-  Quaternion<T> attitude;
-  Vec3<T> velocity_m_s, body_rate_rad_s;
-};
+using Estimate = Truth<T>;
 
 template <class T>
 FLAPPY_INLINE void gather(Increment<T>& sum, const ImuSample<T>& sample, const T& interval_s) {

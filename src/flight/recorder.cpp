@@ -86,7 +86,7 @@ std::vector<DriverUpdate> driver_updates(Fleet<T>& fleet, std::size_t i) {
   std::uint32_t phase = block.phase[lane];
   for (std::size_t k = list.size(); k-- > 0;) {
     list[k].phase = phase -= block.phase_per_update[lane];
-    const L fraction(static_cast<double>(static_cast<T>(static_cast<std::int32_t>(phase)) * static_cast<T>(0x1p-32)));
+    const L fraction(static_cast<double>(model::beat_fraction<T>(phase)));
     list[k].left_V = model::wing_beat_voltage<+1>(beat, fraction, L(parameters.left.voltage_limit_V)).raw[0];
     list[k].right_V = model::wing_beat_voltage<-1>(beat, fraction, L(parameters.right.voltage_limit_V)).raw[0];
   }

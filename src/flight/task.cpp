@@ -299,8 +299,9 @@ Task read_task(const io::Table& table, double tick_s) {
               limit("arrived_by_s", kFar),
               limit("arrived_x_m", -kFar)};
 
-  k.holds_trim = table.string_or("base", "controller") == "trim" ? 1 : 0;
-  if (k.holds_trim == 0 && table.string_or("base", "controller") != "controller")
+  const std::string base = table.string_or("base", "controller");
+  k.holds_trim = base == "trim" ? 1 : 0;
+  if (base != "trim" && base != "controller")
     table.fail("base", "is not known", "\"controller\", or \"trim\": what it has learnt, until it is handed back to");
   read_hand_back(table, k.hand_back);
   read_success(table, k.success);

@@ -7,12 +7,12 @@
 #include <pagmo/algorithms/cmaes.hpp>
 #include <pagmo/population.hpp>
 #include <pagmo/problem.hpp>
-#include <stdexcept>
+
+#include "flight/flight_score.hpp"
 
 namespace flappy::flight {
 namespace {
 
-constexpr double kStray_m = 0.3;
 constexpr int kLook = 5;             // control periods between looks
 constexpr double kReach = 3;         // gains stay within e^+-3 of where they start
 constexpr double kFirstStep = 0.05;  // of the whole range 2 kReach: 0.3
@@ -27,30 +27,24 @@ double square(double x) { return x * x; }
 
 void look(Score& s, const Motion& m, const Target& t, double done, bool settled) {
   if (s.strayed_at >= 0) return;
-  double e[3], distance2 = 0;
-  for (int i = 0; i < 3; ++i) distance2 += square(e[i] = m.position_m[i] - t.position_m[i]);
-  const double distance = std::sqrt(distance2);
-  if (!(distance <= kStray_m)) {
+  const auto [roll, pitch, yaw, x, y, z] = errors_of(m, t);
+  const double distance = std::hypot(x, y, z);
+  if (!(distance <= kFarAway_m)) {
     s.strayed_at = done;
     return;
   }
   s.farthest_m = std::max(s.farthest_m, distance);
   if (!settled) return;
-  const double w = m.attitude[0], x = m.attitude[1], y = m.attitude[2], z = m.attitude[3];
-  const double c = 1 - 2 * (y * y + z * z), d = 2 * (w * z + x * y);
-  const double yaw = std::atan2(t.heading_cos * d - t.heading_sin * c, t.heading_cos * c + t.heading_sin * d);
-  const double roll = std::atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y));
-  const double pitch = std::asin(std::clamp(2 * (w * y - z * x), -1.0, 1.0));
   constexpr double kDegree = std::numbers::pi / 180;
   s.yaw += square(yaw / (10 * kDegree));
-  s.sum += square(roll / (5 * kDegree)) + square(pitch / (5 * kDegree)) + distance2 / square(0.05);
+  s.sum += square(roll / (5 * kDegree)) + square(pitch / (5 * kDegree)) + square(distance / 0.05);
   ++s.settled;
 }
 
 double cost_of(const Score& s) {
   if (s.strayed_at >= 0) return 4 - s.strayed_at;
   const double n = std::max(1, s.settled);
-  return square(s.farthest_m / kStray_m) + s.sum / n + std::min(1.0, s.yaw / n);
+  return square(s.farthest_m / kFarAway_m) + s.sum / n + std::min(1.0, s.yaw / n);
 }
 
 struct Problem {

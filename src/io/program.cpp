@@ -37,9 +37,9 @@ Program::Program(const std::string& name, const std::string& description, const 
 }
 
 int Program::run(int argc, char** argv, const std::function<void()>& job) {
-  spin_briefly(argv);
   try {
     app_.parse(argc, argv);
+    spin_briefly(argv);
     if (!json_path_.empty()) AtomicFile refused_before_the_work(json_path_);
     job();
     return 0;

@@ -1,9 +1,7 @@
 #include "flappy/vehicle_file.hpp"
 
-#include <charconv>
-#include <cstdio>
-
 #include "io/config.hpp"
+#include "io/toml_writer.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::model {
@@ -30,27 +28,6 @@ void read_effects(const io::Table& table, Vehicle& vehicle) {
   }
 }
 
-std::string number_text(double value) {
-  char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
-  std::string s(text, end);
-  if (s.find_first_of(".en") == std::string::npos) s += ".0";
-  return s;
-}
-
-/// `value` as a TOML string.
-std::string string_text(const std::string& value) {
-  std::string s = "\"";
-  for (const char c : value) {
-    char escaped[8];
-    std::snprintf(escaped, sizeof escaped, "\\u%04X", static_cast<unsigned char>(c));
-    const bool control = (c >= 0 && c < ' ') || c == '\x7f';
-    if (c == '"' || c == '\\') s += '\\';
-    s += control ? escaped : std::string(1, c);
-  }
-  return s + "\"";
-}
-
 }  // namespace
 
 Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
@@ -67,9 +44,9 @@ Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::s
 }
 
 std::string vehicle_text(const Vehicle& vehicle) {
-  std::string text = "schema = 1\nname = " + string_text(vehicle.name) + "\n";
+  std::string text = "schema = 1\nname = " + io::toml_string(vehicle.name) + "\n";
   Vehicle copy = vehicle;
-  for (const Parameter& p : parameters(copy)) text += p.path + " = " + number_text(*p.value) + "\n";
+  for (const Parameter& p : parameters(copy)) text += p.path + " = " + io::toml_number(*p.value) + "\n";
   for (const auto& [id, values] : vehicle.effects)
     if (values.empty()) text += "effects." + id + " = {}\n";  // in force at its typical size
   return text;

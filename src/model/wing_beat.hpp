@@ -16,6 +16,12 @@ struct WingBeat {
   T amplitude_V, difference_V, bias_V, split_cycle;
 };
 
+/// Fraction of the beat in [-1/2, 1/2) of a phase counter that is 2^32 times it.
+template <class T>
+FLAPPY_INLINE T beat_fraction(std::uint32_t phase) {
+  return static_cast<T>(static_cast<std::int32_t>(phase)) * static_cast<T>(0x1p-32);
+}
+
 /// Voltage of one motor. `fraction` of the beat in [-1/2, 1/2), where -x stands for 1 - x; inputs already
 /// clipped.
 template <int side, class T>

@@ -26,7 +26,7 @@ FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>
   T fraction[kWidth<T>];
   for (int i = 0; i < kWidth<T>; ++i) {
     std::uint32_t& phase = block.phase[first + i];
-    fraction[i] = static_cast<T>(static_cast<std::int32_t>(phase)) * static_cast<T>(0x1p-32);
+    fraction[i] = beat_fraction<T>(phase);
     phase += block.phase_per_update[first + i];
   }
   const auto d = load_rows<Drive<L>>(block.drive, first);

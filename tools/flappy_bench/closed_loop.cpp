@@ -1,7 +1,5 @@
 #include "closed_loop.hpp"
 
-#include <ctime>
-
 #include "flight/fleet.hpp"
 #include "flight/flight_block.hpp"
 
@@ -10,12 +8,6 @@ namespace {
 
 constexpr std::size_t kFlappers = 4096;
 constexpr double kControl_hz = 500;
-
-double processor_seconds() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 io::Table table(const std::string& path) { return io::Config::load(path).root(); }
 

@@ -1,8 +1,8 @@
 // Built with contraction on: every line of the loop is one fused multiply-add.
 #include <algorithm>
-#include <ctime>
 
 #include "roof.hpp"
+#include "speed.hpp"
 
 namespace flappy::bench {
 namespace {
@@ -22,12 +22,6 @@ __attribute__((target_clones("avx512f", "fma", "default"))) float multiply_add(f
   }
   const Wide sum = c0 + c1 + c2 + c3 + c4 + c5 + c6 + c7 + c8 + c9 + c10 + c11;
   return sum[0] + sum[15];
-}
-
-double processor_seconds() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 }  // namespace

@@ -24,11 +24,6 @@ constexpr std::size_t kDistinctVehicles = 1024;
 constexpr double kFlight_s = 0.2;
 constexpr int kFlightPeriods = static_cast<int>(kFlight_s / (kPeriod * kStep_s));
 
-double processor_seconds() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -87,6 +82,12 @@ double peer_steps_per_s(Peer& peer, double flapping_Hz, double seconds) {
 #endif
 
 }  // namespace
+
+double processor_seconds() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
 
 Figure summary(std::vector<double> values) {
   std::ranges::sort(values);

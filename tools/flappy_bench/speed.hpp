@@ -14,6 +14,9 @@ struct Figure {
   double median = 0, low = 0, high = 0;
 };
 
+/// Processor time of this thread.
+double processor_seconds();
+
 /// Median and range of one figure over rounds.
 Figure summary(std::vector<double> values);
 
