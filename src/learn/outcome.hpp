@@ -60,9 +60,9 @@ class Follower {
 
   /// A tick as the fleet shows it; `so_far`: captured_s, lost_s, status and ended by then.
   void see(const flight::Motion& truth, const flight::Target& goal, double t_s, const Outcome& so_far);
-  /// Whether the electrical power is still asked for, and the power over one tick more.
-  bool manoeuvring(double t_s, bool handed_back);
-  void spend(double energy_J, double t_s) { energy_J_ += energy_J, manoeuvre_s_ = t_s; }
+  /// Whether its energy counts at this tick: call it before spend(), which adds the tick's.
+  bool manoeuvring(double t_s) const;
+  void spend(double power_W, double period_s, bool handed_back);
   void finish(Outcome& outcome) const;
 
  private:
@@ -72,7 +72,7 @@ class Follower {
   Failure failure_ = Failure::none;
   Demand missing_ = Demand::distance;
   bool handed_back_ = false;
-  double strict_s_ = 0, overshoot_m_ = 0, position_error_m_ = 0, heading_error_rad_ = 0;
+  double strict_s_ = 0, overshoot_m_ = 0, position_error_m_ = 0, facing_ = 1, aside_ = 0;
   double energy_J_ = 0, manoeuvre_s_ = 0;
 };
 
@@ -82,7 +82,7 @@ struct Rate {
 };
 Rate rate_of(std::size_t successes, std::size_t flights);
 
-/// Over some of the flights; nothing where there is none. Infinite where a flight that counts never got there.
+/// 10 %, median and 90 %; nothing where there is no flight, infinite where it is one that never got there.
 struct Spread {
   std::optional<double> p10, median, p90;
 };
