@@ -10,16 +10,14 @@ namespace flappy::io {
 /// Every write() is whole or not there. InputError, naming the file, when it cannot be written.
 class AppendFile {
  public:
-  enum class Start { anew, at_end };
-  AppendFile(std::filesystem::path path, Start start);
+  /// Goes on after the first `keep` bytes; what was behind them is cut off.
+  explicit AppendFile(std::filesystem::path path, std::uint64_t keep = 0);
   ~AppendFile();
   AppendFile(const AppendFile&) = delete;
   AppendFile& operator=(const AppendFile&) = delete;
 
   /// Handed to the system when it returns.
   void write(std::string_view text);
-  /// Cuts the file off after `size` bytes.
-  void cut(std::uint64_t size);
   /// Onto the disk.
   void sync();
 
@@ -28,7 +26,7 @@ class AppendFile {
 
   std::filesystem::path path_;
   int descriptor_;
-  std::uint64_t size_ = 0;
+  std::uint64_t size_;
 };
 
 /// Takes a folder for this process alone, until the object or the process ends, and removes what a killed process left

@@ -43,6 +43,12 @@ template <class V>
 concept PlainRange = std::ranges::contiguous_range<V> && std::ranges::sized_range<V> &&
     Plain<std::ranges::range_value_t<V>> && !std::is_array_v<std::remove_cvref_t<V>>;
 
+/// Where a section stands in its file.
+struct CheckpointSection {
+  std::string name, sha256;
+  std::uint64_t offset = 0, size = 0;
+};
+
 /// Writes one checkpoint. It appears under its name on commit(); without it nothing is left, and whatever had the name
 /// stays as it was. InputError when the disk does not take it.
 class CheckpointWriter {
@@ -65,13 +71,7 @@ class CheckpointWriter {
  private:
   io::AtomicFile file_;
   CheckpointHeader header_;
-  std::vector<struct CheckpointSection> sections_;
-};
-
-/// Where a section stands in its file.
-struct CheckpointSection {
-  std::string name, sha256;
-  std::uint64_t offset = 0, size = 0;
+  std::vector<CheckpointSection> sections_;
 };
 
 /// A checkpoint that has been read through once and found whole.

@@ -4,6 +4,7 @@
 //   events.out.tfevents.flappy    all of them for TensorBoard
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <span>
@@ -24,7 +25,7 @@ struct MetricsColumns {
 class Metrics {
  public:
   /// Starts the files anew, or goes on after the first `records` records, as sync() counted them for a checkpoint;
-  /// what was written after them is cut off. InputError when a file holds fewer, or other columns.
+  /// what was written after them is cut off. InputError when a file holds fewer, or the columns are others.
   Metrics(const std::filesystem::path& run, MetricsColumns columns, std::uint64_t records = 0);
 
   /// One value for each column; NaN and infinity stand for "not available" (null, an empty cell, no event).
@@ -35,6 +36,9 @@ class Metrics {
   std::uint64_t sync();
 
  private:
+  Metrics(const std::filesystem::path& run, MetricsColumns columns, std::uint64_t records,
+          const std::array<std::uint64_t, 4>& kept_bytes);
+
   MetricsColumns columns_;
   std::uint64_t records_;
   io::AppendFile jsonl_, csv_, timing_, events_;
@@ -42,11 +46,12 @@ class Metrics {
 
 /// The records of a run, one vector for each column; NaN where not available.
 struct MetricsTable {
+  std::string file;  ///< for messages
   std::vector<std::string> names;
   std::vector<std::vector<double>> columns;
 
+  /// InputError when there is no such column.
   const std::vector<double>& column(const std::string& name) const;
-  std::string file;  ///< for messages
 };
 
 /// Reads metrics.jsonl or timing.jsonl. InputError with file and line.
