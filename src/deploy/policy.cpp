@@ -1,19 +1,16 @@
 #include "deploy/policy.hpp"
 
 #include <dlfcn.h>
-#include <fcntl.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdlib>
 #include <string>
 #include <system_error>
-#include <vector>
 
 #include "deploy/torch_script.hpp"
 #include "io/files.hpp"
+#include "io/run_program.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -54,25 +51,17 @@ class TemporaryFolder {
   throw io::InputError(header.string() + ": " + what + "; accepted: " + accepted);
 }
 
-/// Runs a program found in PATH; its complaints go to `errors`. Its exit code.
-int run(const std::vector<std::string>& words, const fs::path& errors) {
-  std::vector<char*> arguments;
-  arguments.reserve(words.size() + 1);
-  for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  pid_t child = 0;
-  const int fault = posix_spawnp(&child, words[0].c_str(), &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (fault != 0)
-    throw io::InputError(words[0] + ": cannot be run: " + std::generic_category().message(fault) +
-                         "; accepted: a C compiler of this name in PATH");
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+/// Compiles; the compiler's complaints, or nothing.
+std::string compile(const fs::path& header, const fs::path& source, const fs::path& library) {
+  try {
+    // what C lets pass with a warning would call another function than the one that is meant
+    const io::Finished finished = io::run({"cc", "-O2", "-shared", "-fPIC", "-Werror=implicit-function-declaration",
+                                           "-Werror=incompatible-pointer-types", "-include", header.string(),
+                                           source.string(), "-o", library.string(), "-lm"});
+    return finished.exit_code == 0 ? "" : finished.err + "\n";
+  } catch (const std::system_error& e) {
+    refuse(header, "cannot be compiled: cc: " + e.code().message(), "a C compiler of this name in PATH");
   }
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
 }
 
 /// What a compiler complains about first.
@@ -110,13 +99,11 @@ std::unique_ptr<const Policy> load_header(const fs::path& path, int observations
   io::read_text(path);  // or a complaint that names it
   const fs::path header = fs::absolute(path);
   const TemporaryFolder folder;
-  const fs::path source = folder / "wrapper.c", library = folder / "policy.so", errors = folder / "errors.txt";
+  const fs::path source = folder / "wrapper.c", library = folder / "policy.so";
   io::write_atomically(source, kWrapper);
-  if (run({"cc", "-O2", "-shared", "-fPIC", "-Werror=implicit-function-declaration",
-           "-Werror=incompatible-pointer-types", "-include", header.string(), source.string(), "-o", library.string(),
-           "-lm"},
-          errors) != 0)
-    throw io::InputError(first_error(header, io::read_text(errors)) + "; accepted: a C header that cc compiles");
+  const std::string complaints = compile(header, source, library);
+  if (!complaints.empty())
+    throw io::InputError(first_error(header, complaints) + "; accepted: a C header that cc compiles");
 
   void* loaded = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (loaded == nullptr) {
