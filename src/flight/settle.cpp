@@ -5,11 +5,11 @@
 namespace flappy::flight {
 namespace {
 
-/// Standing at the origin, to stay there.
+/// At the origin, to stay there: released in the air, for a flapper on a stand is content with too little thrust.
 Task staying() {
   Task task;
   task.name = "settle";
-  task.start.kind = sim::Start::standing;
+  task.start.kind = sim::Start::flying;
   task.path.push_back({0, {}});
   task.constants.limits = {1e9, -1e9, 1e9, 1e9, 1e9, 1e9, 1e9, 1e9, -1e9};
   return task;
