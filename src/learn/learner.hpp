@@ -19,9 +19,6 @@
 
 namespace flappy::learn {
 
-/// Samples that are worked on together; a batch is a multiple of it.
-inline constexpr std::size_t kChunk = 64;
-
 /// Inputs of a network are clamp((observation - mean) * scale, +-clip).
 struct Normaliser {
   std::vector<double> mean, scale;
@@ -39,7 +36,8 @@ struct LearnerOptions {
   int policy_delay = 2;
   double noise_sd = 0.2, noise_clip = 0.5;  ///< of the target's action; sd 0: none
   double tau = 0.005;
-  double huber = 0;  ///< where squares turn into lines (the loss is then e^2 / 2 below, as torch's huber_loss); 0: squares
+  double huber =
+      0;  ///< where squares turn into lines (the loss is then e^2 / 2 below, as torch's huber_loss); 0: squares
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-8;
   std::size_t batch = 256;  ///< a multiple of kChunk
 

@@ -8,6 +8,9 @@
 
 namespace flappy::learn {
 
+/// Transitions that an update works on together; a batch is a multiple of it.
+inline constexpr std::size_t kChunk = 64;
+
 /// Numbers in the parts of a transition.
 struct TransitionShape {
   int actor_observation = 0;
