@@ -347,18 +347,17 @@ const LearnerCounters& Learner<T>::counters() const {
 }
 
 template <class T>
-std::vector<typename Learner<T>::LayerView> Learner<T>::layers(Network network, bool target) const {
-  const UpdatePlan<T>& plan = storage_->plan;
+std::vector<typename Learner<T>::Layer> Learner<T>::layers(Network network, Kind kind) const {
+  const Storage& s = *storage_;
   const bool of_actor = network == Network::actor;
-  const NetworkShape& net = of_actor ? plan.actor : plan.critic;
-  const T* from = (target ? plan.targets : plan.weights) +
-                  (of_actor ? plan.actor_at() : (network == Network::critic_2 ? net.weight_count() : 0));
-  std::vector<LayerView> list;
-  for (int l = 0; l < net.layers; ++l)
-    list.push_back({{from + net.weights[l], from + net.weights[l + 1]},
-                    net.widths[l],
-                    net.widths[l + 1],
-                    padded(net.widths[l + 1])});
+  const NetworkShape& net = of_actor ? s.plan.actor : s.plan.critic;
+  const T* from = s.numbers.data() + static_cast<std::ptrdiff_t>(kind) * s.count;
+  from += of_actor ? s.plan.actor_at() : static_cast<std::ptrdiff_t>(network) * net.weight_count();
+  std::vector<Layer> list;
+  for (int l = 0; l < net.layers; ++l) {
+    const int outputs = net.widths[l + 1];
+    list.push_back({{from + net.weights[l], from + net.weights[l + 1]}, net.widths[l], outputs, padded(outputs)});
+  }
   return list;
 }
 

@@ -96,13 +96,14 @@ class Learner {
   LearnerCounters& counters();
   const LearnerCounters& counters() const;
 
-  /// Weights of one layer, for tests: [1 + inputs][padded outputs], the first row is the bias.
-  struct LayerView {
-    std::span<const T> weights;
+  /// The numbers of one layer: [1 + inputs][padded], the first row is the bias.
+  struct Layer {
+    std::span<const T> numbers;
     int inputs, outputs, padded;
   };
   enum class Network { critic_1, critic_2, actor };
-  std::vector<LayerView> layers(Network network, bool target = false) const;
+  enum class Kind { weights, targets, first_moments, second_moments };
+  std::vector<Layer> layers(Network network, Kind kind = Kind::weights) const;
 
  private:
   struct Storage;
