@@ -1,5 +1,6 @@
 #include "io/files.hpp"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -166,6 +167,12 @@ void AtomicFile::commit() {
   if (std::fflush(file_) != 0 || fsync(fileno(file_)) != 0) refuse(errno);
   if (std::rename(temporary_.c_str(), path_.c_str()) != 0) refuse(errno);
   std::fclose(std::exchange(file_, nullptr));
+  // The name is on the disk once its folder is; a file system that cannot do that has done what it can.
+  const auto folder = path_.has_parent_path() ? path_.parent_path() : std::filesystem::path(".");
+  if (const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); descriptor >= 0) {
+    fsync(descriptor);
+    close(descriptor);
+  }
 }
 
 void AtomicFile::refuse(int error) const { refuse_file(path_, "cannot be written", error); }

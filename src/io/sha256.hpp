@@ -4,9 +4,27 @@
 #include <string>
 #include <string_view>
 
+struct evp_md_ctx_st;
+
 namespace flappy::io {
 
 /// SHA-256 as 64 lower-case hexadecimal digits.
 std::string sha256(std::string_view bytes);
+
+/// The same of bytes that come in pieces.
+class Sha256 {
+ public:
+  Sha256();
+  ~Sha256();
+  Sha256(const Sha256&) = delete;
+  Sha256& operator=(const Sha256&) = delete;
+
+  void add(std::string_view bytes);
+  /// Call it once, last.
+  std::string digits();
+
+ private:
+  evp_md_ctx_st* context_;
+};
 
 }  // namespace flappy::io

@@ -1,6 +1,4 @@
 // flappy-bench: speed beside DART and MuJoCo, accuracy against step size, and a batch to look at.
-#include <unistd.h>
-
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -11,6 +9,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "hover.hpp"
 #include "io/program.hpp"
+#include "io/progress.hpp"
 #include "roof.hpp"
 #include "speed.hpp"
 #ifdef FLAPPY_HAVE_PEERS
@@ -33,13 +32,11 @@ std::vector<std::string> facts() {
   return list;
 }
 
-void show_progress(int done, int total) {
-  if (!isatty(STDERR_FILENO)) return;
-  std::fprintf(stderr, "\rround %d of %d%s", done, total, done == total ? "\r                    \r" : "");
-}
-
 Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
-  const SpeedReport report = measure_speed(vehicle, options, show_progress);
+  io::ProgressLine progress("measured");
+  const SpeedReport report =
+      measure_speed(vehicle, options, [&](int done, int total) { progress.show(static_cast<double>(done) / total); });
+  progress.clear();
   const double best = *report.median("float");
   std::printf("one core, median of %d [range], whole step, %s\n", options.rounds, sim::best_instruction_set().c_str());
   std::printf("  %-20s %12s %20s %14s\n", "", "M steps/s", "", "float is x");

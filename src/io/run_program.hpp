@@ -1,0 +1,14 @@
+// Another program as a function from text to text.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace flappy::io {
+
+/// Runs a program (found along PATH, no shell) with `input` on its stdin and returns its stdout. `result` is what it
+/// is to make; InputError "result: is not written: ..." when the program is missing or fails.
+std::string run_program(const std::vector<std::string>& command, std::string_view input, const std::string& result);
+
+}  // namespace flappy::io
