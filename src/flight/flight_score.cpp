@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 namespace flappy::flight {
 
@@ -79,6 +78,12 @@ FlightSummary summarise(std::span<const FlightScore> flights) {
     s.failed += t.size();
   }
   return s;
+}
+
+std::optional<double> quantile(std::vector<double> list, double q) {
+  if (list.empty()) return std::nullopt;
+  std::ranges::sort(list);
+  return list[static_cast<std::size_t>(q * static_cast<double>(list.size() - 1))];
 }
 
 }  // namespace flappy::flight

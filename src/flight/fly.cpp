@@ -17,8 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kSettle_s = 3;  // of hover before a flight that starts settled
-
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -135,7 +133,7 @@ class Part {
  private:
   void start_settled(bool logged) {
     const auto vehicle = [&](std::uint32_t flapper) { return config_.vehicle_of(flapper); };
-    const auto pool = settle<T>(fleet_.options(), fleet_.size(), kSettle_s, vehicle);
+    const auto pool = settle<T>(fleet_.options(), fleet_.size(), kHover_s, vehicle);
     for (std::size_t i = 0; i < fleet_.size(); ++i) {
       fleet_.start(i, 0, pool[i]);
       if (logged)

@@ -7,6 +7,8 @@
 
 namespace flappy::flight {
 
+inline constexpr double kHover_s = 3;  // long enough for a controller to learn its trim
+
 /// Snapshots of `count` vehicles after `seconds` of hover, each at a phase of the wing beat of its own. `options`: sensors,
 /// controller and world of the flights to come; its task is not used. Bytes depend on the vehicles, the options and the
 /// number of each flapper alone.

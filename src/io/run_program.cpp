@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <memory>
 #include <system_error>
+#include <utility>
 
 #include "io/files.hpp"
 
@@ -27,34 +28,46 @@ std::string contents(std::FILE* file) {
 
 }  // namespace
 
-std::string run_program(const std::vector<std::string>& command, std::string_view input, const std::string& result) {
-  const auto refuse = [&](const std::string& what) { throw InputError(result + ": is not written: " + what); };
+Finished run(const std::vector<std::string>& command, std::string_view input) {
+  const auto fail = [](int error) { throw std::system_error(error, std::generic_category()); };
   // files without a name rather than pipes: nobody waits for anybody
   std::array<File, 3> streams = {File(std::tmpfile(), std::fclose), File(std::tmpfile(), std::fclose),
                                  File(std::tmpfile(), std::fclose)};
   for (const auto& stream : streams)
-    if (!stream) refuse(std::generic_category().message(errno));
+    if (!stream) fail(errno);
   if (std::fwrite(input.data(), 1, input.size(), streams[0].get()) != input.size() ||
       std::fflush(streams[0].get()) != 0)
-    refuse(std::generic_category().message(errno));
+    fail(errno);
   std::rewind(streams[0].get());
 
   std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
   for (const auto& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  for (int i = 0; i < 3; ++i) posix_spawn_file_actions_adddup2(&actions, fileno(streams[i].get()), i);
+  for (std::size_t i = 0; i < 3; ++i)
+    posix_spawn_file_actions_adddup2(&actions, fileno(streams[i].get()), static_cast<int>(i));
   pid_t child = 0;
   const int error = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
-  if (error == ENOENT) refuse(command[0] + " is not installed");
-  if (error != 0) refuse(command[0] + ": " + std::generic_category().message(error));
+  if (error != 0) fail(error);
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
-    if (errno != EINTR) refuse(command[0] + ": " + std::generic_category().message(errno));
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) refuse(command[0] + " failed: " + contents(streams[2].get()));
-  return contents(streams[1].get());
+    if (errno != EINTR) fail(errno);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contents(streams[1].get()), contents(streams[2].get())};
+}
+
+std::string run_program(const std::vector<std::string>& command, std::string_view input, const std::string& result) {
+  const auto refusal = [&](const std::string& what) { return InputError(result + ": is not written: " + what); };
+  try {
+    Finished finished = run(command, input);
+    if (finished.exit_code != 0) throw refusal(command[0] + " failed: " + finished.err);
+    return std::move(finished.out);
+  } catch (const std::system_error& e) {
+    if (e.code().value() == ENOENT) throw refusal(command[0] + " is not installed");
+    throw refusal(command[0] + ": " + e.code().message());
+  }
 }
 
 }  // namespace flappy::io

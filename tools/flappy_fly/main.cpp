@@ -1,5 +1,4 @@
 // flappy-fly: flies a configuration, once or many times over, and says how far off it was; writes flight logs.
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -64,13 +63,6 @@ void print_score(const FlyConfig& config, const FlightSummary& s) {
     std::printf("  %zu %s: flight %zu first, at %.2f s; half of them by %.2f s, the last at %.2f s\n", f.flights,
                 name.c_str(), config.fleet.first_flapper + f.first_flight, f.first_s, f.median_s, f.last_s);
   }
-}
-
-/// Empty for an empty list.
-std::optional<double> quantile(std::vector<double> list, double q) {
-  if (list.empty()) return std::nullopt;
-  std::ranges::sort(list);
-  return list[static_cast<std::size_t>(q * static_cast<double>(list.size() - 1))];
 }
 
 void print_success(const FlyResult& r) {

@@ -1,0 +1,345 @@
+// flappy-eval: flies a policy on thousands of randomised vehicles and says how well, beside PID and ARC alone.
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+
+#include "io/program.hpp"
+#include "io/progress.hpp"
+#include "io/toml_writer.hpp"
+#include "learn/evaluation.hpp"
+
+namespace flappy::eval {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using flight::Controller;
+using flight::FlyConfig;
+using learn::Rate;
+using learn::Spread;
+using learn::Summary;
+using Number = std::optional<double>;
+
+constexpr std::size_t kNominalFlights = 20;
+constexpr double kHummingbird_s = 0.25;  // the escape of the bird, as the study of the manoeuvre reports it
+constexpr double kOptimum_s = 0.248;     // direct optimisation on the exact physics, without noise
+constexpr const char* kPolicies = "a run folder, an actor (.json), TorchScript (.pt) or a C header (.h)";
+
+struct Request {
+  std::string policy, config, vehicle, task, stream = "test";
+  std::vector<std::string> overrides;
+  std::size_t episodes = 10000;
+  std::uint64_t seed = 1;
+  int threads = 0;
+  bool no_baselines = false;
+};
+
+std::string file_override(const char* key, const fs::path& path) {
+  return std::string(key) + "=" + io::toml_string(fs::absolute(path).string());
+}
+
+/// What is flown: the run's own configuration, or --config with the policy in it.
+FlyConfig read_config(const Request& r) {
+  const fs::path policy = r.policy;
+  fs::path config = r.config.empty() ? fs::path(FLAPPY_CONFIGS "/fly/escape.toml") : fs::path(r.config);
+  std::vector<std::string> overrides;
+  if (fs::is_directory(policy)) {
+    if (!r.config.empty())
+      throw io::InputError("--config: " + r.policy + " has its own; accepted: --config with a single file");
+    config = policy / "config" / "fly.toml";
+    if (!fs::exists(config)) throw io::InputError(r.policy + ": holds no config/fly.toml; accepted: " + kPolicies);
+  } else if (policy.extension() == ".json") {
+    overrides.push_back(file_override("actor", policy));
+  }
+  if (!r.vehicle.empty()) overrides.push_back(file_override("vehicle", r.vehicle));
+  if (!r.task.empty()) overrides.push_back(file_override("task", r.task));
+  overrides.insert(overrides.end(), r.overrides.begin(), r.overrides.end());
+  FlyConfig c = flight::read_fly_config(config, overrides);
+  if (fs::is_directory(policy) && !c.actor)
+    throw io::InputError(config.string() + ": actor: is missing; accepted: the trained actor's file");
+  c.fleet.seed = r.seed;
+  c.fleet.batch.threads = r.threads;
+  return c;
+}
+
+/// Whoever flies, and how that went.
+struct Column {
+  const char* name;
+  std::size_t asked = 0;
+  Summary flights, nominal;
+  bool stopped = false;
+  double wall_s = 0, steps = 0;
+};
+
+class Evaluation {
+ public:
+  Evaluation(const Request& request, const FlyConfig& config)
+      : config_(config),
+        options_{.count = request.episodes,
+                 .first_flapper = request.stream == "test" ? learn::kTestFlappers : learn::kValidationFlappers},
+        evaluator_(config, options_),
+        nominal_(learn::nominal(config), nominal_options()) {}
+
+  Column fly_policy(const learn::Pilot& pilot) { return fly("policy", evaluator_, nominal_, pilot); }
+
+  /// The vehicles of the policy, hovering under this controller and flown by it alone.
+  Column fly_alone(const char* name, const Controller& controller) {
+    if (controller.kind == config_.fleet.controller.kind) return fly(name, evaluator_, nominal_, {});
+    FlyConfig other = config_;
+    other.fleet.controller = controller;
+    learn::Evaluator evaluator(other, options_), nominal(learn::nominal(other), nominal_options());
+    return fly(name, evaluator, nominal, {});
+  }
+
+ private:
+  learn::EvaluationOptions nominal_options() const {
+    learn::EvaluationOptions o = options_;
+    o.count = kNominalFlights;
+    return o;
+  }
+
+  Column fly(const char* name, learn::Evaluator& evaluator, learn::Evaluator& nominal,
+             const learn::Pilot& pilot) const {
+    io::ProgressLine progress(std::string(name) + " flown");
+    Column column{.name = name, .asked = options_.count};
+    const auto keep_going = [&](double done) {
+      progress.show(done);
+      return !io::interrupted();
+    };
+    const learn::Evaluation few = nominal.fly(pilot, learn::Detail::full, keep_going);
+    column.nominal = learn::summarise(few.flights);
+    column.stopped = few.stopped;
+    if (few.stopped) return column;
+    const learn::Evaluation all = evaluator.fly(pilot, learn::Detail::full, keep_going);
+    column.flights = learn::summarise(all.flights);
+    column.stopped = all.stopped;
+    column.wall_s = few.wall_s + all.wall_s;
+    column.steps = few.steps + all.steps;
+    return column;
+  }
+
+  const FlyConfig& config_;
+  learn::EvaluationOptions options_;
+  learn::Evaluator evaluator_, nominal_;
+};
+
+Number finite(Number x) { return x && std::isfinite(*x) ? x : std::nullopt; }
+Number times(Number x, double factor) { return finite(x) ? Number(*x * factor) : std::nullopt; }
+Number if_flown(const Summary& s, double x) { return s.flights > 0 ? Number(x) : std::nullopt; }
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+/// One row of the table.
+void print_row(const std::string& name, const std::vector<Column>& columns, int digits, const auto& number) {
+  std::printf("  %-34s", name.c_str());
+  for (const Column& c : columns) {
+    const Number x = number(c);
+    if (x) std::printf("%12.*f", digits, *x);
+    else std::printf("%12s", "-");
+  }
+  std::printf("\n");
+}
+
+void print_rate(const std::string& name, const std::vector<Column>& columns, Rate Summary::*rate) {
+  print_row(name, columns, 2, [&](const Column& c) { return if_flown(c.flights, 100 * (c.flights.*rate).value); });
+  print_row("  95 % interval, from", columns, 2,
+            [&](const Column& c) { return if_flown(c.flights, 100 * (c.flights.*rate).low); });
+  print_row("  to", columns, 2, [&](const Column& c) { return if_flown(c.flights, 100 * (c.flights.*rate).high); });
+}
+
+void print_spread(const std::string& name, const std::vector<Column>& columns, int digits, Spread Summary::*spread,
+                  double factor = 1) {
+  const auto row = [&](const std::string& label, Number Spread::*part) {
+    print_row(label, columns, digits, [&](const Column& c) { return times(c.flights.*spread.*part, factor); });
+  };
+  row(name + ", median", &Spread::median);
+  row("  10 %", &Spread::p10);
+  row("  90 %", &Spread::p90);
+}
+
+void print_failures(const std::vector<Column>& columns) {
+  const auto count = [&](const std::string& name, const auto& of) {
+    bool any = false;
+    for (const Column& c : columns) any = any || of(c) > 0;
+    if (any)
+      print_row(name, columns, 0, [&](const Column& c) { return if_flown(c.flights, static_cast<double>(of(c))); });
+  };
+  const auto shown = [](std::string name) {
+    for (char& c : name)
+      if (c == '_') c = ' ';
+    return name;
+  };
+  for (std::size_t k = 1; k < learn::kFailures; ++k) {
+    const auto failure = static_cast<learn::Failure>(k);
+    count("failed: " + shown(name_of(failure)), [&](const Column& c) { return c.flights.failures[k]; });
+    for (std::size_t d = 0; d < learn::kDemands && failure == learn::Failure::never_captured; ++d)
+      count("  missing most: " + shown(name_of(static_cast<learn::Demand>(d))),
+            [&](const Column& c) { return c.flights.missing[d]; });
+  }
+}
+
+std::string hexadecimal(std::uint64_t value) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+  return text;
+}
+
+void print(const Request& request, const FlyConfig& config, const std::vector<Column>& columns) {
+  for (const Column& c : columns)
+    if (c.stopped) std::printf("stopped: %s flew %zu of %zu flights\n", c.name, c.flights.flights, c.asked);
+  std::printf("%zu flights of %g s, task %s, seed %llu, %s vehicles, %s\n", columns[0].flights.flights,
+              config.duration_s, config.fleet.task.name.c_str(), static_cast<unsigned long long>(request.seed),
+              request.stream.c_str(), config.precision.c_str());
+  std::printf("  %-34s", "");
+  for (const Column& c : columns) std::printf("%12s", c.name);
+  std::printf("\n");
+  print_rate("success, %", columns, &Summary::success);
+  print_rate("captured the goal, %", columns, &Summary::captured);
+  print_spread("time to capture, s", columns, 3, &Summary::capture_s);
+  print_spread("overshoot, mm", columns, 1, &Summary::overshoot_m, 1000);
+  print_spread("final position error, mm", columns, 1, &Summary::position_error_m, 1000);
+  print_spread("final heading error, deg", columns, 1, &Summary::heading_error_rad, kDegrees);
+  print_spread("energy of the manoeuvre, J", columns, 3, &Summary::energy_J);
+  print_spread("mean power, W", columns, 2, &Summary::power_W);
+  print_failures(columns);
+  std::printf("  nominal vehicle, %zu flights from the middle of the start\n", kNominalFlights);
+  print_row("strict goal reached, %", columns, 0,
+            [](const Column& c) { return if_flown(c.nominal, 100 * c.nominal.strict.value); });
+  print_row("time to it, s, median", columns, 3, [](const Column& c) { return finite(c.nominal.strict_s.median); });
+  if (config.fleet.task.name == "escape")
+    std::printf("  the hummingbird: %.2f s; the study's optimum: %.3f s\n", kHummingbird_s, kOptimum_s);
+  double wall_s = 0, steps = 0;
+  for (const Column& c : columns) wall_s += c.wall_s, steps += c.steps;
+  std::printf("  %.1f s, %.1f million steps/s, hash %s\n", wall_s, wall_s > 0 ? steps / wall_s / 1e6 : 0,
+              hexadecimal(columns[0].flights.hash).c_str());
+}
+
+Json or_null(Number x) { return finite(x) ? Json(*x) : Json(nullptr); }
+
+void put_spread(Json& json, const std::string& name, const std::string& unit, const Spread& s, double factor = 1) {
+  json[name + "_median_" + unit] = or_null(times(s.median, factor));
+  json[name + "_p10_" + unit] = or_null(times(s.p10, factor));
+  json[name + "_p90_" + unit] = or_null(times(s.p90, factor));
+}
+
+/// Figures of one column; no wall-clock time, so that they are the same bytes again.
+Json json_of(const Column& c) {
+  const Summary& s = c.flights;
+  const auto figure = [&](double x) { return or_null(if_flown(s, x)); };
+  Json json = {{"episodes", s.flights},
+               {"stopped", c.stopped},
+               {"success_rate", figure(s.success.value)},
+               {"success_low", figure(s.success.low)},
+               {"success_high", figure(s.success.high)},
+               {"captured_rate", figure(s.captured.value)}};
+  put_spread(json, "time_to_capture", "s", s.capture_s);
+  json["strict_rate"] = figure(s.strict.value);
+  put_spread(json, "time_to_strict", "s", s.strict_s);
+  put_spread(json, "overshoot", "mm", s.overshoot_m, 1000);
+  // medians, under the name that says what they are of
+  json["final_position_error_mm"] = or_null(times(s.position_error_m.median, 1000));
+  json["final_position_error_p90_mm"] = or_null(times(s.position_error_m.p90, 1000));
+  json["final_heading_error_deg"] = or_null(times(s.heading_error_rad.median, kDegrees));
+  json["final_heading_error_p90_deg"] = or_null(times(s.heading_error_rad.p90, kDegrees));
+  put_spread(json, "energy", "J", s.energy_J);
+  put_spread(json, "mean_power", "W", s.power_W);
+  for (std::size_t k = 1; k < learn::kFailures; ++k)
+    json["failures"][name_of(static_cast<learn::Failure>(k))] = s.failures[k];
+  for (std::size_t d = 0; d < learn::kDemands; ++d)
+    json["never_captured_missing"][name_of(static_cast<learn::Demand>(d))] = s.missing[d];
+  json["nominal"] = {{"episodes", c.nominal.flights},
+                     {"success_rate", or_null(if_flown(c.nominal, c.nominal.success.value))},
+                     {"strict_rate", or_null(if_flown(c.nominal, c.nominal.strict.value))}};
+  put_spread(json["nominal"], "time_to_strict", "s", c.nominal.strict_s);
+  json["hash"] = hexadecimal(s.hash);
+  return json;
+}
+
+Json json_of(const Request& request, const FlyConfig& config, const std::vector<Column>& columns) {
+  Json json = {{"policy", request.policy},
+               {"task", config.fleet.task.name},
+               {"seed", request.seed},
+               {"vehicles", request.stream},
+               {"episodes_asked", request.episodes}};
+  json.update(json_of(columns[0]));
+  json["pid_success_rate"] = json["arc_success_rate"] = nullptr;
+  for (std::size_t i = 1; i < columns.size(); ++i) {
+    const std::string name = i == 1 ? "pid" : "arc";
+    json[name] = json_of(columns[i]);
+    json[name + "_success_rate"] = json[name]["success_rate"];
+  }
+  if (config.fleet.task.name == "escape")
+    json["reference"] = {{"hummingbird_s", kHummingbird_s}, {"study_optimum_s", kOptimum_s}};
+  json["commit"] = io::commit();
+  json["config"] = config.resolved;
+  return json;
+}
+
+/// The controller of this name: the one that is flown with where it is of that kind.
+Controller controller_named(const std::string& name, const FlyConfig& config) {
+  const auto kind = name == "pid" ? Controller::Kind::pid : Controller::Kind::arc;
+  if (config.fleet.controller.kind == kind) return config.fleet.controller;
+  return flight::read_controller(io::Config::load(fs::path(FLAPPY_CONFIGS "/controllers") / (name + ".toml")).root());
+}
+
+void evaluate(const Request& request, const io::Program& program) {
+  const fs::path path = request.policy;
+  const std::string kind = path.extension().string();
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) {
+    io::read_text(path);  // or a complaint that names it
+    if (kind != ".json" && kind != ".pt" && kind != ".h")
+      throw io::InputError(request.policy + ": is no policy; accepted: " + kPolicies);
+  }
+  const FlyConfig config = read_config(request);
+  const flight::Task& task = config.fleet.task;
+  std::unique_ptr<const deploy::Policy> policy;
+  if (kind == ".pt" || kind == ".h")
+    policy = deploy::load_policy(path, static_cast<int>(task.observation().size()), flight::kActions);
+  std::vector<std::pair<const char*, Controller>> alone;
+  if (!request.no_baselines)
+    alone = {{"PID alone", controller_named("pid", config)}, {"ARC alone", controller_named("arc", config)}};
+
+  Evaluation evaluation(request, config);
+  io::stop_on_interrupt();
+  std::vector<Column> columns;
+  columns.push_back(evaluation.fly_policy({policy ? nullptr : config.actor, policy.get()}));
+  for (const auto& [name, controller] : alone)
+    if (!columns.back().stopped) columns.push_back(evaluation.fly_alone(name, controller));
+  print(request, config, columns);
+  program.write_json(json_of(request, config, columns));
+}
+
+}  // namespace
+}  // namespace flappy::eval
+
+int main(int argc, char** argv) {
+  using namespace flappy;
+  io::Program program("flappy-eval", "Flies a policy on randomised vehicles, scored beside PID and ARC alone.",
+                      {"instruction set " + sim::best_instruction_set(),
+                       std::string("TorchScript ") + (deploy::reads_torch_script() ? "yes" : "no")});
+  CLI::App& app = program.app();
+  eval::Request r;
+  app.add_option("policy", r.policy, eval::kPolicies)->required();
+  app.add_option("--config", r.config,
+                 "how a single file flies: configs/fly/*.toml (escape); a run folder has its own");
+  app.add_option("--vehicle", r.vehicle, "vehicle file instead");
+  app.add_option("--task", r.task, "task file instead");
+  app.add_option("--set", r.overrides, "override a key: task.hand_back.at_s=0.4")->allow_extra_args(false);
+  app.add_option("--episodes", r.episodes, "flights, each with vehicle, start and noise of its own")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str();
+  app.add_option("--seed", r.seed, "of vehicles, starts and noise")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{INT64_MAX}))
+      ->capture_default_str();
+  app.add_option("--stream", r.stream, "vehicles that training never saw: \"test\", or \"validation\"")
+      ->check(CLI::IsMember({"test", "validation"}))
+      ->capture_default_str();
+  app.add_option("--threads", r.threads, "0: one for each processor")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  app.add_flag("--no-baselines", r.no_baselines, "without PID and ARC");
+  return program.run(argc, argv, [&] { eval::evaluate(r, program); });
+}
