@@ -240,10 +240,16 @@ void read_success(const io::Table& table, Success<double>& s) {
 
 }  // namespace
 
+std::vector<std::pair<std::string, std::vector<Signal>>> Task::observed_parts() const {
+  std::vector<std::pair<std::string, std::vector<Signal>>> list;
+  for (std::size_t i = 0; i < part_infos().size(); ++i)
+    if (parts >> i & 1) list.emplace_back(part_infos()[i].name, part_infos()[i].signals);
+  return list;
+}
+
 std::vector<Signal> Task::observation() const {
   std::vector<Signal> list;
-  for (std::size_t i = 0; i < part_infos().size(); ++i)
-    if (parts >> i & 1) list.insert(list.end(), part_infos()[i].signals.begin(), part_infos()[i].signals.end());
+  for (const auto& [part, signals] : observed_parts()) list.insert(list.end(), signals.begin(), signals.end());
   return list;
 }
 

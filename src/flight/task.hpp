@@ -121,6 +121,8 @@ struct Task {
   std::uint32_t hold = 1;   ///< control periods for which a policy's action stays
   TaskConstants<double> constants{};
 
+  /// Names of the parts observed, with their signals.
+  std::vector<std::pair<std::string, std::vector<Signal>>> observed_parts() const;
   std::vector<Signal> observation() const;
   std::vector<Signal> action() const;
   /// Where the episode of this key starts.

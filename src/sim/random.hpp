@@ -24,6 +24,7 @@ enum class Stream : std::uint32_t {
   weights = 10,
   replay = 11,
   target_noise = 12,
+  snapshot = 13,
 };
 
 struct RandomKey {
