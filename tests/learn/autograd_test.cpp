@@ -111,8 +111,6 @@ void gradients_agree(double tolerance) {
       const auto theirs = pair.theirs->gradients(static_cast<TorchLearner::Network>(n));
       const double gap = difference(numbers(pair.ours, n, Learner<T>::Kind::first_moments), theirs, 1 - o.beta1);
       EXPECT_LT(gap, tolerance) << name << ", network " << n;
-      RecordProperty(std::string(name) + std::to_string(n), std::to_string(gap));
-      printf("%s %d %g\n", name, n, gap);
     }
   }
 }

@@ -1,6 +1,14 @@
 #include "torch_peer.hpp"
 
+#include <dlfcn.h>
 #include <torch/torch.h>
+
+#include <filesystem>
+
+extern "C" {
+void sgemm_();  // of whichever BLAS the system gives LibTorch
+void openblas_set_num_threads(int) __attribute__((weak));
+}
 
 namespace flappy::oracle {
 namespace {
@@ -205,13 +213,12 @@ TorchLearner::Numbers TorchLearner::gradients(Network network) const {
 }
 double TorchLearner::critic_loss() const { return storage_->loss; }
 
-const char* TorchLearner::version() {
-  static const bool once = [] {
-    torch::set_num_threads(1);
-    return true;
-  }();
-  (void)once;
-  return TORCH_VERSION;
+std::string TorchLearner::version() {
+  if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);
+  torch::set_num_threads(1);
+  Dl_info blas{};
+  const bool known = dladdr(reinterpret_cast<void*>(sgemm_), &blas) != 0;
+  return TORCH_VERSION + (known ? " with " + std::filesystem::canonical(blas.dli_fname).string() : std::string());
 }
 
 }  // namespace flappy::oracle

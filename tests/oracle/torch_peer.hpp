@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "learn/learner.hpp"
@@ -29,8 +30,8 @@ class TorchLearner {
   Numbers gradients(Network network) const;  ///< of the last update
   double critic_loss() const;
 
-  /// LibTorch's version; from the first call on it works with one thread.
-  static const char* version();
+  /// LibTorch's version and its BLAS, on which its speed hangs; from the first call on it works with one thread.
+  static std::string version();
 
  private:
   struct Storage;
