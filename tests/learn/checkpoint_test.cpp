@@ -47,7 +47,8 @@ class CheckpointTest : public testing::Test {
     return refusal([&] { Checkpoint checkpoint(run_ / name); });
   }
   std::string open_bytes(const std::string& bytes) {
-    std::ofstream(run_ / "changed", std::ios::binary) << bytes;  // thousands of them need not reach the disk
+    std::filesystem::remove(run_ / "changed");  // thousands of new files need not reach the disk, as replaced ones do
+    std::ofstream(run_ / "changed", std::ios::binary) << bytes;
     return open("changed");
   }
   void change(const std::string& name, const std::function<void(std::string&)>& how) {
