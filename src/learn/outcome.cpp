@@ -114,8 +114,8 @@ void Follower::see(const Motion& truth, const Target& goal, double t_s, const Ou
 
 bool Follower::manoeuvring(double t_s) const { return !handed_back_ && t_s < success_.by_s + kTick; }
 
-void Follower::spend(double power_W, double period_s, bool handed_back) {
-  energy_J_ += power_W * period_s;
+void Follower::spend(double energy_J, double period_s, bool handed_back) {
+  energy_J_ += energy_J;
   manoeuvre_s_ += period_s;
   handed_back_ = handed_back;
 }

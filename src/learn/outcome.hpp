@@ -62,7 +62,7 @@ class Follower {
   void see(const flight::Motion& truth, const flight::Target& goal, double t_s, const Outcome& so_far);
   /// Whether its energy counts at this tick: call it before spend(), which adds the tick's.
   bool manoeuvring(double t_s) const;
-  void spend(double power_W, double period_s, bool handed_back);
+  void spend(double energy_J, double period_s, bool handed_back);
   void finish(Outcome& outcome) const;
 
  private:
