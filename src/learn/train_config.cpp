@@ -118,6 +118,7 @@ class Reader {
     c_.actor_rate = t.number("actor_rate", io::positive(1));
     c_.critic_rate = t.number("critic_rate", io::positive(1));
     c_.last_rate = t.number_or("last_rate", 1, {0, 1});
+    c_.policy_averaging = t.number_or("policy_averaging", 1, io::positive(1));
     l.tau = t.number("averaging", io::positive(1));
     l.twin = t.boolean("twin");
     l.policy_delay = static_cast<int>(t.integer("policy_delay", 1, 1000));

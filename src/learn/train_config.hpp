@@ -11,7 +11,8 @@
 //   [reward]                scale, discount (from action to action), steps (of the return that the critics learn)
 //   [learn]                 updates, updates_per_step, batch, actor_rate, critic_rate, last_rate (share of the rates at the
 //                           last update, reached in a line), averaging (tau), twin, policy_delay, target_noise,
-//                           target_noise_clip, huber (0: squares), replay (transitions kept)
+//                           target_noise_clip, huber (0: squares), replay (transitions kept), policy_averaging (share of
+//                           the actor that the policy takes over after each step; 1: the policy is the actor)
 //   [evaluate]              every (updates), vehicles
 //   [checkpoint]            every (updates), keep
 //
@@ -36,7 +37,7 @@ struct TrainConfig {
   double reward_scale = 1, discount = 1;
   std::size_t return_steps = 1;
   std::uint64_t updates = 0, updates_per_step = 1;
-  double actor_rate = 0, critic_rate = 0, last_rate = 1;
+  double actor_rate = 0, critic_rate = 0, last_rate = 1, policy_averaging = 1;
   std::size_t replay = 0;
   std::uint64_t evaluate_every = 0, checkpoint_every = 0;
   std::size_t evaluate_vehicles = 0, keep = 2;

@@ -46,6 +46,8 @@ class Trainer {
         replay_(config.learner.shape, config.replay),
         collector_(config) {
     if (options.init) start_from(*options.init);
+    actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
+    average_ = actor_->weights;
   }
 
   TrainSummary run() {
@@ -101,7 +103,7 @@ class Trainer {
   /// One action of every flapper, and meanwhile the updates of this step.
   void step() {
     const auto from = Clock::now();
-    collector_.begin(std::make_shared<flight::Actor>(named(learner_.actor())));
+    collector_.begin(actor_);
     const std::size_t items = collector_.items();
     learnt_ = replay_.size() >= config_.learner.batch && steps_ >= config_.steps_before;
     if (learnt_) {
@@ -118,6 +120,9 @@ class Trainer {
                              "; accepted: lower learn.critic_rate, reward.scale or reward.discount");
       losses_ += learner_.metrics().critic_loss, values_ += learner_.metrics().mean_q;
       actor_values_ += learner_.metrics().actor_q, ++samples_;
+      actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
+      for (std::size_t k = 0; k < average_.size(); ++k)
+        average_[k] += config_.policy_averaging * (actor_->weights[k] - average_[k]);
     } else {
       const auto count = static_cast<std::ptrdiff_t>(items);
 #pragma omp parallel for schedule(dynamic) num_threads(config_.threads)
@@ -143,7 +148,7 @@ class Trainer {
     const double s = std::chrono::duration<double>(from - report_start_.time).count();
     if (!evaluator_)
       evaluator_.emplace(config_.fly, EvaluationOptions{config_.evaluate_vehicles, kValidationFlappers, 1024});
-    policy_ = named(learner_.target_actor());
+    policy_ = averaged();
     const Evaluation e = evaluator_->fly({std::make_shared<flight::Actor>(policy_), nullptr}, Detail::success);
     std::vector<double> capture_s;
     double successes = 0;
@@ -191,9 +196,16 @@ class Trainer {
     report_start_ = {Clock::now(), updates(), collector_.env_steps()};
   }
 
+  /// The policy: the actor averaged over steps, in the precision that it flies in.
+  flight::Actor averaged() const {
+    flight::Actor policy = *actor_;
+    std::ranges::transform(average_, policy.weights.begin(), [](double w) { return static_cast<float>(w); });
+    return policy;
+  }
+
   /// Policies where others find them.
   void publish() {
-    if (policy_.widths.empty()) policy_ = named(learner_.target_actor());
+    if (policy_.widths.empty()) policy_ = averaged();
     if (best_.widths.empty()) best_ = policy_;
     flight::write_actor(options_.folder / "best.json", best_);
     flight::write_actor(options_.folder / "last.json", policy_);
@@ -231,6 +243,7 @@ class Trainer {
     to.put("sums", std::array<double, 5>{losses_, values_, actor_values_, success_, best_success_});
     to.put("samples", samples_);
     to.put("best_update", best_update_);
+    to.put("average", average_);
     to.put("best_weights", best_.weights);
     to.put("policy_weights", policy_.weights);
     payload_sha256_ = to.commit();
@@ -258,7 +271,9 @@ class Trainer {
     losses_ = sums[0], values_ = sums[1], actor_values_ = sums[2], success_ = sums[3], best_success_ = sums[4];
     from.get("samples", samples_);
     from.get("best_update", best_update_);
-    policy_ = best_ = named(learner_.target_actor());
+    actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
+    policy_ = best_ = averaged();
+    from.get("average", average_);
     from.get("best_weights", best_.weights);
     from.get("policy_weights", policy_.weights);
     saved_at_ = updates();
@@ -316,7 +331,9 @@ class Trainer {
   std::uint64_t samples_ = 0;
   double success_ = -1, best_success_ = -1;
   std::uint64_t best_update_ = 0;
-  flight::Actor policy_, best_;
+  std::shared_ptr<const flight::Actor> actor_;  // that flies
+  std::vector<double> average_;                 // its weights, over steps
+  flight::Actor policy_, best_;                 // of the last evaluation, and of the best one
   std::string payload_sha256_;
 
   Mark report_start_{};
