@@ -57,7 +57,7 @@ class Trainer {
     Metrics metrics(folder, kColumns, records_);
     metrics_ = &metrics;
     publish();
-    report_start_ = {Clock::now(), updates(), collector_.env_steps()};
+    start_ = last_ = mark();
     bool going = true;
     while (going && updates() < config_.updates) {
       step();
@@ -66,15 +66,23 @@ class Trainer {
       if (passed(config_.checkpoint_every) && updates() < config_.updates) save();
       going = !options_.keep_going || options_.keep_going(progress(evaluates));
     }
-    if (saved_at_ != updates()) save();
+    if (saved_step_ != steps_) save();
     return summarise();
   }
 
  private:
+  /// Where a stretch of training began; seconds are those of steps, of this process.
   struct Mark {
-    Clock::time_point time;
+    double seconds;
     std::uint64_t updates, env_steps;
   };
+  Mark mark() const { return {learning_s_ + warming_s_, updates(), collector_.env_steps()}; }
+  std::pair<double, double> rates_since(const Mark& from) const {
+    const Mark now = mark();
+    const double s = std::max(now.seconds - from.seconds, 1e-9);
+    return {static_cast<double>(now.updates - from.updates) / s,
+            static_cast<double>(now.env_steps - from.env_steps) / s};
+  }
 
   std::uint64_t updates() const { return learner_.counters().updates; }
   /// Whether the last step reached a multiple of `every`, or the end.
@@ -145,7 +153,6 @@ class Trainer {
   void evaluate() {
     const auto from = Clock::now();
     const double wall = wall_s();
-    const double s = std::chrono::duration<double>(from - report_start_.time).count();
     if (!evaluator_)
       evaluator_.emplace(config_.fly, EvaluationOptions{config_.evaluate_vehicles, kValidationFlappers, 1024});
     policy_ = averaged();
@@ -186,14 +193,10 @@ class Trainer {
     return_mean_ = share(sums.gain);
     losses_ = values_ = actor_values_ = 0, samples_ = 0;
     evaluation_s_ += seconds_since(from);
-    const double times[] = {wall,
-                            evaluation_s_,
-                            static_cast<double>(updates() - report_start_.updates) / s,
-                            static_cast<double>(collector_.env_steps() - report_start_.env_steps) / s,
-                            simulation,
-                            learning};
+    const auto [updates_per_s, env_steps_per_s] = rates_since(last_);
+    const double times[] = {wall, evaluation_s_, updates_per_s, env_steps_per_s, simulation, learning};
     metrics_->record(figures, times);
-    report_start_ = {Clock::now(), updates(), collector_.env_steps()};
+    last_ = mark();
   }
 
   /// The policy: the actor averaged over steps, in the precision that it flies in.
@@ -247,7 +250,7 @@ class Trainer {
     to.put("best_weights", best_.weights);
     to.put("policy_weights", policy_.weights);
     payload_sha256_ = to.commit();
-    saved_at_ = updates();
+    saved_step_ = steps_;
     keep_newest(options_.folder, config_.keep);
   }
 
@@ -276,7 +279,7 @@ class Trainer {
     from.get("average", average_);
     from.get("best_weights", best_.weights);
     from.get("policy_weights", policy_.weights);
-    saved_at_ = updates();
+    saved_step_ = steps_;
     payload_sha256_ = from.payload_sha256();
     const MetricsTable timing = read_metrics(options_.folder / "timing.jsonl");
     if (records_ > 0 && timing.column("wall_s").size() >= records_) {
@@ -285,15 +288,9 @@ class Trainer {
   }
 
   TrainProgress progress(bool evaluated) const {
-    const double s = seconds_since(report_start_.time);
-    return {updates(),
-            config_.updates,
-            collector_.episodes(),
-            collector_.env_steps(),
-            return_mean_,
-            success_,
-            static_cast<double>(updates() - report_start_.updates) / s,
-            static_cast<double>(collector_.env_steps() - report_start_.env_steps) / s,
+    const auto [updates_per_s, env_steps_per_s] = rates_since(start_);
+    return {updates(),    config_.updates, collector_.episodes(), collector_.env_steps(),
+            return_mean_, success_,        updates_per_s,         env_steps_per_s,
             evaluated};
   }
 
@@ -308,6 +305,7 @@ class Trainer {
     s.best_success = best_success_;
     s.best_update = best_update_;
     s.payload_sha256 = payload_sha256_;
+    if (records_ == 0) return s;
     const std::vector<double> success = read_metrics(options_.folder / "metrics.jsonl").column("success_rate");
     const std::vector<double> wall = read_metrics(options_.folder / "timing.jsonl").column("wall_s");
     for (std::size_t level = 0; level < std::size(kSuccessLevels); ++level)
@@ -326,7 +324,7 @@ class Trainer {
   Metrics* metrics_ = nullptr;
 
   bool learnt_ = false;  // in the last step
-  std::uint64_t steps_ = 0, records_ = 0, saved_at_ = ~std::uint64_t{0};
+  std::uint64_t steps_ = 0, records_ = 0, saved_step_ = ~std::uint64_t{0};
   double losses_ = 0, values_ = 0, actor_values_ = 0, return_mean_ = std::numeric_limits<double>::quiet_NaN();
   std::uint64_t samples_ = 0;
   double success_ = -1, best_success_ = -1;
@@ -336,7 +334,7 @@ class Trainer {
   flight::Actor policy_, best_;                 // of the last evaluation, and of the best one
   std::string payload_sha256_;
 
-  Mark report_start_{};
+  Mark start_{}, last_{};  // of this process, and of the last evaluation
   double wall_before_s_ = 0, evaluation_s_ = 0, learning_s_ = 0, warming_s_ = 0;
 };
 
