@@ -53,10 +53,14 @@ class Trainer {
   TrainSummary run() {
     const fs::path& folder = options_.folder;
     if (options_.from) resume(Checkpoint(*options_.from));
-    else write_start();
+    else write_config();
     Metrics metrics(folder, kColumns, records_);
     metrics_ = &metrics;
     publish();
+    if (!options_.from) {
+      save();  // from now on it can be resumed, whenever it is killed
+      write_start();
+    }
     start_ = last_ = mark();
     bool going = true;
     while (going && updates() < config_.updates) {
@@ -214,9 +218,12 @@ class Trainer {
     flight::write_actor(options_.folder / "last.json", policy_);
   }
 
-  void write_start() {
+  void write_config() {
     fs::create_directories(options_.folder / "config");
     for (const auto& [name, text] : config_.resolved) io::write_atomically(options_.folder / "config" / name, text);
+  }
+
+  void write_start() {
     const TrainCosts costs = costs_of(config_);
     const nlohmann::ordered_json run = {{"schema", 1},
                                         {"task", config_.fly.fleet.task.name},
@@ -368,7 +375,7 @@ TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
   fs::create_directories(options.folder, error);
   if (error) throw io::InputError(options.folder.string() + ": cannot be written: " + error.message());
   const io::FolderLock lock(options.folder);
-  if (!options.from && !fs::is_empty(options.folder, error) && fs::exists(options.folder / "run.json"))
+  if (!options.from && fs::exists(options.folder / "run.json", error))
     throw io::InputError(options.folder.string() + ": holds a run; accepted: a new folder, or --resume " +
                          options.folder.string());
   Trainer trainer(config, options);

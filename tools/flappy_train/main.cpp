@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "io/program.hpp"
 #include "io/progress.hpp"
@@ -89,13 +90,16 @@ fs::path config_of(const fs::path& run) {
 }
 
 TrainSummary train_one(const TrainConfig& config, TrainOptions options) {
-  const TrainCosts costs = costs_of(config);
-  std::printf("%s: seed %llu, %d threads, %.0f MB of memory, at most %.0f MB on disk\n", options.folder.c_str(),
-              static_cast<unsigned long long>(config.seed), config.threads,
-              static_cast<double>(costs.memory_bytes) / 1e6, static_cast<double>(costs.disk_bytes) / 1e6);
-  std::fflush(stdout);
   io::ProgressLine line("trained");
+  bool said = false;
   options.keep_going = [&](const TrainProgress& p) {
+    if (!std::exchange(said, true)) {
+      const TrainCosts costs = costs_of(config);
+      std::printf("%s: seed %llu, %d threads, %.0f MB of memory, at most %.0f MB on disk\n", options.folder.c_str(),
+                  static_cast<unsigned long long>(config.seed), config.threads,
+                  static_cast<double>(costs.memory_bytes) / 1e6, static_cast<double>(costs.disk_bytes) / 1e6);
+      std::fflush(stdout);
+    }
     if (line.due()) line.show(static_cast<double>(p.update) / static_cast<double>(p.updates), words(p));
     return !io::interrupted();
   };
