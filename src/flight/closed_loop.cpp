@@ -31,17 +31,51 @@ FLAPPY_INLINE Setpoint<L<T>> setpoint(FlightBlock<T>& f, const FlightPlan<T>& pl
   return setpoint_at<L<T>>(plan.path, f.tick + first, f.segment + first);
 }
 
+/// The policy acts where its last action has been held for long enough.
+template <class T>
+FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episode<L<T>>& episode, int first) {
+  const FlightBlock<T>& f = s.flight;
+  T due[kWidth<T>];
+  bool any_due = false;
+  for (int i = 0; i < kWidth<T>; ++i) {
+    due[i] = f.tick[first + i] % plan.hold == 0 ? T(1) : T(0);
+    any_due |= due[i] > 0;
+  }
+  if (!any_due) return;
+  const auto acts = L<T>::load(due) > L<T>(0);
+  L<T> observation[kMaxObservation], action[kActions];
+  for (int i = 0; i < plan.actor.widths[0]; ++i) observation[i] = L<T>::load(f.observation[i] + first);
+  evaluate(plan.actor, observation, action);
+  if (plan.explores) {
+    const auto fresh = sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::exploration), plan.period,
+                                          f.flapper + first, f.flight + first);
+    for (int i = 0; i < kActions; ++i) {
+      const L<T> noise = L<T>(plan.noise_kept) * episode.noise[i] + L<T>(plan.noise_fresh) * fresh.n[i];
+      episode.noise[i] = where(acts, noise, episode.noise[i]);
+      action[i] = clamp(L<T>(action[i] + episode.exploration * noise), L<T>(-1), L<T>(1));
+    }
+  }
+  for (int i = 0; i < kActions; ++i) episode.action[i] = where(acts, action[i], episode.action[i]);
+  episode.gain = where(acts, L<T>(0), episode.gain);
+  store_rows(episode, s.flight.episode, first);
+}
+
+/// What the controller has learnt to hold; nothing without one.
+template <class T>
+FLAPPY_INLINE WingBeat<L<T>> learnt_trim(const FlightBlock<T>& f, const FlightPlan<T>& plan, int first) {
+  if (plan.controller == static_cast<int>(Controller::Kind::pid))
+    return trim(plan.pid, load_rows<Pid<L<T>>>(f.controller, first));
+  if (plan.controller == static_cast<int>(Controller::Kind::arc))
+    return trim(plan.arc, load_rows<Arc<L<T>>>(f.controller, first));
+  return {L<T>(0), L<T>(0), L<T>(0), L<T>(0)};
+}
+
 /// Policy and controller set the inputs of the wing beat.
 template <class T>
 FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;
   auto episode = load_rows<Episode<L<T>>>(f.episode, first);
-  if (plan.actor.layers > 0) {
-    L<T> observation[kMaxObservation];
-    for (int i = 0; i < plan.actor.widths[0]; ++i) observation[i] = L<T>::load(f.observation[i] + first);
-    evaluate(plan.actor, observation, episode.action);
-    store_rows(episode, f.episode, first);
-  }
+  if (plan.actor.layers > 0) act(s, plan, episode, first);
   const auto estimate = load_rows<Estimate<L<T>>>(f.estimate, first);
   const auto ref = setpoint(f, plan, first);
   const L<T> zero(0);
@@ -163,12 +197,20 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   }
   const auto ref = setpoint(f, plan, first);
   const auto score = score_of(truth, ref);
-  episode.reward = reward_of(plan.task.reward, score, truth, episode);
+  const Reward<T>& pays = plan.task.reward;
+  episode.reward = reward_of(pays, score, truth, episode);
   const L<T> now = L<T>::load(time);
   const auto estimate = load_rows<Estimate<L<T>>>(f.estimate, first);
   const bool by_estimate = plan.task.hand_back.on_estimate > 0;
   const auto done = by_estimate ? arrived(plan.task.hand_back, score_of(estimate, ref), estimate.body_rate_rad_s, now)
                                 : arrived(plan.task.hand_back, score, truth.body_rate_rad_s, now);
+  if (pays.goal != 0 || pays.arrival != 0) {
+    const L<T> there = closeness(pays, score, truth);
+    const L<T> early = L<T>(pays.early) * max(L<T>(L<T>(plan.task.hand_back.at_s) - now), L<T>(0));
+    const L<T> once = where(done & (episode.handed_back == L<T>(0)), L<T>(L<T>(pays.arrival) * there + early), L<T>(0));
+    episode.reward += L<T>(pays.goal) * there + once;
+  }
+  episode.gain += episode.reward;
   episode.handed_back = where(done, L<T>(1), episode.handed_back);
   note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode);
   for (int i = 0; i < kActions; ++i) episode.previous[i] = episode.action[i];
@@ -184,7 +226,8 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
     if (plan.task.contact_ends > 0 && (status & ~std::uint32_t{sim::kFrozen})) f.ended[first + i] |= kContact;
   }
   L<T> row[kMaxObservation];
-  const int rows = observe(plan.parts, estimate, ref, episode, L<T>::load(fraction), row);
+  const int rows =
+      observe(plan.parts, estimate, ref, episode, L<T>::load(fraction), now, learnt_trim(f, plan, first), row);
   for (int i = 0; i < rows; ++i) row[i].store(f.observation[i] + first);
   store_rows(episode, f.episode, first);
 }

@@ -15,6 +15,9 @@ struct Episode {
   T added[kActions];     // besides: V, V, V, split cycle
   T handed_back;         // 0 or 1
   T reward;              // of the last control period
+  T gain;                // sum of rewards since the policy last acted
+  T exploration;         // standard deviation of the noise on its actions
+  T noise[kActions];     // of which this is the present one, of deviation 1
   T captured_s;          // when the goal was captured first; 0: not yet
   T lost_s;              // when it was not kept first; 0: never
 };
@@ -71,12 +74,28 @@ FLAPPY_INLINE T reward_of(const Reward<Element<T>>& k, const Score<T>& s, const 
                                                                        T(k.body_rate) * length(t.body_rate_rad_s)))));
   return T(k.inverse_square) / T(c * c + T(1e-6)) - T(k.cost) * c +
          (T(k.facing) * s.facing + (T(k.upright) * min(T(0), s.upright) +
-                                    (T(k.behind) * min(T(0), T(s.position_m.x + T(k.behind_m))) + T(k.alive))));
+                                    (T(k.behind) * min(T(0), T(s.position_m.x + T(k.behind_m))) + T(k.alive)))) +
+         (T(k.level) * s.upright +
+          T(k.near) / T(T(1) + T(k.near_1_m) * T(k.near_1_m) * dot(s.position_m, s.position_m)));
 }
 
 template <class T>
 FLAPPY_INLINE auto shorter(const Vec3<T>& v, const Element<T>& limit) {
   return dot(v, v) < T(limit) * T(limit);
+}
+
+/// 1 at the goal and at rest there, falling off with every error: G in task.hpp.
+template <class T>
+FLAPPY_INLINE T closeness(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t) {
+  const T tilt = T(k.goal_1_tilt) * atan2(sqrt(max(T(T(1) - s.upright * s.upright), T(0))), s.upright);
+  const T heading = T(k.goal_1_heading) * s.yaw_rad;
+  const T square[] = {T(k.goal_1_m) * T(k.goal_1_m) * dot(s.position_m, s.position_m),
+                      T(k.goal_s_m) * T(k.goal_s_m) * dot(s.velocity_m_s, s.velocity_m_s),
+                      T(k.goal_s_rad) * T(k.goal_s_rad) * dot(t.body_rate_rad_s, t.body_rate_rad_s), tilt * tilt,
+                      heading * heading};
+  T product(1);
+  for (const T& x : square) product *= T(1) + x;
+  return T(1) / product;
 }
 
 /// Lanes where the policy's work is done.
@@ -121,7 +140,7 @@ FLAPPY_INLINE void look_for_ends(const Limits<Element<T>>& k, const Score<T>& s,
 /// Writes the observed parts; returns how many rows they are.
 template <class T>
 FLAPPY_INLINE int observe(std::uint32_t parts, const Estimate<T>& x, const Setpoint<T>& ref, const Episode<T>& e,
-                          const T& beat_fraction, T* row) {
+                          const T& beat_fraction, const T& time_s, const WingBeat<T>& trim, T* row) {
   int n = 0;
   const auto observes = [&](Part part) { return (parts >> static_cast<int>(part) & 1) != 0; };
   const auto add = [&](const Vec3<T>& v) { row[n++] = v.x, row[n++] = v.y, row[n++] = v.z; };
@@ -147,6 +166,11 @@ FLAPPY_INLINE int observe(std::uint32_t parts, const Estimate<T>& x, const Setpo
     };
     const Vec3<T> minus_x{-R.row_x.x, -R.row_x.y, -R.row_x.z};
     add(turned_back(R.row_x, R.row_y)), add(turned_back(R.row_y, minus_x)), add(R.row_z);
+  }
+  if (observes(Part::time)) row[n++] = time_s;
+  if (observes(Part::trim)) {
+    row[n++] = trim.amplitude_V, row[n++] = trim.difference_V;
+    row[n++] = trim.bias_V, row[n++] = trim.split_cycle;
   }
   return n;
 }

@@ -162,42 +162,84 @@ void Fleet<T>::set_added(std::size_t i, const sim::Input& input) {
 }
 
 template <class T>
-void Fleet<T>::step() {
+void Fleet<T>::set_exploration(const Exploration& exploration) {
   Storage& s = *storage_;
-  auto& body = s.batch.storage();
-  s.period = &s.schedule.next();
-  const Period& period = *s.period;
-  s.physics = body.plan();
-  FlightPlan<T>& plan = s.plan;
-  plan.physics = &s.physics;
-  plan.first_step = body.steps;
-  plan.slices = period.slices.data();
-  plan.slice_count = static_cast<int>(period.slices.size());
-  plan.fuse = period.fuse.data();
-  plan.fuse_count = static_cast<int>(period.fuse.size());
-  plan.advance = period.advance.data();
-  plan.replay = period.replay.data();
-  plan.replay_count = static_cast<int>(period.replay.size());
-  plan.push_slot = period.push_slot;
-  plan.newest = period.newest;
-  plan.ahead_s = period.ahead_s;
+  s.exploration = exploration;
+  s.plan.explores = exploration.high > 0;
+  s.plan.noise_kept = static_cast<T>(exploration.kept);
+  s.plan.noise_fresh = static_cast<T>(std::sqrt(1 - square(exploration.kept)));
+  for (std::size_t i = 0; i < size(); ++i) s.start_exploration(i);
+}
+
+template <class T>
+void Fleet<T>::begin(int periods) {
+  Storage& s = *storage_;
+  s.periods.resize(static_cast<std::size_t>(periods));
+  s.plans.clear();
+  s.physics = s.batch.storage().plan();
+  for (Period& period : s.periods) {
+    period = s.schedule.next();
+    FlightPlan<T> plan = s.plan;
+    plan.physics = &s.physics;
+    plan.period = static_cast<std::uint32_t>(period.first_step / s.period_steps);
+    plan.first_step = period.first_step;
+    plan.slices = period.slices.data();
+    plan.slice_count = static_cast<int>(period.slices.size());
+    plan.fuse = period.fuse.data();
+    plan.fuse_count = static_cast<int>(period.fuse.size());
+    plan.advance = period.advance.data();
+    plan.replay = period.replay.data();
+    plan.replay_count = static_cast<int>(period.replay.size());
+    plan.push_slot = period.push_slot;
+    plan.newest = period.newest;
+    plan.ahead_s = period.ahead_s;
+    s.plans.push_back(plan);
+  }
   if (s.recording) {
-    s.imu_tap_size = period.slices.size() * kImuSampleRows * kLanes<T>;
-    s.mocap_tap_size = period.slices.size() * kMocapRows * kLanes<T>;
+    s.imu_tap_size = s.periods.back().slices.size() * kImuSampleRows * kLanes<T>;
+    s.mocap_tap_size = s.periods.back().slices.size() * kMocapRows * kLanes<T>;
     s.imu_tap.resize(s.blocks.size() * s.imu_tap_size);
     s.mocap_tap.resize(s.blocks.size() * s.mocap_tap_size);
   }
-  const auto blocks = static_cast<std::ptrdiff_t>(s.blocks.size());
-#pragma omp parallel for schedule(static) num_threads(body.threads)
-  for (std::ptrdiff_t b = 0; b < blocks; ++b) {
-    const auto i = static_cast<std::size_t>(b);
+}
+
+template <class T>
+void Fleet<T>::fly_block(std::size_t b) {
+  Storage& s = *storage_;
+  auto& body = s.batch.storage();
+  for (const FlightPlan<T>& plan : s.plans) {
+    const bool last = &plan == &s.plans.back();
     Tap<T> tap;
-    if (s.recording) tap = {&s.imu_tap[i * s.imu_tap_size], &s.mocap_tap[i * s.mocap_tap_size]};
-    s.fly({body.blocks[i], body.effects_of(i), s.blocks[i], &s.ring[i * s.ring_size], &s.queue[i * s.queue_size], tap,
-           body.block_after(i)},
+    if (s.recording && last) tap = {&s.imu_tap[b * s.imu_tap_size], &s.mocap_tap[b * s.mocap_tap_size]};
+    s.fly({body.blocks[b], body.effects_of(b), s.blocks[b], &s.ring[b * s.ring_size], &s.queue[b * s.queue_size], tap,
+           last ? body.block_after(b) : nullptr},
           plan);
   }
-  body.steps += s.period_steps;
+}
+
+template <class T>
+void Fleet<T>::end() {
+  Storage& s = *storage_;
+  s.batch.storage().steps += static_cast<std::int64_t>(s.plans.size()) * s.period_steps;
+}
+
+template <class T>
+void Fleet<T>::step() {
+  begin(1);
+  const auto count = static_cast<std::ptrdiff_t>(blocks());
+#pragma omp parallel for schedule(static) num_threads(storage_->batch.storage().threads)
+  for (std::ptrdiff_t b = 0; b < count; ++b) fly_block(static_cast<std::size_t>(b));
+  end();
+}
+
+template <class T>
+std::size_t Fleet<T>::blocks() const {
+  return storage_->blocks.size();
+}
+
+template <class T>
+std::pair<std::size_t, std::size_t> Fleet<T>::flappers(std::size_t block) const {
+  return {block * kLanes<T>, std::min(size(), (block + 1) * kLanes<T>)};
 }
 
 template <class T>
@@ -271,6 +313,30 @@ std::vector<double> Fleet<T>::observation(std::size_t i) const {
   return row;
 }
 template <class T>
+void Fleet<T>::observation(std::size_t i, T* row) const {
+  const auto [f, lane] = storage_->at(i);
+  for (int k = 0; k < storage_->observed; ++k) row[k] = f.observation[k][lane];
+}
+template <class T>
+void Fleet<T>::true_observation(std::size_t i, T* row) const {
+  const auto [f, lane] = storage_->at(i);
+  double exact[kMaxObservation];
+  storage_->observe_as(i, get<Truth<double>>(f.truth, lane), exact);
+  for (int k = 0; k < storage_->observed; ++k) row[k] = static_cast<T>(exact[k]);
+}
+template <class T>
+std::array<T, kActions> Fleet<T>::action(std::size_t i) const {
+  const auto [f, lane] = storage_->at(i);
+  std::array<T, kActions> action;
+  for (int k = 0; k < kActions; ++k) action[static_cast<std::size_t>(k)] = f.episode[k][lane];
+  return action;
+}
+template <class T>
+T Fleet<T>::gain(std::size_t i) const {
+  const auto [f, lane] = storage_->at(i);
+  return f.episode[offsetof(Episode<T>, gain) / sizeof(T)][lane];
+}
+template <class T>
 std::pair<double, double> Fleet<T>::innovation(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
   const auto x = get<Fusion<double>>(f.fusion, lane);
@@ -320,6 +386,26 @@ auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
                                                         {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z}});
                                       });
   return list;
+}
+
+template <class T>
+std::vector<std::span<std::byte>> Fleet<T>::memory() {
+  Storage& s = *storage_;
+  return {std::as_writable_bytes(std::span(s.batch.storage().blocks)), std::as_writable_bytes(std::span(s.blocks)),
+          std::as_writable_bytes(std::span(s.ring)), std::as_writable_bytes(std::span(s.queue))};
+}
+
+template <class T>
+std::int64_t Fleet<T>::periods() const {
+  return storage_->batch.storage().steps / storage_->period_steps;
+}
+
+template <class T>
+void Fleet<T>::restored(std::int64_t periods) {
+  Storage& s = *storage_;
+  s.schedule = Schedule(s.options.sensors, s.options.batch.step_s, s.period_steps);
+  for (std::int64_t k = 0; k < periods; ++k) s.schedule.next();
+  s.batch.storage().steps = periods * s.period_steps;
 }
 
 template <class T>

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <memory>
+#include <span>
 
 #include "flight/actor_file.hpp"
 #include "flight/setup.hpp"
@@ -23,6 +24,12 @@ struct FleetOptions {
   std::uint64_t seed = 0;
   std::uint32_t first_flapper = 0;  ///< number of the fleet's first flapper in the random streams
   sim::BatchOptions batch;
+};
+
+/// Noise on a policy's actions: an autoregressive one of first order, in units of the action.
+struct Exploration {
+  double low = 0, high = 0;  ///< standard deviation of the first and of the last flapper of a fleet
+  double kept = 0;           ///< correlation from one action to the next
 };
 
 /// A flapper's motion, true or estimated. SI units; attitude w, x, y, z, body to world.
@@ -74,8 +81,19 @@ class Fleet {
   /// Adds to the controller's output from now on: open-loop flight, excitation.
   void set_added(std::size_t i, const sim::Input& input);
 
+  /// Noise on the actor's actions from now on.
+  void set_exploration(const Exploration& exploration);
+
   /// One control period for all.
   void step();
+  /// The same in parts: begin() plans `periods` control periods, then fly_block() takes a block of flappers through all of
+  /// them, each block once, in any order and on any thread, and end() closes them.
+  void begin(int periods);
+  void fly_block(std::size_t block);
+  void end();
+  std::size_t blocks() const;
+  /// Flappers of a block: the first, and the one after the last.
+  std::pair<std::size_t, std::size_t> flappers(std::size_t block) const;
 
   Motion truth(std::size_t i) const;
   Motion estimate(std::size_t i) const;
@@ -88,6 +106,11 @@ class Fleet {
   double captured_s(std::size_t i) const;  ///< when the goal was first captured; 0: not yet
   double lost_s(std::size_t i) const;      ///< when it was first not kept, as the task asks; 0: never
   std::vector<double> observation(std::size_t i) const;
+  void observation(std::size_t i, T* row) const;
+  /// What the policy would observe if the estimate were true.
+  void true_observation(std::size_t i, T* row) const;
+  std::array<T, kActions> action(std::size_t i) const;  ///< of the policy, its noise included
+  T gain(std::size_t i) const;                          ///< rewards since the policy last acted
   /// Squared innovations of the last pose over their variance: angle and position, three degrees of freedom each.
   std::pair<double, double> innovation(std::size_t i) const;
   std::array<double, 3> gyro_bias_rad_s(std::size_t i) const;  ///< true
@@ -109,6 +132,12 @@ class Fleet {
   void record(bool on);
   std::vector<ImuRecord> imu_samples(std::size_t i) const;
   std::vector<MocapRecord> mocap_samples(std::size_t i) const;  ///< without the lost ones
+
+  /// All that changes in flight, for who keeps and restores it: then restored() must follow, with the control periods
+  /// flown. Vehicles with effects keep some of it elsewhere.
+  std::vector<std::span<std::byte>> memory();
+  void restored(std::int64_t periods);
+  std::int64_t periods() const;  ///< flown so far
 
   std::uint64_t hash(std::size_t first, std::size_t last) const;
   std::uint64_t hash() const { return hash(0, size()); }

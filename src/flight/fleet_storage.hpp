@@ -54,7 +54,10 @@ struct Fleet<T>::Storage {
   std::vector<Segment<T>> path;
   std::shared_ptr<const Actor> actor;
   std::vector<T> actor_numbers;
-  const Period* period = nullptr;
+  std::vector<Period> periods;       // being flown, or flown last
+  std::vector<FlightPlan<T>> plans;  // of each of them
+  Exploration exploration;
+  int observed = 0;  // rows of the observation
   std::vector<T> imu_tap, mocap_tap;
   std::size_t imu_tap_size = 0, mocap_tap_size = 0;
   bool recording = false;
@@ -104,7 +107,7 @@ struct Fleet<T>::Storage {
                                 square(s.mocap.position_noise_m),
                                 gravity,
                                 {at.x, at.y, at.z}});
-    const Controller& c = options.controller;
+    Controller& c = options.controller;
     const auto fill = [&](auto constants) {
       constants.velocity_share = low_pass_share(c.velocity_low_pass_hz, period_s);
       constants.rate_share = low_pass_share(c.body_rate_low_pass_hz, period_s);
@@ -112,11 +115,12 @@ struct Fleet<T>::Storage {
       constants.gravity_m_s2 = gravity;
       return constants;
     };
-    PidConstants<double> pid = fill(c.pid);
-    pid.per_period_Hz = 1 / period_s;
+    c.pid = fill(c.pid);
+    c.pid.per_period_Hz = 1 / period_s;
+    c.arc = fill(c.arc);
     plan.controller = static_cast<int>(c.kind);
-    plan.pid = rounded<T>(pid);
-    plan.arc = rounded<T>(fill(c.arc));
+    plan.pid = rounded<T>(c.pid);
+    plan.arc = rounded<T>(c.arc);
     TaskConstants<double> task = options.task.constants;
     task.tick_s = period_s;
     // half-way between ticks, so that rounding cannot move an end by one
@@ -127,6 +131,8 @@ struct Fleet<T>::Storage {
       *after = (std::floor(*after / period_s + 1e-6) + 0.5) * period_s;
     plan.task = rounded<T>(task);
     plan.parts = options.task.parts;
+    plan.hold = options.task.hold;
+    observed = static_cast<int>(options.task.observation().size());
     plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(period_s)};
   }
 
@@ -157,8 +163,9 @@ struct Fleet<T>::Storage {
     if (tap.empty()) return;
     if (i >= batch.size()) throw std::out_of_range("no flapper " + std::to_string(i) + " in the fleet");
     const auto* rows = reinterpret_cast<const T(*)[kLanes<T>]>(&tap[i / kLanes<T> * tap_size]);
-    double time_s = static_cast<double>(period->first_step) * options.batch.step_s;
-    for (const Slice& slice : period->slices) {
+    const Period& period = periods.back();
+    double time_s = static_cast<double>(period.first_step) * options.batch.step_s;
+    for (const Slice& slice : period.slices) {
       time_s += slice.steps * options.batch.step_s;
       if (!(slice.*taken)) continue;
       add(time_s, get<Sample<double>>(rows, static_cast<int>(i % kLanes<T>)));
@@ -170,7 +177,9 @@ struct Fleet<T>::Storage {
   void start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot);
   Snapshot<T> snapshot(std::size_t i, const Target& target);
   void start_lane(std::size_t i, std::uint32_t episode, const Truth<double>& truth);
+  void start_exploration(std::size_t i);
   void show(std::size_t i);
+  void observe_as(std::size_t i, const Estimate<double>& x, double* row);
   void start_fusion(std::size_t i, const Truth<double>& truth, sim::RandomKey key);
 };
 
@@ -195,17 +204,37 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
   put(imu, f.imu, lane);
   start_fusion(i, truth, key);
   put(Episode<double>{}, f.episode, lane);
+  start_exploration(i);
+}
+
+template <class T>
+void Fleet<T>::Storage::start_exploration(std::size_t i) {
+  const auto [f, lane] = at(i);
+  const double place = batch.size() > 1 ? static_cast<double>(i) / static_cast<double>(batch.size() - 1) : 1;
+  f.episode[offsetof(Episode<T>, exploration) / sizeof(T)][lane] =
+      static_cast<T>(exploration.low + (exploration.high - exploration.low) * place);
 }
 
 /// The observation before the first period.
 template <class T>
 void Fleet<T>::Storage::show(std::size_t i) {
   const auto [f, lane] = at(i);
-  const double phase = model::beat_fraction<double>(batch.storage().at(i).block.phase[lane]);
   double row[kMaxObservation] = {};
-  observe(options.task.parts, get<Estimate<double>>(f.estimate, lane), setpoint(f, lane), Episode<double>{}, phase,
-          row);
+  observe_as(i, get<Estimate<double>>(f.estimate, lane), row);
   for (int k = 0; k < kMaxObservation; ++k) f.observation[k][lane] = static_cast<T>(row[k]);
+}
+
+template <class T>
+void Fleet<T>::Storage::observe_as(std::size_t i, const Estimate<double>& x, double* row) {
+  const auto [f, lane] = at(i);
+  const double phase = model::beat_fraction<double>(batch.storage().at(i).block.phase[lane]);
+  WingBeat<double> learnt{};
+  if (options.controller.kind == Controller::Kind::pid)
+    learnt = trim(options.controller.pid, get<Pid<double>>(f.controller, lane));
+  else if (options.controller.kind == Controller::Kind::arc)
+    learnt = trim(options.controller.arc, get<Arc<double>>(f.controller, lane));
+  observe(options.task.parts, x, setpoint(f, lane), get<Episode<double>>(f.episode, lane), phase,
+          f.tick[lane] * period_steps * options.batch.step_s, learnt, row);
 }
 
 template <class T>

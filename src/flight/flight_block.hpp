@@ -80,6 +80,10 @@ struct FlightPlan {
   std::uint32_t parts;  // observed
   PathView<T> path;
   ActorView<T> actor;
+  std::uint32_t hold;    // control periods between its actions
+  std::uint32_t period;  // since the fleet began; counts draws of exploration
+  bool explores;
+  T noise_kept, noise_fresh;        // shares of the last and of a new normal in the noise, from action to action
   std::uint64_t* cycles = nullptr;  // spent in each stage, for a benchmark on one thread
 };
 

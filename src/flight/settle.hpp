@@ -1,4 +1,4 @@
-// Settled flappers: each vehicle is stood up, takes off on the spot and hovers until its controller has learnt its trim.
+// Settled flappers: each vehicle is released in the air and hovers until its controller has learnt its trim.
 #pragma once
 
 #include <functional>

@@ -27,14 +27,21 @@ const std::vector<PartInfo>& part_infos() {
         {"beat_phase", {{"beat_sin", "1", -1, 1}, {"beat_cos", "1", -1, 1}}},
         {"heading_error", {{"heading_sin", "1", -1, 1}, {"heading_cos", "1", -1, 1}}},
         {"previous_action", {}},
-        {"goal_rotation", {}}};
+        {"goal_rotation", {}},
+        {"time", {{"time", "s", 0, 1}}},
+        {"trim", {}}};
     for (const char* row : {"x", "y", "z"})
       for (const char* column : {"x", "y", "z"})
         for (const auto& [part, name] :
              {std::pair{Part::rotation_matrix, "R_"}, std::pair{Part::goal_rotation, "goal_R_"}})
           list[static_cast<std::size_t>(part)].signals.push_back({name + std::string(row) + column, "1", -1, 1});
-    for (const char* input : {"amplitude", "difference", "bias", "split_cycle"})
-      list[6].signals.push_back({std::string("previous_") + input, "1", -1, 1});
+    const char* inputs[kActions] = {"amplitude", "difference", "bias", "split_cycle"};
+    const double trim_high[kActions] = {18, 3, 3.5, 0.15};
+    for (int i = 0; i < kActions; ++i) {
+      list[6].signals.push_back({std::string("previous_") + inputs[i], "1", -1, 1});
+      list[9].signals.push_back(
+          {std::string("trim_") + inputs[i], i < 3 ? "V" : "1", i > 0 ? -trim_high[i] : 0, trim_high[i]});
+    }
     return list;
   }();
   return infos;
@@ -175,6 +182,20 @@ Reward<double> read_reward(const io::Table& table) {
   r.behind = weight("behind_1_m");
   r.behind_m = weight("behind_m");
   r.alive = weight("alive");
+  r.level = weight("level");
+  r.near = weight("near");
+  r.goal = weight("goal");
+  r.arrival = weight("arrival");
+  r.early = weight("early_1_s");
+  const auto per = [&](const char* name) {
+    return 1 / table.number_or(std::string("reward.") + name, kFar, io::positive());
+  };
+  r.near_1_m = per("near_m");
+  r.goal_1_m = per("goal_m");
+  r.goal_s_m = per("goal_m_s");
+  r.goal_s_rad = per("goal_rad_s");
+  r.goal_1_tilt = per("goal_tilt_rad");
+  r.goal_1_heading = per("goal_heading_rad");
   return r;
 }
 
@@ -219,10 +240,16 @@ void read_success(const io::Table& table, Success<double>& s) {
 
 }  // namespace
 
+std::vector<std::pair<std::string, std::vector<Signal>>> Task::observed_parts() const {
+  std::vector<std::pair<std::string, std::vector<Signal>>> list;
+  for (std::size_t i = 0; i < part_infos().size(); ++i)
+    if (parts >> i & 1) list.emplace_back(part_infos()[i].name, part_infos()[i].signals);
+  return list;
+}
+
 std::vector<Signal> Task::observation() const {
   std::vector<Signal> list;
-  for (std::size_t i = 0; i < part_infos().size(); ++i)
-    if (parts >> i & 1) list.insert(list.end(), part_infos()[i].signals.begin(), part_infos()[i].signals.end());
+  for (const auto& [part, signals] : observed_parts()) list.insert(list.end(), signals.begin(), signals.end());
   return list;
 }
 
@@ -283,6 +310,10 @@ Task read_task(const io::Table& table, double tick_s) {
     k.action_low[i] = range[0];
     k.action_high[i] = range[1];
   }
+  const double hold_s = table.number_or("action.hold_s", tick_s, {tick_s, 1});
+  task.hold = static_cast<std::uint32_t>(std::lround(hold_s / tick_s));
+  if (std::abs(hold_s / tick_s - task.hold) > 1e-6)
+    table.fail("action.hold_s", "is no whole number of control periods", "n x " + io::shortest_digits(tick_s) + " s");
   k.reward = read_reward(table);
 
   const auto limit = [&](const char* name, double otherwise) {

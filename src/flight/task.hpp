@@ -14,7 +14,7 @@
 namespace flappy::flight {
 
 inline constexpr int kActions = 4;
-inline constexpr int kMaxObservation = 32;
+inline constexpr int kMaxObservation = 40;  // all parts together
 
 /// A row of the observation or the action, for who reads or exports it.
 struct Signal {
@@ -23,7 +23,8 @@ struct Signal {
 };
 
 /// Parts an observation may have, in the order of their bits. Those of a flapper's state are estimated; goal_rotation is the
-/// attitude seen from the heading of the set point.
+/// attitude seen from the heading of the set point, time runs from the start, and trim is what the controller has learnt to
+/// hold.
 enum class Part {
   rotation_matrix,
   position_error,
@@ -32,7 +33,9 @@ enum class Part {
   beat_phase,
   heading_error,
   previous_action,
-  goal_rotation
+  goal_rotation,
+  time,
+  trim
 };
 
 /// Why an episode ended; bits. A time-out is a truncation, all others are terminations.
@@ -48,11 +51,17 @@ enum Ended : std::uint32_t {
 /// Terms of the reward, as rows are scored each control period on the true state:
 ///   C = |a|^2 action + |a - a_prev|^2 action_change + |p| position + |(roll, pitch, yaw)| angles + |v| velocity + |w| rate
 ///   r = inverse_square / (C^2 + 1e-6) - cost C + facing R'_00 + upright min(0, R'_22) + behind min(0, x + behind_m) + alive
-/// with p, x and R' relative to the set point.
+///       + level R'_22 + near s(|p| / near_m) + goal G
+/// and once, when it is handed back: arrival G + early (at_s - t); with p, x and R' relative to the set point, and
+///   G = s(|p| / goal_m) s(|v| / goal_m_s) s(|w| / goal_rad_s) s(tilt / goal_tilt) s(heading error / goal_heading)
+///   s(x) = 1 / (1 + x^2)
 template <class T>
 struct Reward {
   T action, action_change, position, angles, velocity, body_rate;
   T inverse_square, cost, facing, upright, behind, behind_m, alive;
+  T level, near, near_1_m;
+  T goal, arrival, early;
+  T goal_1_m, goal_s_m, goal_s_rad, goal_1_tilt, goal_1_heading;  // of what G falls off with
 };
 
 /// When an episode ends, positions relative to the set point. Unused limits are far away.
@@ -109,8 +118,11 @@ struct Task {
   StartRange start;
   std::vector<Segment<double>> path;
   std::uint32_t parts = 0;  ///< bit of each Part observed
+  std::uint32_t hold = 1;   ///< control periods for which a policy's action stays
   TaskConstants<double> constants{};
 
+  /// Names of the parts observed, with their signals.
+  std::vector<std::pair<std::string, std::vector<Signal>>> observed_parts() const;
   std::vector<Signal> observation() const;
   std::vector<Signal> action() const;
   /// Where the episode of this key starts.

@@ -111,11 +111,12 @@ void write_curve_csv(const std::filesystem::path& path, const LearningCurve& cur
 
 void write_curve_svg(const std::filesystem::path& path, const LearningCurve& curve, const std::string& score) {
   std::string label;
-  for (const char c : score) label += c == '_' ? ' ' : c;
+  for (const char c : score) label += c == '_' || c == '\'' ? ' ' : c;
   std::string script =
       "set terminal svg size 720,432 dynamic background '#ffffff' font 'sans-serif,14' name 'learning_curve'\n"
       "set encoding utf8\n"
-      "set border 3 lc '#444444'\nset tics nomirror\nset grid ytics lc '#dddddd' lt 1\nset key bottom right\n"
+      "set border 3 lc '#444444'\nset tics nomirror\nset grid ytics lc '#dddddd' lt 1\nset key bottom right\nset "
+      "rmargin 5\n"
       "set xlabel 'update'\nset ylabel '" +
       label + "'\n$rows << end_of_rows\n";
   for (const auto& row : curve.rows) {

@@ -75,12 +75,12 @@ std::array<std::uint64_t, 4> all_kept_bytes(const std::filesystem::path& run, co
 
 }  // namespace
 
-Metrics::Metrics(const std::filesystem::path& run, MetricsColumns columns, std::uint64_t records)
+Metrics::Metrics(const std::filesystem::path& run, const MetricsColumns& columns, std::uint64_t records)
     : Metrics(run, columns, records, all_kept_bytes(run, columns, records)) {}
 
-Metrics::Metrics(const std::filesystem::path& run, MetricsColumns columns, std::uint64_t records,
+Metrics::Metrics(const std::filesystem::path& run, const MetricsColumns& columns, std::uint64_t records,
                  const std::array<std::uint64_t, 4>& kept_bytes)
-    : columns_(std::move(columns)),
+    : columns_(columns),
       records_(records),
       jsonl_(run / kFiles[0], kept_bytes[0]),
       csv_(run / kFiles[1], kept_bytes[1]),

@@ -26,7 +26,7 @@ class Metrics {
  public:
   /// Starts the files anew, or goes on after the first `records` records, as sync() counted them for a checkpoint;
   /// what was written after them is cut off. InputError when a file holds fewer, or the columns are others.
-  Metrics(const std::filesystem::path& run, MetricsColumns columns, std::uint64_t records = 0);
+  Metrics(const std::filesystem::path& run, const MetricsColumns& columns, std::uint64_t records = 0);
 
   /// One value for each column; NaN and infinity stand for "not available" (null, an empty cell, no event).
   /// On the way to the disk when it returns: a killed program loses nothing.
@@ -36,7 +36,7 @@ class Metrics {
   std::uint64_t sync();
 
  private:
-  Metrics(const std::filesystem::path& run, MetricsColumns columns, std::uint64_t records,
+  Metrics(const std::filesystem::path& run, const MetricsColumns& columns, std::uint64_t records,
           const std::array<std::uint64_t, 4>& kept_bytes);
 
   MetricsColumns columns_;

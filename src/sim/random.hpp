@@ -21,6 +21,10 @@ enum class Stream : std::uint32_t {
   start_estimate = 7,
   power = 8,
   wings = 9,
+  weights = 10,
+  replay = 11,
+  target_noise = 12,
+  snapshot = 13,
 };
 
 struct RandomKey {

@@ -150,6 +150,60 @@ TEST(Actor, ActsInAFleetOnWhatItObserves) {
   }
 }
 
+TEST(Actor, HoldsItsActionAndGathersWhatItEarns) {
+  FleetOptions o = hovering();
+  o.task.hold = 3;
+  const auto actor = std::make_shared<Actor>(fitting(o.task));
+  Fleet<double> fleet(2, test::nominal(), o);
+  fleet.set_actor(actor);
+  std::vector<double> acted;
+  double gained = 0;
+  for (std::uint32_t tick = 0; tick < 20; ++tick) {
+    if (tick == 7) fleet.start(1, 1);  // whose actions are then out of step with the other's
+    if (tick % 3 == 0) acted = expected(*actor, fleet.observation(0)), gained = 0;
+    fleet.step();
+    gained += fleet.reward(0);
+    for (std::size_t k = 0; k < kActions; ++k) ASSERT_NEAR(fleet.action(0)[k], acted[k], 1e-12) << tick;
+    ASSERT_NEAR(fleet.gain(0), gained, 1e-12) << tick;
+    ASSERT_EQ(fleet.tick(1), tick < 7 ? tick + 1 : tick - 6);
+  }
+}
+
+TEST(Actor, ExploresWithNoiseOfItsDeviationAndMemory) {
+  FleetOptions o = hovering();
+  o.task.hold = 2;
+  Actor quiet = fitting(o.task);
+  for (double& w : quiet.weights) w = 0;
+  const std::size_t n = 256;
+  const int steps = 40;
+  Fleet<float> fleet(n, test::nominal(), o);
+  fleet.set_actor(std::make_shared<Actor>(quiet));
+  fleet.set_exploration({0.05, 0.15, 0.6});
+  std::vector<std::array<float, kActions>> last(n);
+  double low = 0, high = 0, with_last = 0, of_two = 0;
+  const double burn_in = 15;  // 0.6^15 of the start, which is at rest, is left
+  for (int step = 0; step < steps; ++step) {
+    fleet.step(), fleet.step();
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto a = fleet.action(i);
+      for (std::size_t k = 0; k < kActions && step >= burn_in; ++k) {
+        (i < n / 2 ? low : high) += a[k] * a[k];
+        const double deviation = 0.05 + 0.1 * static_cast<double>(i) / (n - 1);
+        with_last += a[k] * last[i][k] / (deviation * deviation), of_two += 1;
+      }
+      last[i] = a;
+    }
+  }
+  // Means of sigma^2 over each half of a line; 12,800 samples a half, of which (1 - 0.36)/(1 + 0.36) are independent: 1.8 %
+  const auto half = [](double from, double to) { return (from * from + from * to + to * to) / 3; };
+  EXPECT_NEAR(low / (of_two / 2) / half(0.05, 0.1), 1, 0.08);
+  EXPECT_NEAR(high / (of_two / 2) / half(0.1, 0.15), 1, 0.08);
+  EXPECT_NEAR(with_last / of_two, 0.6, 0.05);
+  fleet.set_exploration({});
+  fleet.step(), fleet.step();
+  EXPECT_EQ(fleet.action(3)[1], 0);
+}
+
 TEST(Actor, MustFitItsTask) {
   const FleetOptions o = hovering();
   Fleet<float> fleet(1, test::nominal(), o);

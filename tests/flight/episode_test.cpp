@@ -49,7 +49,7 @@ TEST(Reward, IsItsFormula) {
   for (int i = 0; i < 300; ++i) {
     const Sample s = random_sample(engine);
     Reward<double> k{};
-    for (double* w = &k.action; w <= &k.alive; ++w) *w = weight(engine);
+    for (double* w = &k.action; w <= &k.near_1_m; ++w) *w = weight(engine);
     if (i % 3 == 0)
       k.action = k.action_change = k.position = k.angles = k.velocity = k.body_rate = 0;  // C = 0: 1/1e-6 is the most
     const Eigen::Matrix3d& R = s.relative;
@@ -68,7 +68,8 @@ TEST(Reward, IsItsFormula) {
                      std::sqrt(vx * vx + vy * vy + vz * vz) * k.velocity +
                      std::sqrt(w.x * w.x + w.y * w.y + w.z * w.z) * k.body_rate;
     const double expected = k.inverse_square / (c * c + 1e-6) - k.cost * c + k.facing * R(0, 0) +
-                            k.upright * std::min(0.0, R(2, 2)) + k.behind * std::min(0.0, dx + k.behind_m) + k.alive;
+                            k.upright * std::min(0.0, R(2, 2)) + k.behind * std::min(0.0, dx + k.behind_m) + k.alive +
+                            k.level * R(2, 2) + k.near / (1 + std::pow(k.near_1_m, 2) * (dx * dx + dy * dy + dz * dz));
     const Score<double> score = score_of(s.truth, s.ref);
     EXPECT_NEAR(score.roll_rad, roll, 1e-12);
     EXPECT_NEAR(score.pitch_rad, pitch, 1e-9);  // asin near its end
@@ -78,6 +79,25 @@ TEST(Reward, IsItsFormula) {
     // a difference of 1e-12 in C, where the terms cancel to a small one, comes out 1e12 x larger in 1/(C^2 + 1e-6) at most
     EXPECT_NEAR(reward_of(k, score, s.truth, s.episode), expected,
                 1e-9 * (1 + std::abs(expected)) + 1e-12 * std::abs(2 * c) / std::pow(c * c + 1e-6, 2));
+  }
+}
+
+TEST(Reward, ClosenessFallsOffWithEveryError) {
+  std::mt19937 engine(3);
+  std::uniform_real_distribution<double> weight(0.1, 3);
+  for (int i = 0; i < 300; ++i) {
+    const Sample s = random_sample(engine);
+    Reward<double> k{};
+    for (double* w = &k.goal_1_m; w <= &k.goal_1_heading; ++w) *w = weight(engine);
+    const Score<double> score = score_of(s.truth, s.ref);
+    const Eigen::Matrix3d& R = s.relative;
+    const auto norm = [](const V& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); };
+    const double errors[] = {k.goal_1_m * norm(score.position_m), k.goal_s_m * norm(score.velocity_m_s),
+                             k.goal_s_rad * norm(s.truth.body_rate_rad_s), k.goal_1_tilt * std::acos(R(2, 2)),
+                             k.goal_1_heading * std::atan2(R(1, 0), R(0, 0))};
+    double expected = 1;
+    for (const double x : errors) expected /= 1 + x * x;
+    EXPECT_NEAR(closeness(k, score, s.truth), expected, 1e-10 * expected);  // acos near its ends
   }
 }
 

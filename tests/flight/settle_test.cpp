@@ -40,6 +40,7 @@ void goes_on(const std::string& name) {
   for (std::size_t i = 0; i < kCount; ++i) fleet.start(i, 1, pool[(i + 7) % kCount]);
   for (std::size_t i = 0; i < kCount; ++i) {
     EXPECT_EQ(fleet.batch().status(i), 0u);
+    EXPECT_EQ(fleet.batch().support(i), sim::Start::flying);
     EXPECT_LT(far_off_m(fleet.truth(i), fleet.target(i)), 0.03) << i;
   }
   // A fresh flight at rest falls 0.1 m before its controller has learnt its trim; a settled one goes on as it was.
@@ -100,7 +101,68 @@ TEST(Trim, IsAllThatActsUntilHandedBack) {
     }
   }
   EXPECT_NE(fleet.input(0).bias_V, first.bias_V);
-  EXPECT_NEAR(first.amplitude_V, 9.8, 0.6);  // what carries the vehicle
+  double mean = 0;
+  for (int tick = 0; tick < 500; ++tick) fleet.step(), mean += fleet.input(0).amplitude_V / 500;
+  EXPECT_NEAR(first.amplitude_V, mean, 0.05);  // what carries the vehicle, but for how it bobs: 5 mm x 10 V/m
+  EXPECT_GT(mean, 10.5);                       // and more than what the controller takes off with
+}
+
+/// What arriving pays, what the time left pays, and the trim and time that a policy may observe.
+TEST(HandBack, PaysOnceForWhereItIsAndWhenItComes) {
+  std::string text = holding(0, 0);
+  text.insert(text.find("[start]"), "base = \"trim\"\n");
+  text.replace(text.find("\"beat_phase\""), 12, "\"time\", \"trim\"");
+  text.replace(text.find("alive = 1.0\nposition_1_m = 2.0"), 30,
+               "arrival = 40.0\nearly_1_s = 7.0\ngoal = 2.0\ngoal_m = 0.06\ngoal_m_s = 0.6\ngoal_rad_s = "
+               "10.0\ngoal_tilt_rad = 0.5\ngoal_heading_rad = 0.8");
+  text += "[hand_back]\non = \"estimate\"\nat_s = 0.1\ndistance_m = 0.05\n";
+  FleetOptions o = fleet_options(sensors("paper"), controller("arc"), task(text));
+  const auto vehicle = [](std::uint32_t) { return test::identified(); };
+  const auto pool = settle<double>(o, 1, 3, vehicle);
+  Fleet<double> fleet(1, test::identified(), o);
+  fleet.start(0, 0, pool[0]);
+  const auto observed = fleet.observation(0);  // position error, time, trim
+  EXPECT_EQ(observed[3], 0);
+  fleet.step();
+  EXPECT_TRUE(fleet.handed_back(0));  // at the goal from the start
+  EXPECT_NEAR(fleet.observation(0)[3], 0.002, 1e-15);
+  const sim::Input u = fleet.input(0);  // of which the trim is all, until then
+  EXPECT_NEAR(observed[4], u.amplitude_V, 1e-9);
+  EXPECT_NEAR(observed[5], u.difference_V, 1e-9);
+  EXPECT_NEAR(observed[6], u.bias_V, 1e-9);
+  EXPECT_NEAR(observed[7], u.split_cycle, 1e-9);
+  std::vector<double> as_true(8);
+  fleet.true_observation(0, as_true.data());
+  EXPECT_EQ(as_true[0], fleet.truth(0).position_m[0] - fleet.target(0).position_m[0]);
+  const double first = fleet.reward(0);
+  fleet.step();
+  const double then = fleet.reward(0);  // 2 G alone
+  EXPECT_GT(then, 0.5);
+  EXPECT_LT(then, 2);
+  // at_s counts to the middle of its last period; G moves by some per cent within a period of the beat
+  EXPECT_NEAR(first - 7 * (0.099 - 0.002), 42 / 2 * then, 0.1 * 21 * then);
+}
+
+TEST(Fleet, FliesOnFromItsMemory) {
+  const sim::Randomisation vehicles = randomisation();
+  const auto vehicle = [&](std::uint32_t flapper) { return vehicles.sample({.seed = 4, .flapper = flapper}); };
+  const FleetOptions o = fleet_options(sensors("code"), controller("pid"), task(holding(0.1, 0)));
+  const auto pool = settle<float>(o, 20, 0.5, vehicle);
+  Fleet<float> one(20, vehicle(0), o), other(20, vehicle(0), o);
+  for (std::size_t i = 0; i < 20; ++i) one.start(i, 0, pool[i]);
+  for (int i = 0; i < 33; ++i) one.step();
+  const auto from = one.memory(), to = other.memory();
+  ASSERT_EQ(from.size(), to.size());
+  for (std::size_t k = 0; k < from.size(); ++k) std::copy(from[k].begin(), from[k].end(), to[k].begin());
+  other.restored(one.periods());
+  for (int i = 0; i < 35; ++i) one.step();
+  for (int group = 0; group < 7; ++group) {  // in parts, blocks last first
+    other.begin(5);
+    for (std::size_t b = other.blocks(); b-- > 0;) other.fly_block(b);
+    other.end();
+  }
+  EXPECT_EQ(one.hash(), other.hash());
+  EXPECT_EQ(other.periods(), 68);
 }
 
 TEST(Success, NotesCaptureAndLossOnTheTrueState) {

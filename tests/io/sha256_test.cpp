@@ -13,5 +13,11 @@ TEST(Sha256, AgreesWithTheStandard) {
   EXPECT_NE(sha256(std::string("a\0b", 3)), sha256(std::string("a\0c", 3)));
 }
 
+TEST(Sha256, TakesPieces) {
+  Sha256 hash;
+  for (const char* piece : {"a", "", "bc"}) hash.add(piece);
+  EXPECT_EQ(hash.digits(), sha256("abc"));
+}
+
 }  // namespace
 }  // namespace flappy::io

@@ -79,6 +79,17 @@ foreach(row RANGE 23)
   endif()
 endforeach()
 
+# ---- the learner's
+
+run(--rounds 1 --seconds 0.01 --no-peers learner --json ${WORK}/learner.json)
+expect_equal("exit code" "${code}" 0)
+expect_keys(${WORK}/learner.json learner=ARRAY peak_multiply_adds_per_s=NUMBER instruction_set=STRING)
+file(READ ${WORK}/learner.json json)
+string(JSON rate GET "${json}" learner 1 updates_per_s)
+if(NOT rate GREATER 0)
+  message(SEND_ERROR "the learner does ${rate} updates/s")
+endif()
+
 run(--version)
 expect_equal("exit code" "${code}" 0)
 foreach(line IN ITEMS "^flappy-bench [0-9]+\\.[0-9]+\\.[0-9]+\n" "\ncommit ([0-9a-f]+(-dirty)?|unknown)\n" "\ninstruction set ${set}\n"

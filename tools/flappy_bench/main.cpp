@@ -1,6 +1,4 @@
-// flappy-bench: speed beside DART and MuJoCo, accuracy against step size, and a batch to look at.
-#include <unistd.h>
-
+// flappy-bench: speed beside DART, MuJoCo and LibTorch, accuracy against step size, and a batch to look at.
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -11,12 +9,17 @@
 #include "flappy/vehicle_file.hpp"
 #include "hover.hpp"
 #include "io/program.hpp"
+#include "io/progress.hpp"
+#include "learner.hpp"
 #include "roof.hpp"
 #include "speed.hpp"
 #ifdef FLAPPY_HAVE_PEERS
 #include <mujoco/mujoco.h>
 
 #include <dart/config.hpp>
+#endif
+#ifdef FLAPPY_HAVE_TORCH
+#include "torch_peer.hpp"
 #endif
 
 namespace flappy::bench {
@@ -30,16 +33,17 @@ std::vector<std::string> facts() {
   list.push_back(std::string("MuJoCo ") + mj_versionString());
   list.push_back("DART " DART_VERSION);
 #endif
+#ifdef FLAPPY_HAVE_TORCH
+  list.push_back("LibTorch " + oracle::TorchLearner::version());
+#endif
   return list;
 }
 
-void show_progress(int done, int total) {
-  if (!isatty(STDERR_FILENO)) return;
-  std::fprintf(stderr, "\rround %d of %d%s", done, total, done == total ? "\r                    \r" : "");
-}
-
 Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
-  const SpeedReport report = measure_speed(vehicle, options, show_progress);
+  io::ProgressLine progress("measured");
+  const SpeedReport report =
+      measure_speed(vehicle, options, [&](int done, int total) { progress.show(static_cast<double>(done) / total); });
+  progress.clear();
   const double best = *report.median("float");
   std::printf("one core, median of %d [range], whole step, %s\n", options.rounds, sim::best_instruction_set().c_str());
   std::printf("  %-20s %12s %20s %14s\n", "", "M steps/s", "", "float is x");
@@ -124,13 +128,47 @@ Json convergence(const model::Vehicle& vehicle) {
   return {{"steps", steps}, {"integrators", integrators}};
 }
 
+Json learner(const SpeedOptions& options) {
+  const std::vector<LearnerRow> rows = measure_learner(options, show_progress);
+  const double peak = peak_multiply_adds_per_s();
+  std::printf("updates/s, actor 32-32, one core, median of %d [range], %s\n", options.rounds,
+              sim::best_instruction_set().c_str());
+  std::printf("  %-24s %10s %22s %8s %10s %10s %12s\n", "", "", "", "of peak", "LibTorch", "we are x", "two threads");
+  Json list = Json::array();
+  for (const LearnerRow& r : rows) {
+    const double share = r.multiply_adds * r.updates_per_s.median / peak;
+    std::printf("  %-24s %10.0f  [%8.0f .. %8.0f] %6.0f %%", r.name.c_str(), r.updates_per_s.median,
+                r.updates_per_s.low, r.updates_per_s.high, 100 * share);
+    if (r.torch_per_s) std::printf(" %10.0f %10.1f", r.torch_per_s->median, r.times_torch->median);
+    else std::printf(" %10s %10s", "-", "-");
+    std::printf(" %10.2f x\n", r.two_thread_scaling.median);
+    list.push_back({{"name", r.name},
+                    {"batch", r.options.batch},
+                    {"multiply_adds", r.multiply_adds},
+                    {"updates_per_s", r.updates_per_s.median},
+                    {"updates_per_s_low", r.updates_per_s.low},
+                    {"updates_per_s_high", r.updates_per_s.high},
+                    {"share_of_peak", share},
+                    {"torch_updates_per_s", r.torch_per_s ? Json(r.torch_per_s->median) : Json(nullptr)},
+                    {"times_torch", r.times_torch ? Json(r.times_torch->median) : Json(nullptr)},
+                    {"two_thread_scaling", r.two_thread_scaling.median}});
+  }
+  std::printf("this core does %.0f G multiply-adds/s\n", peak / 1e9);
+#ifdef FLAPPY_HAVE_TORCH
+  if (options.peers) std::printf("LibTorch %s\n", oracle::TorchLearner::version().c_str());
+#endif
+  return {{"learner", list}, {"peak_multiply_adds_per_s", peak}, {"instruction_set", sim::best_instruction_set()}};
+}
+
 }  // namespace
 }  // namespace flappy::bench
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  io::Program program("flappy-bench", "Speed and accuracy of the simulator, side by side with DART and MuJoCo.",
-                      bench::facts());
+  io::Program program(
+      "flappy-bench",
+      "Speed and accuracy of the simulator and the learner, side by side with DART, MuJoCo and LibTorch.",
+      bench::facts());
   CLI::App& app = program.app();
   std::string vehicle = FLAPPY_CONFIGS "/vehicles/hummingbird_nominal.toml";
   bench::SpeedOptions options;
@@ -141,9 +179,10 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", options.seconds, "of each measurement")
       ->check(CLI::Range(0.01, 60.0))
       ->capture_default_str();
-  app.add_flag("!--no-peers", options.peers, "leave DART and MuJoCo out");
+  app.add_flag("!--no-peers", options.peers, "leave DART, MuJoCo and LibTorch out");
   CLI::App* convergence =
       app.add_subcommand("convergence", "error against step size, and against work for other integrators");
+  CLI::App* learner = app.add_subcommand("learner", "updates per second of the learner, beside LibTorch");
   CLI::App* batch = app.add_subcommand("batch", "fly a batch at one input and summarise it");
   std::string config;
   std::vector<std::string> overrides;
@@ -153,6 +192,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(0, 1);
   return program.run(argc, argv, [&] {
     if (*batch) return program.write_json(bench::fly_batch(config, overrides));
+    if (*learner) return program.write_json(bench::learner(options));
     const model::Vehicle v = model::read_vehicle(vehicle);
     program.write_json(*convergence ? bench::convergence(v) : bench::speed(v, options));
   });

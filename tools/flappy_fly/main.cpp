@@ -1,9 +1,5 @@
 // flappy-fly: flies a configuration, once or many times over, and says how far off it was; writes flight logs.
-#include <unistd.h>
-
-#include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -11,40 +7,13 @@
 
 #include "flight/fly.hpp"
 #include "io/program.hpp"
+#include "io/progress.hpp"
 
 namespace flappy::fly {
 namespace {
 
 using Json = nlohmann::ordered_json;
 using namespace flight;
-
-volatile std::sig_atomic_t interrupted = 0;
-
-/// The first Ctrl-C ends the flights, the second the program.
-void stop_on_interrupt() {
-  struct sigaction action {};
-  action.sa_handler = [](int) { interrupted = 1; };
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
-
-class ProgressLine {
- public:
-  void show(double done) {
-    const auto now = std::chrono::steady_clock::now();
-    if (!terminal_ || now - shown_ < std::chrono::milliseconds(200)) return;
-    shown_ = now;
-    std::fprintf(stderr, "\rflown %3.0f %%", 100 * done);
-  }
-  void clear() const {
-    if (terminal_) std::fprintf(stderr, "\r            \r");
-  }
-
- private:
-  bool terminal_ = isatty(STDERR_FILENO) != 0;
-  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
-};
 
 constexpr const char* kAxes[6] = {"roll", "pitch", "yaw", "x", "y", "z"};
 constexpr const char* kEnds[6] = {"time_out", "contact", "not_finite", "out_of_bounds", "heading_late", "arrival_late"};
@@ -196,12 +165,12 @@ int main(int argc, char** argv) {
     if (*seeded) overrides.push_back("flight.seed=" + std::to_string(seed));
     const flight::FlyConfig config = flight::read_fly_config(config_name, overrides);
     options.log_folder = log;
-    fly::ProgressLine progress;
+    io::ProgressLine progress("flown");
     options.keep_going = [&](double done) {
       progress.show(done);
-      return fly::interrupted == 0;
+      return !io::interrupted();
     };
-    fly::stop_on_interrupt();
+    io::stop_on_interrupt();
     const flight::FlyResult result = flight::fly(config, options);
     progress.clear();
     fly::print(config, options, result);

@@ -1,15 +1,13 @@
 // flappy-tune: finds better gains for a controller on many flights at once, and writes its file.
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "flight/tune.hpp"
 #include "io/program.hpp"
+#include "io/progress.hpp"
 
 namespace {
-
-volatile std::sig_atomic_t interrupted = 0;
 
 std::string controller_text(flappy::flight::Controller c, const std::string& origin) {
   std::string text = "# " + origin + "\nschema = 1\nkind = \"" +
@@ -35,7 +33,7 @@ int main(int argc, char** argv) {
   return program.run(argc, argv, [&] {
     const flight::TuneConfig config = flight::read_tune_config(config_name, overrides);
     const auto start = std::chrono::steady_clock::now();
-    std::signal(SIGINT, [](int) { interrupted = 1; });
+    io::stop_on_interrupt();
     const double before = flight::cost_of(config, config.start);
     std::printf("start: cost %.4f\n", before);
     unsigned generation = 0;
@@ -45,7 +43,7 @@ int main(int argc, char** argv) {
       std::fflush(stdout);
       io::write_atomically(
           out, controller_text(r.best, "Tuned by flappy-tune, generation " + std::to_string(r.generations) + "."));
-      return interrupted == 0;
+      return !io::interrupted();
     });
     program.write_json({{"start_cost", before}, {"cost", result.cost}, {"generations", generation}});
   });

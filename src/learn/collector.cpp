@@ -1,0 +1,182 @@
+#include "learn/collector.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "flight/settle.hpp"
+
+namespace flappy::learn {
+namespace {
+
+constexpr double kSettle_s = 3;  // of hover before an episode that starts settled
+
+flight::FlyConfig of_training(const TrainConfig& config) {
+  flight::FlyConfig fly = config.fly;
+  fly.fleet.seed = config.seed;
+  fly.fleet.first_flapper = 0;
+  fly.fleet.batch.threads = config.threads;
+  return fly;
+}
+
+}  // namespace
+
+Collector::Collector(const TrainConfig& config)
+    : config_(config),
+      fly_(of_training(config)),
+      fleet_(config.flappers, fly_.vehicle, fly_.fleet),
+      inputs_(fly_.fleet.task.observation().size()),
+      kept_(config.return_steps),
+      pending_(config.flappers),
+      observations_(config.flappers * kept_ * inputs_),
+      actions_(config.flappers * kept_ * flight::kActions),
+      gains_(config.flappers * kept_),
+      staged_(fleet_.blocks()),
+      seconds_(fleet_.blocks()) {
+  if (fly_.fleet.task.start.settled)
+    pool_ = flight::settle<float>(fly_.fleet, config.vehicles, kSettle_s,
+                                  [&](std::uint32_t flapper) { return fly_.vehicle_of(flapper); });
+  fleet_.set_exploration(config.exploration);
+  for (std::size_t i = 0; i < fleet_.size(); ++i) start(i);
+}
+
+/// The next episode of a flapper: from a snapshot drawn for it, or with a vehicle of its own.
+void Collector::start(std::size_t i) {
+  Pending& p = pending_[i];
+  ++p.episode;
+  const auto flapper = static_cast<std::uint32_t>(i);
+  if (!pool_.empty()) {
+    const double place = sim::uniform_pair({config_.seed, flapper, p.episode, sim::Stream::snapshot}, 0).first;
+    fleet_.start(i, p.episode, pool_[static_cast<std::size_t>(place * static_cast<double>(pool_.size()))]);
+  } else {
+    if (fly_.randomisation)
+      fleet_.set_vehicle(i, fly_.randomisation->sample({config_.seed, flapper, p.episode, sim::Stream::vehicle}));
+    fleet_.start(i, p.episode);
+  }
+  p.count = 0;
+  p.gain = 0;
+  fleet_.observation(i, observation(i, 0));
+}
+
+void Collector::begin(const std::shared_ptr<const flight::Actor>& actor) {
+  fleet_.set_actor(actor);
+  fleet_.begin(static_cast<int>(fly_.fleet.task.hold));
+}
+
+void Collector::run(std::size_t item) {
+  const auto from = std::chrono::steady_clock::now();
+  fleet_.fly_block(item);
+  staged_[item].clear();
+  const auto [first, last] = fleet_.flappers(item);
+  for (std::size_t i = first; i < last; ++i) gather(i, item);
+  seconds_[item] += std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count();
+}
+
+/// What the last action of a flapper led to.
+void Collector::gather(std::size_t i, std::size_t item) {
+  Pending& p = pending_[i];
+  const auto action = fleet_.action(i);
+  std::copy(action.begin(), action.end(), &actions_[(i * kept_ + p.count) * flight::kActions]);
+  gains_[i * kept_ + p.count] = static_cast<float>(config_.reward_scale) * fleet_.gain(i);
+  p.gain += gains_[i * kept_ + p.count];
+  ++p.count;
+
+  float next[flight::kMaxObservation];
+  fleet_.observation(i, next);
+  const std::uint32_t ended = fleet_.ended(i);
+  const bool handed_back = fleet_.handed_back(i);
+  const bool terminated = handed_back || (ended & ~std::uint32_t{flight::kTimeOut}) != 0;
+  if (terminated || ended != 0) {
+    while (p.count > 0) emit(i, item, next, terminated);
+    ++p.episodes;
+    p.sums.episodes += 1;
+    p.sums.gain += p.gain;
+    p.sums.captured += fleet_.captured_s(i) > 0;
+    p.sums.handed_back += handed_back;
+    p.sums.terminated += terminated && !handed_back;
+    start(i);
+    return;
+  }
+  if (p.count == kept_) emit(i, item, next, false);
+  std::copy_n(next, inputs_, observation(i, p.count));
+}
+
+/// Tells of the oldest action that is pending: its return over all that are, then the value of what is seen now.
+void Collector::emit(std::size_t i, std::size_t item, const float* next, bool terminated) {
+  Pending& p = pending_[i];
+  const auto discount = static_cast<float>(config_.discount);
+  float* action = &actions_[i * kept_ * flight::kActions];
+  float* gain = &gains_[i * kept_];
+  float sum = 0, weight = 1;
+  for (std::uint32_t k = 0; k < p.count; ++k) {
+    sum += weight * gain[k];
+    weight *= discount;
+  }
+  std::vector<float>& to = staged_[item];
+  to.insert(to.end(), observation(i, 0), observation(i, 1));
+  to.insert(to.end(), action, action + flight::kActions);
+  to.push_back(sum);
+  to.push_back(terminated ? 0 : weight);
+  to.insert(to.end(), next, next + inputs_);
+  --p.count;
+  std::copy_n(observation(i, 1), p.count * inputs_, observation(i, 0));
+  std::copy_n(action + flight::kActions, p.count * flight::kActions, action);
+  std::copy_n(gain + 1, p.count, gain);
+}
+
+void Collector::end(Replay& replay) {
+  fleet_.end();
+  const TransitionLayout& at = replay.layout();
+  for (const std::vector<float>& rows : staged_)
+    for (const float* row = rows.data(); row != rows.data() + rows.size(); row += at.row)
+      replay.add({row + at.actor_observation, nullptr, row + at.action, row + at.next_actor_observation, nullptr,
+                  row[at.reward], row[at.discount]});
+}
+
+EpisodeSums Collector::take_sums() {
+  EpisodeSums all;
+  for (Pending& p : pending_) {
+    const EpisodeSums s = std::exchange(p.sums, {});
+    all.episodes += s.episodes, all.gain += s.gain, all.captured += s.captured;
+    all.handed_back += s.handed_back, all.terminated += s.terminated;
+  }
+  return all;
+}
+
+std::uint64_t Collector::episodes() const {
+  std::uint64_t sum = 0;
+  for (const Pending& p : pending_) sum += p.episodes;
+  return sum;
+}
+
+std::uint64_t Collector::env_steps() const { return static_cast<std::uint64_t>(fleet_.periods()) * fleet_.size(); }
+
+double Collector::seconds() const {
+  double sum = 0;
+  for (const double s : seconds_) sum += s;
+  return sum;
+}
+
+void Collector::save(CheckpointWriter& to) {
+  std::size_t k = 0;
+  for (const std::span<std::byte> bytes : fleet_.memory()) to.put_bytes("fleet_" + std::to_string(k++), bytes);
+  to.put("periods", fleet_.periods());
+  to.put_bytes("pending", std::as_bytes(std::span(pending_)));
+  to.put("pending_observations", observations_);
+  to.put("pending_actions", actions_);
+  to.put("pending_gains", gains_);
+}
+
+void Collector::restore(const Checkpoint& from) {
+  std::size_t k = 0;
+  for (const std::span<std::byte> bytes : fleet_.memory()) from.get_bytes("fleet_" + std::to_string(k++), bytes);
+  std::int64_t periods = 0;
+  from.get("periods", periods);
+  fleet_.restored(periods);
+  from.get_bytes("pending", std::as_writable_bytes(std::span(pending_)));
+  from.get("pending_observations", observations_);
+  from.get("pending_actions", actions_);
+  from.get("pending_gains", gains_);
+}
+
+}  // namespace flappy::learn

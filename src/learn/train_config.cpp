@@ -1,0 +1,172 @@
+#include "learn/train_config.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/sha256.hpp"
+#include "io/toml_writer.hpp"
+
+namespace flappy::learn {
+namespace {
+
+using Overrides = std::vector<std::string>;
+
+/// What a training configuration says itself; overrides of other keys go to what it flies.
+const Overrides kOwn = {"schema",  "fly",    "seed",  "threads",  "observation", "networks",
+                        "collect", "reward", "learn", "evaluate", "checkpoint"};
+
+std::pair<Overrides, Overrides> routed(const Overrides& overrides) {
+  std::pair<Overrides, Overrides> own_and_flown;
+  for (const std::string& text : overrides) {
+    const std::size_t begin = std::min(text.find_first_not_of(" \t"), text.size());
+    const std::string first = text.substr(begin, text.find_first_of(".= \t", begin) - begin);
+    (std::ranges::count(kOwn, first) > 0 ? own_and_flown.first : own_and_flown.second).push_back(text);
+  }
+  return own_and_flown;
+}
+
+std::vector<int> widths(const io::Table& t, const char* key) {
+  std::vector<int> list;
+  for (const double width : t.numbers(key, {1, flight::kMaxWidth})) {
+    if (width != std::floor(width)) t.fail(key, "is no list of whole numbers", "[32, 32]");
+    list.push_back(static_cast<int>(width));
+  }
+  if (list.empty() || list.size() >= flight::kMaxLayers)
+    t.fail(key, "is no list of hidden layers", "1 to " + std::to_string(flight::kMaxLayers - 1) + " widths");
+  return list;
+}
+
+class Reader {
+ public:
+  Reader(const std::filesystem::path& path, const Overrides& own, const Overrides& flown)
+      : main_(io::Config::load(path, own)), root_(main_.root()) {
+    root_.integer("schema", 1, 1);
+    c_.fly = flight::read_fly_config(root_.file("fly"), flown);
+  }
+
+  TrainConfig read() {
+    c_.seed = static_cast<std::uint64_t>(root_.integer_or("seed", 0, 0, INT32_MAX));
+    c_.threads = static_cast<int>(root_.integer_or("threads", 0, 0, 1024));
+    if (c_.threads == 0) c_.threads = omp_get_num_procs();
+    if (c_.fly.precision != "float") root_.fail("fly", "flies in double", "precision = \"float\"");
+    if (c_.fly.fleet.task.constants.success.by_s <= 0)
+      root_.fail("fly", "has a task that says no success", "a task with [success.capture] and [success.keep]");
+    if (c_.fly.welded) root_.fail("fly", "holds its vehicle on a stand", "flight.support = \"task\"");
+    if (!c_.fly.vehicle.effects.empty() && c_.fly.fleet.task.start.settled)
+      root_.fail("fly", "starts settled with a vehicle that has effects", "a vehicle without effects");
+    read_networks();
+    read_collection();
+    read_learning();
+    root_.finish();
+    c_.fly.fleet.batch.threads = c_.threads;
+    c_.learner.seed = c_.seed;
+    c_.learner.threads = c_.threads;
+    keep_texts();
+    return std::move(c_);
+  }
+
+ private:
+  void read_networks() {
+    LearnerOptions& l = c_.learner;
+    const io::Table t = root_.table("networks");
+    l.actor_hidden = widths(t, "actor");
+    l.critic_hidden = widths(t, "critic");
+    const bool relu = t.choice("activation", {"relu", "tanh"}) == "relu";
+    l.actor_activation = l.critic_activation = relu ? flight::Activation::relu : flight::Activation::tanh;
+    l.last_layer_scale = t.number_or("last_layer_scale", 0.1, {0, 1});
+
+    std::vector<std::string> parts;
+    const auto scales = root_.optional_table("observation");
+    for (const auto& [part, signals] : c_.fly.fleet.task.observed_parts()) {
+      parts.push_back(part);
+      std::vector<double> given;
+      if (scales && scales->has(part)) given = scales->numbers(part, signals.size(), io::positive(1e6));
+      for (std::size_t i = 0; i < signals.size(); ++i) {
+        l.actor_input.mean.push_back((signals[i].low + signals[i].high) / 2);
+        l.actor_input.scale.push_back(given.empty() ? 2 / (signals[i].high - signals[i].low) : given[i]);
+      }
+    }
+    l.shape = {static_cast<int>(l.actor_input.mean.size()), 0, flight::kActions};
+  }
+
+  void read_collection() {
+    const io::Table t = root_.table("collect");
+    c_.flappers = static_cast<std::size_t>(t.integer("flappers", 1, 1 << 20));
+    c_.vehicles = static_cast<std::size_t>(t.integer_or("vehicles", 1024, 1, 1 << 20));
+    c_.steps_before = static_cast<std::size_t>(t.integer_or("steps_before", 20, 1, 1'000'000));
+    c_.exploration = {t.number("noise_low", {0, 10}), t.number("noise_high", {0, 10}),
+                      t.number("noise_kept", {0, 0.999})};
+    const io::Table r = root_.table("reward");
+    c_.reward_scale = r.number("scale", io::positive(1e6));
+    c_.discount = r.number("discount", {0, 1});
+    c_.return_steps = static_cast<std::size_t>(r.integer("steps", 1, 100));
+  }
+
+  void read_learning() {
+    LearnerOptions& l = c_.learner;
+    const io::Table t = root_.table("learn");
+    c_.updates_per_step = static_cast<std::uint64_t>(t.integer("updates_per_step", 1, 10000));
+    const auto whole_steps = [&](const io::Table& from, const char* key) {
+      const auto n = static_cast<std::uint64_t>(from.integer(key, 1, 1'000'000'000));
+      return (n + c_.updates_per_step - 1) / c_.updates_per_step * c_.updates_per_step;
+    };
+    c_.updates = whole_steps(t, "updates");
+    l.batch = static_cast<std::size_t>(t.integer("batch", kChunk, 1 << 20));
+    if (l.batch % kChunk != 0) t.fail("batch", "is no multiple of " + std::to_string(kChunk), "n x 64");
+    c_.actor_rate = t.number("actor_rate", io::positive(1));
+    c_.critic_rate = t.number("critic_rate", io::positive(1));
+    c_.last_rate = t.number_or("last_rate", 1, {0, 1});
+    c_.policy_averaging = t.number_or("policy_averaging", 1, io::positive(1));
+    l.tau = t.number("averaging", io::positive(1));
+    l.twin = t.boolean("twin");
+    l.policy_delay = static_cast<int>(t.integer("policy_delay", 1, 1000));
+    l.noise_sd = t.number("target_noise", {0, 10});
+    l.noise_clip = t.number("target_noise_clip", {0, 10});
+    l.huber = t.number_or("huber", 0, {0, 1e6});
+    c_.replay = static_cast<std::size_t>(t.integer("replay", 1024, 100'000'000));
+    const std::size_t most = c_.flappers * c_.return_steps;  // that a step may add
+    if (c_.replay < most)
+      t.fail("replay", "is less than one step adds", "at least " + std::to_string(most) + " transitions");
+    const io::Table e = root_.table("evaluate");
+    c_.evaluate_every = whole_steps(e, "every");
+    c_.evaluate_vehicles = static_cast<std::size_t>(e.integer("vehicles", 1, 1'000'000));
+    const io::Table p = root_.table("checkpoint");
+    c_.checkpoint_every = whole_steps(p, "every");
+    c_.keep = static_cast<std::size_t>(p.integer_or("keep", 2, 1, 1000));
+  }
+
+  void keep_texts() {
+    c_.resolved = c_.fly.resolved;
+    const auto with = [](const std::string& text, const char* name, const Overrides& overrides) {
+      return io::Config::parse(text, name, overrides).resolved();
+    };
+    c_.resolved["fly.toml"] = with(c_.resolved["fly.toml"], "fly.toml", {"actor=\"../best.json\""});
+    std::string all;
+    c_.resolved["train.toml"] = with(main_.resolved(), "train.toml", {"fly=\"fly.toml\"", "threads=0"});
+    for (const auto& [name, text] : c_.resolved) all += name + "\n" + text;
+    c_.sha256 = io::sha256(all);
+  }
+
+  io::Config main_;
+  io::Table root_;
+  TrainConfig c_;
+};
+
+}  // namespace
+
+flight::Actor TrainConfig::blank_actor() const {
+  flight::Actor a;
+  a.task = fly.fleet.task.name;
+  for (const flight::Signal& s : fly.fleet.task.observation()) a.observation.push_back(s.name);
+  for (const flight::Signal& s : fly.fleet.task.action()) a.action.push_back(s.name);
+  return a;
+}
+
+TrainConfig read_train_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  const auto [own, flown] = routed(overrides);
+  return Reader(path, own, flown).read();
+}
+
+}  // namespace flappy::learn

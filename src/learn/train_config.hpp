@@ -1,0 +1,57 @@
+// What is trained and how, as configs/train/*.toml state it:
+//
+//   schema = 1
+//   fly = "file"            what is flown: vehicles, task, sensors, controller; relative to the folder of the configuration
+//   seed                    of weights, draws, noise and the vehicles trained on; evaluation flies with the seed of `fly`
+//   threads                 0: all
+//   [observation]           optional: part = [scale of each of its signals], in place of 2 / (high - low) of their ranges
+//   [networks]              actor, critic: widths of hidden layers; activation = "relu" | "tanh"
+//   [collect]               flappers, vehicles (settled, from which episodes are drawn), noise_low, noise_high, noise_kept (from
+//                           action to action), steps_before (actions of each flapper before the first update)
+//   [reward]                scale, discount (from action to action), steps (of the return that the critics learn)
+//   [learn]                 updates, updates_per_step, batch, actor_rate, critic_rate, last_rate (share of the rates at the
+//                           last update, reached in a line), averaging (tau), twin, policy_delay, target_noise,
+//                           target_noise_clip, huber (0: squares), replay (transitions kept), policy_averaging (share of
+//                           the actor that the policy takes over after each step; 1: the policy is the actor)
+//   [evaluate]              every (updates), vehicles
+//   [checkpoint]            every (updates), keep
+//
+// Updates are counted in whole steps: every figure above is rounded up to a multiple of updates_per_step.
+//
+// Any other override, as "task.reward.goal=1", belongs to `fly`.
+#pragma once
+
+#include "flight/fly_config.hpp"
+#include "learn/learner.hpp"
+
+namespace flappy::learn {
+
+struct TrainConfig {
+  flight::FlyConfig fly;
+  std::uint64_t seed = 0;
+  int threads = 0;  ///< at least 1
+  LearnerOptions learner;
+
+  std::size_t flappers = 0, vehicles = 0, steps_before = 0;
+  flight::Exploration exploration;
+  double reward_scale = 1, discount = 1;
+  std::size_t return_steps = 1;
+  std::uint64_t updates = 0, updates_per_step = 1;
+  double actor_rate = 0, critic_rate = 0, last_rate = 1, policy_averaging = 1;
+  std::size_t replay = 0;
+  std::uint64_t evaluate_every = 0, checkpoint_every = 0;
+  std::size_t evaluate_vehicles = 0, keep = 2;
+
+  /// Texts of the files that were read, by name, as FlyConfig::resolved; train.toml names fly.toml, which names the
+  /// policy of the run as its actor.
+  std::map<std::string, std::string> resolved;
+  std::string sha256;  ///< of all of them but for the number of threads
+
+  /// An actor of this task, without weights.
+  flight::Actor blank_actor() const;
+};
+
+/// io::InputError for whatever is missing, unknown, out of range or does not fit together.
+TrainConfig read_train_config(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
+
+}  // namespace flappy::learn

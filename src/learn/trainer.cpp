@@ -1,0 +1,396 @@
+#include "learn/trainer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "learn/collector.hpp"
+#include "learn/evaluation.hpp"
+#include "learn/metrics.hpp"
+
+namespace flappy::learn {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+const MetricsColumns kColumns = {
+    {"update", "env_steps", "episodes", "return_mean", "captured_share", "handed_back_share", "terminated_share",
+     "critic_loss", "mean_q", "actor_q", "replay", "success_rate", "capture_rate", "time_to_capture_median_s"},
+    {"wall_s", "evaluation_s", "updates_per_s", "env_steps_per_s", "share_simulation", "share_learning"}};
+
+/// As /proc/cpuinfo names it.
+std::string processor() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("model name")) return line.substr(std::min(line.find(':') + 2, line.size()));
+  return "unknown";
+}
+
+double median(std::vector<double> list) {
+  if (list.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::ranges::sort(list);
+  return list[list.size() / 2];
+}
+
+class Trainer {
+ public:
+  Trainer(const TrainConfig& config, const TrainOptions& options)
+      : config_(config),
+        options_(options),
+        learner_(config.learner),
+        replay_(config.learner.shape, config.replay),
+        collector_(config) {
+    if (options.init) start_from(*options.init);
+    actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
+    average_ = actor_->weights;
+  }
+
+  TrainSummary run() {
+    const fs::path& folder = options_.folder;
+    if (options_.from) resume(Checkpoint(*options_.from));
+    else write_config();
+    Metrics metrics(folder, kColumns, records_);
+    metrics_ = &metrics;
+    publish();
+    if (!options_.from) {
+      save();  // from now on it can be resumed, whenever it is killed
+      write_start();
+    }
+    start_ = last_ = mark();
+    bool going = true;
+    while (going && updates() < config_.updates) {
+      step();
+      const bool evaluates = passed(config_.evaluate_every);
+      if (evaluates) evaluate();
+      if (passed(config_.checkpoint_every) && updates() < config_.updates) save();
+      going = !options_.keep_going || options_.keep_going(progress(evaluates));
+    }
+    if (saved_step_ != steps_) save();
+    return summarise();
+  }
+
+ private:
+  /// Where a stretch of training began; seconds are those of steps, of this process.
+  struct Mark {
+    double seconds;
+    std::uint64_t updates, env_steps;
+  };
+  Mark mark() const { return {learning_s_ + warming_s_, updates(), collector_.env_steps()}; }
+  std::pair<double, double> rates_since(const Mark& from) const {
+    const Mark now = mark();
+    const double s = std::max(now.seconds - from.seconds, 1e-9);
+    return {static_cast<double>(now.updates - from.updates) / s,
+            static_cast<double>(now.env_steps - from.env_steps) / s};
+  }
+
+  std::uint64_t updates() const { return learner_.counters().updates; }
+  /// Whether the last step reached a multiple of `every`, or the end.
+  bool passed(std::uint64_t every) const {
+    return updates() > 0 && (updates() % every == 0 || updates() == config_.updates) && learnt_;
+  }
+
+  flight::Actor named(flight::Actor actor) const {
+    const flight::Actor names = config_.blank_actor();
+    actor.task = names.task, actor.observation = names.observation, actor.action = names.action;
+    return actor;
+  }
+
+  void start_from(const flight::Actor& actor) {
+    const flight::Actor names = config_.blank_actor();
+    if (actor.observation != names.observation || actor.action != names.action)
+      throw io::InputError("--init: the policy observes or does something else than task " + names.task +
+                           "; accepted: a policy of this task");
+    try {
+      learner_.set_actor(actor);
+    } catch (const std::invalid_argument& e) {
+      throw io::InputError("--init: " + std::string(e.what()) + "; accepted: a policy of the same networks");
+    }
+  }
+
+  /// One action of every flapper, and meanwhile the updates of this step.
+  void step() {
+    const auto from = Clock::now();
+    collector_.begin(actor_);
+    const std::size_t items = collector_.items();
+    learnt_ = replay_.size() >= config_.learner.batch && steps_ >= config_.steps_before;
+    if (learnt_) {
+      const std::uint64_t n = config_.updates_per_step;
+      for (std::uint64_t u = 0; u < n; ++u) {
+        const std::size_t first = items * u / n, last = items * (u + 1) / n;
+        const double done = static_cast<double>(updates()) / static_cast<double>(config_.updates);
+        const double rate = 1 + (config_.last_rate - 1) * done;
+        learner_.update(replay_, rate * config_.actor_rate, rate * config_.critic_rate,
+                        {last - first, [&](std::size_t i) { collector_.run(first + i); }});
+      }
+      if (!std::isfinite(learner_.metrics().critic_loss))
+        throw io::InputError("the critics diverged at update " + std::to_string(updates()) +
+                             "; accepted: lower learn.critic_rate, reward.scale or reward.discount");
+      losses_ += learner_.metrics().critic_loss, values_ += learner_.metrics().mean_q;
+      actor_values_ += learner_.metrics().actor_q, ++samples_;
+      actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
+      for (std::size_t k = 0; k < average_.size(); ++k)
+        average_[k] += config_.policy_averaging * (actor_->weights[k] - average_[k]);
+    } else {
+      const auto count = static_cast<std::ptrdiff_t>(items);
+#pragma omp parallel for schedule(dynamic) num_threads(config_.threads)
+      for (std::ptrdiff_t i = 0; i < count; ++i) collector_.run(static_cast<std::size_t>(i));
+    }
+    collector_.end(replay_);
+    ++steps_;
+    (learnt_ ? learning_s_ : warming_s_) += seconds_since(from);
+  }
+
+  double wall_s() const { return wall_before_s_ + seconds_since(options_.started) - evaluation_s_; }
+
+  std::pair<double, double> shares() const {
+    const double all = static_cast<double>(config_.threads) * (wall_s() - wall_before_s_);
+    const double simulation = collector_.seconds();
+    return {simulation / all,
+            std::max(0.0, static_cast<double>(config_.threads) * (learning_s_ + warming_s_) - simulation) / all};
+  }
+
+  void evaluate() {
+    const auto from = Clock::now();
+    const double wall = wall_s();
+    if (!evaluator_)
+      evaluator_.emplace(config_.fly, EvaluationOptions{config_.evaluate_vehicles, kValidationFlappers, 1024});
+    policy_ = averaged();
+    const Evaluation e = evaluator_->fly({std::make_shared<flight::Actor>(policy_), nullptr}, Detail::success);
+    std::vector<double> capture_s;
+    double successes = 0;
+    for (const Outcome& o : e.flights) {
+      successes += o.success();
+      if (o.captured_s > 0) capture_s.push_back(o.captured_s);
+    }
+    const auto n = static_cast<double>(e.flights.size());
+    success_ = successes / n;
+    if (success_ > best_success_) {
+      best_success_ = success_;
+      best_update_ = updates();
+      best_ = policy_;
+    }
+    publish();
+
+    const EpisodeSums sums = collector_.take_sums();
+    const double samples = static_cast<double>(samples_);
+    const auto [simulation, learning] = shares();
+    const auto share = [&](double count) { return count / sums.episodes; };
+    const double figures[] = {static_cast<double>(updates()),
+                              static_cast<double>(collector_.env_steps()),
+                              static_cast<double>(collector_.episodes()),
+                              share(sums.gain),
+                              share(sums.captured),
+                              share(sums.handed_back),
+                              share(sums.terminated),
+                              losses_ / samples,
+                              values_ / samples,
+                              actor_values_ / samples,
+                              static_cast<double>(replay_.size()),
+                              success_,
+                              static_cast<double>(capture_s.size()) / n,
+                              median(capture_s)};
+    return_mean_ = share(sums.gain);
+    losses_ = values_ = actor_values_ = 0, samples_ = 0;
+    evaluation_s_ += seconds_since(from);
+    const auto [updates_per_s, env_steps_per_s] = rates_since(last_);
+    const double times[] = {wall, evaluation_s_, updates_per_s, env_steps_per_s, simulation, learning};
+    metrics_->record(figures, times);
+    last_ = mark();
+  }
+
+  /// The policy: the actor averaged over steps, in the precision that it flies in.
+  flight::Actor averaged() const {
+    flight::Actor policy = *actor_;
+    std::ranges::transform(average_, policy.weights.begin(), [](double w) { return static_cast<float>(w); });
+    return policy;
+  }
+
+  /// Policies where others find them.
+  void publish() {
+    if (policy_.widths.empty()) policy_ = averaged();
+    if (best_.widths.empty()) best_ = policy_;
+    flight::write_actor(options_.folder / "best.json", best_);
+    flight::write_actor(options_.folder / "last.json", policy_);
+  }
+
+  void write_config() {
+    fs::create_directories(options_.folder / "config");
+    for (const auto& [name, text] : config_.resolved) io::write_atomically(options_.folder / "config" / name, text);
+  }
+
+  void write_start() {
+    const TrainCosts costs = costs_of(config_);
+    const nlohmann::ordered_json run = {{"schema", 1},
+                                        {"task", config_.fly.fleet.task.name},
+                                        {"seed", config_.seed},
+                                        {"commit", options_.commit},
+                                        {"processor", processor()},
+                                        {"instruction_set", sim::best_instruction_set()},
+                                        {"config_sha256", config_.sha256},
+                                        {"init", options_.init != nullptr},
+                                        {"memory_bytes", costs.memory_bytes},
+                                        {"disk_bytes", costs.disk_bytes}};
+    io::write_atomically(options_.folder / "run.json", run.dump(2) + "\n");
+  }
+
+  void save() {
+    records_ = metrics_->sync();
+    CheckpointWriter to(options_.folder / checkpoint_name(updates()),
+                        {updates(), config_.sha256, processor(), sim::best_instruction_set(), options_.commit});
+    to.put("numbers", learner_.numbers());
+    to.put_bytes("counters", std::as_bytes(std::span(&learner_.counters(), 1)));
+    to.put("replay_size", static_cast<std::uint64_t>(replay_.size()));
+    to.put("replay_cursor", static_cast<std::uint64_t>(replay_.cursor()));
+    to.put("replay", replay_.rows());
+    collector_.save(to);
+    to.put("steps", steps_);
+    to.put("records", records_);
+    to.put("sums", std::array<double, 5>{losses_, values_, actor_values_, success_, best_success_});
+    to.put("samples", samples_);
+    to.put("best_update", best_update_);
+    to.put("average", average_);
+    to.put("best_weights", best_.weights);
+    to.put("policy_weights", policy_.weights);
+    payload_sha256_ = to.commit();
+    saved_step_ = steps_;
+    keep_newest(options_.folder, config_.keep);
+  }
+
+  void resume(const Checkpoint& from) {
+    if (from.header().config_sha256 != config_.sha256)
+      throw io::InputError(from.path().string() + ": is of another configuration than " +
+                           (options_.folder / "config").string() + "; accepted: a checkpoint of this run");
+    from.get("numbers", learner_.numbers());
+    from.get_bytes("counters", std::as_writable_bytes(std::span(&learner_.counters(), 1)));
+    std::uint64_t size = 0, cursor = 0;
+    from.get("replay_size", size);
+    from.get("replay_cursor", cursor);
+    std::vector<float> rows(size * replay_.layout().row);
+    from.get("replay", rows);
+    replay_.restore(rows, cursor);
+    collector_.restore(from);
+    from.get("steps", steps_);
+    from.get("records", records_);
+    std::array<double, 5> sums{};
+    from.get("sums", sums);
+    losses_ = sums[0], values_ = sums[1], actor_values_ = sums[2], success_ = sums[3], best_success_ = sums[4];
+    from.get("samples", samples_);
+    from.get("best_update", best_update_);
+    actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
+    policy_ = best_ = averaged();
+    from.get("average", average_);
+    from.get("best_weights", best_.weights);
+    from.get("policy_weights", policy_.weights);
+    saved_step_ = steps_;
+    payload_sha256_ = from.payload_sha256();
+    const MetricsTable timing = read_metrics(options_.folder / "timing.jsonl");
+    if (records_ > 0 && timing.column("wall_s").size() >= records_) {
+      wall_before_s_ = timing.column("wall_s")[records_ - 1];
+    }
+  }
+
+  TrainProgress progress(bool evaluated) const {
+    const auto [updates_per_s, env_steps_per_s] = rates_since(start_);
+    return {updates(),    config_.updates, collector_.episodes(), collector_.env_steps(),
+            return_mean_, success_,        updates_per_s,         env_steps_per_s,
+            evaluated};
+  }
+
+  TrainSummary summarise() const {
+    TrainSummary s;
+    s.seed = config_.seed;
+    s.updates = updates(), s.env_steps = collector_.env_steps(), s.episodes = collector_.episodes();
+    s.stopped = updates() < config_.updates;
+    s.wall_s = wall_s();
+    s.evaluation_s = evaluation_s_;
+    std::tie(s.share_simulation, s.share_learning) = shares();
+    s.best_success = best_success_;
+    s.best_update = best_update_;
+    s.payload_sha256 = payload_sha256_;
+    if (records_ == 0) return s;
+    const std::vector<double> success = read_metrics(options_.folder / "metrics.jsonl").column("success_rate");
+    const std::vector<double> wall = read_metrics(options_.folder / "timing.jsonl").column("wall_s");
+    for (std::size_t level = 0; level < std::size(kSuccessLevels); ++level)
+      for (std::size_t i = 0; i + 1 < success.size() && !s.time_to_s[level]; ++i)
+        if (success[i] >= kSuccessLevels[level] && success[i + 1] >= kSuccessLevels[level])
+          s.time_to_s[level] = wall[i];
+    return s;
+  }
+
+  const TrainConfig& config_;
+  const TrainOptions& options_;
+  Learner<float> learner_;
+  Replay replay_;
+  Collector collector_;
+  std::optional<Evaluator> evaluator_;
+  Metrics* metrics_ = nullptr;
+
+  bool learnt_ = false;  // in the last step
+  std::uint64_t steps_ = 0, records_ = 0, saved_step_ = ~std::uint64_t{0};
+  double losses_ = 0, values_ = 0, actor_values_ = 0, return_mean_ = std::numeric_limits<double>::quiet_NaN();
+  std::uint64_t samples_ = 0;
+  double success_ = -1, best_success_ = -1;
+  std::uint64_t best_update_ = 0;
+  std::shared_ptr<const flight::Actor> actor_;  // that flies
+  std::vector<double> average_;                 // its weights, over steps
+  flight::Actor policy_, best_;                 // of the last evaluation, and of the best one
+  std::string payload_sha256_;
+
+  Mark start_{}, last_{};  // of this process, and of the last evaluation
+  double wall_before_s_ = 0, evaluation_s_ = 0, learning_s_ = 0, warming_s_ = 0;
+};
+
+void write_summary(const fs::path& folder, const TrainSummary& s) {
+  const auto or_null = [](const std::optional<double>& x) {
+    return x ? nlohmann::ordered_json(*x) : nlohmann::ordered_json(nullptr);
+  };
+  const nlohmann::ordered_json json = {{"seed", s.seed},
+                                       {"wall_s", s.wall_s},
+                                       {"env_steps", s.env_steps},
+                                       {"updates", s.updates},
+                                       {"episodes", s.episodes},
+                                       {"time_to_50_s", or_null(s.time_to_s[0])},
+                                       {"time_to_80_s", or_null(s.time_to_s[1])},
+                                       {"time_to_90_s", or_null(s.time_to_s[2])},
+                                       {"time_to_95_s", or_null(s.time_to_s[3])},
+                                       {"share_simulation", s.share_simulation},
+                                       {"share_learning", s.share_learning},
+                                       {"evaluation_s", s.evaluation_s},
+                                       {"best_success_rate", s.best_success},
+                                       {"best_update", s.best_update},
+                                       {"stopped", s.stopped},
+                                       {"payload_sha256", s.payload_sha256}};
+  io::write_atomically(folder / "summary.json", json.dump(2) + "\n");
+}
+
+}  // namespace
+
+TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
+  std::error_code error;
+  fs::create_directories(options.folder, error);
+  if (error) throw io::InputError(options.folder.string() + ": cannot be written: " + error.message());
+  const io::FolderLock lock(options.folder);
+  if (!options.from && fs::exists(options.folder / "run.json", error))
+    throw io::InputError(options.folder.string() + ": holds a run; accepted: a new folder, or --resume " +
+                         options.folder.string());
+  Trainer trainer(config, options);
+  const TrainSummary summary = trainer.run();
+  write_summary(options.folder, summary);
+  return summary;
+}
+
+TrainCosts costs_of(const TrainConfig& config) {
+  const TransitionLayout layout(config.learner.shape);
+  const std::size_t replay = config.replay * layout.row * sizeof(float);
+  constexpr std::size_t kFlapper = 2500,
+                        kRest = 20'000'000;  // bytes, rounded up: of a flapper; of networks and records
+  const std::size_t flappers = (config.flappers + 1024) * kFlapper + config.vehicles * kFlapper;
+  return {replay + flappers + kRest, (config.keep + 1) * (replay + config.flappers * kFlapper + kRest)};
+}
+
+}  // namespace flappy::learn

@@ -1,0 +1,65 @@
+// Training: collection and learning side by side, evaluation at fixed updates, checkpoints, and what a run leaves behind.
+//
+//   RUN/config/          the resolved configuration; config/fly.toml flies the best policy
+//   RUN/run.json         commit, processor, instruction set, seed, memory
+//   RUN/metrics.*, timing.jsonl, events.out.tfevents.flappy   (metrics.hpp), a record for each evaluation
+//   RUN/checkpoint_N.flappy
+//   RUN/best.json, last.json   actors: of the best evaluation so far, and of the last one
+//   RUN/summary.json
+//
+// In every step, the actor as it was after the step before flies, while the learner draws from what was flown before: the
+// lag is one step, whoever is faster. All but timing.jsonl, summary.json, run.json and the events is the same for any number of
+// threads, and after any number of resumptions.
+#pragma once
+
+#include <chrono>
+#include <optional>
+
+#include "learn/train_config.hpp"
+
+namespace flappy::learn {
+
+/// What the person who waits is told.
+struct TrainProgress {
+  std::uint64_t update = 0, updates = 0, episodes = 0, env_steps = 0;
+  double mean_return = 0;  ///< of the episodes since the last evaluation
+  double success = -1;     ///< of the last evaluation; -1: none yet
+  double updates_per_s = 0, env_steps_per_s = 0;
+  bool evaluated = false;  ///< just now
+};
+
+struct TrainOptions {
+  std::filesystem::path folder;
+  /// Goes on from this checkpoint; nothing: the run starts.
+  std::optional<std::filesystem::path> from;
+  std::shared_ptr<const flight::Actor> init;                                         ///< starts with this actor
+  std::string commit;                                                                ///< of the program
+  std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();  ///< when the process did
+  std::function<bool(const TrainProgress&)> keep_going;  ///< asked after each step; false: checkpoint and stop
+};
+
+struct TrainSummary {
+  std::uint64_t seed = 0, updates = 0, env_steps = 0, episodes = 0;
+  bool stopped = false;  ///< before its last update
+  double wall_s = 0;     ///< since the process started, evaluations excluded
+  double evaluation_s = 0;
+  double share_simulation = 0, share_learning = 0;  ///< of the time of all threads; waiting counts as learning
+  double best_success = 0;
+  std::uint64_t best_update = 0;
+  /// When 50, 80, 90, 95 % success were reached: the wall_s of the first evaluation at which, and at the next one, that many
+  /// vehicles succeeded. Nothing: not reached.
+  std::optional<double> time_to_s[4];
+  std::string payload_sha256;  ///< of the last checkpoint
+};
+inline constexpr double kSuccessLevels[4] = {0.5, 0.8, 0.9, 0.95};
+
+/// Memory of replay and flappers, and the most that a run leaves on disk.
+struct TrainCosts {
+  std::size_t memory_bytes = 0, disk_bytes = 0;
+};
+
+/// io::InputError where the run folder is taken, a checkpoint does not fit, the disk is full, or learning diverged.
+TrainSummary train(const TrainConfig& config, const TrainOptions& options);
+TrainCosts costs_of(const TrainConfig& config);
+
+}  // namespace flappy::learn

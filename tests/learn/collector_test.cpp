@@ -1,0 +1,202 @@
+// What reaches the replay memory, by what each flight must have earned.
+#include "learn/collector.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "training.hpp"
+
+namespace flappy::learn {
+namespace {
+
+constexpr int kSteps = 60;  // of 10 ms: every flight begins again
+
+/// A policy that stirs.
+std::shared_ptr<const flight::Actor> actor_of(const TrainConfig& c) {
+  flight::Actor a = c.blank_actor();
+  a.widths = {static_cast<int>(a.observation.size()), 5, flight::kActions};
+  a.mean.assign(a.observation.size(), 0);
+  a.scale.assign(a.observation.size(), 0.3);
+  for (std::size_t k = 0; k < flight::weight_count(a.widths); ++k)
+    a.weights.push_back(static_cast<double>(k * 29 % 61) / 128 - 0.25);
+  return std::make_shared<flight::Actor>(std::move(a));
+}
+
+struct Collected {
+  Replay replay;
+  EpisodeSums sums;
+  std::uint64_t episodes, env_steps;
+};
+
+Collected collect(const TrainConfig& c, int steps = kSteps) {
+  Collector collector(c);
+  Replay replay(c.learner.shape, c.replay);
+  const auto actor = actor_of(c);
+  for (int step = 0; step < steps; ++step) {
+    collector.begin(actor);
+    for (std::size_t i = collector.items(); i-- > 0;) collector.run(i);
+    collector.end(replay);
+  }
+  const std::uint64_t episodes = collector.episodes(), env_steps = collector.env_steps();
+  return {std::move(replay), collector.take_sums(), episodes, env_steps};
+}
+
+/// A reward that can be told from what is observed: 1 a period, and 100 a second for what is left at hand-back.
+Overrides plain(std::size_t steps) {
+  Overrides list = {"learn.replay=20000",        "reward.scale=0.5",
+                    "reward.discount=0.9",       "reward.steps=" + std::to_string(steps),
+                    "task.reward.early_1_s=100", "task.reward.alive=1"};
+  for (const char* off : {"action", "near", "facing", "level", "goal", "arrival"})
+    list.push_back(std::string("task.reward.") + off + "=0");
+  return list;
+}
+
+class Transitions {
+ public:
+  Transitions(const TrainConfig& c, const Replay& replay)
+      : replay_(replay), flappers_(c.flappers), inputs_(c.learner.shape.actor_observation) {
+    const auto signals = c.fly.fleet.task.observation();
+    for (std::size_t k = 0; k < signals.size(); ++k)
+      if (signals[k].name == "time") time_ = k;
+  }
+  /// With a return of one step there is one transition of every flapper in each step.
+  const float* row(int step, std::size_t i) const {
+    return replay_.row(static_cast<std::size_t>(step) * flappers_ + i);
+  }
+  const float* seen(const float* row) const { return row + replay_.layout().actor_observation; }
+  const float* next(const float* row) const { return row + replay_.layout().next_actor_observation; }
+  float reward(const float* row) const { return row[replay_.layout().reward]; }
+  float discount(const float* row) const { return row[replay_.layout().discount]; }
+  double time_s(const float* observation) const { return observation[time_]; }
+  bool same(const float* a, const float* b) const { return std::equal(a, a + inputs_, b); }
+
+ private:
+  const Replay& replay_;
+  std::size_t flappers_;
+  int inputs_;
+  std::size_t time_ = 0;
+};
+
+TEST(Collector, OneStepTransitionsAreWhatWasFlown) {
+  const TrainConfig c = small_training(plain(1));
+  const Collected all = collect(c);
+  ASSERT_EQ(all.replay.size(), kSteps * c.flappers);
+  const Transitions t(c, all.replay);
+  double episodes = 0, gain = 0;
+  int early = 0;
+  for (std::size_t i = 0; i < c.flappers; ++i) {
+    double since = 0;
+    for (int step = 0; step < kSteps; ++step) {
+      const float* row = t.row(step, i);
+      ASSERT_NEAR(t.time_s(t.next(row)), t.time_s(t.seen(row)) + 0.01, 1e-6);
+      const bool ended = t.discount(row) == 0;
+      double expected = 0.5 * 5;  // periods of an action
+      // at_s counts to the middle of its last period, 0.349 s; a flight may be handed back within an action, and flies on
+      if (ended && t.time_s(t.next(row)) < 0.3499) {
+        EXPECT_GT(t.reward(row), expected + 0.5 * 100 * (0.349 - t.time_s(t.next(row))) - 1e-4);
+        EXPECT_LT(t.reward(row), expected + 0.5 * 100 * (0.349 - t.time_s(t.seen(row))));
+        expected = t.reward(row);
+        ++early;
+      }
+      ASSERT_NEAR(t.reward(row), expected, 1e-5);
+      since += t.reward(row);
+      if (ended) episodes += 1, gain += since, since = 0;
+      else ASSERT_FLOAT_EQ(t.discount(row), 0.9F);
+      if (step + 1 == kSteps) continue;
+      const float* after = t.row(step + 1, i);
+      EXPECT_EQ(t.same(t.next(row), t.seen(after)), !ended);
+      EXPECT_EQ(t.time_s(t.seen(after)) == 0, ended);
+    }
+  }
+  EXPECT_GE(episodes, c.flappers);  // 0.6 s of flights of at most 0.35 s
+  EXPECT_EQ(all.sums.episodes, episodes);
+  EXPECT_EQ(all.episodes, episodes);
+  EXPECT_NEAR(all.sums.gain, gain, 1e-3 * gain);
+  EXPECT_EQ(all.sums.handed_back + all.sums.terminated, episodes);
+  EXPECT_EQ(all.env_steps, kSteps * 5 * c.flappers);
+}
+
+TEST(Collector, ReturnsAreSumsOverTheirSteps) {
+  const TrainConfig one = small_training(plain(1)), three = small_training(plain(3));
+  const Collected single = collect(one), summed = collect(three);
+  const Transitions s(one, single.replay);
+  // by their first observation, which no two transitions share
+  const auto key = [&](const Transitions& t, const float* row) {
+    return std::vector<float>(t.seen(row), t.seen(row) + one.learner.shape.actor_observation);
+  };
+  const Transitions m(three, summed.replay);
+  std::map<std::vector<float>, const float*> rows;
+  for (std::size_t k = 0; k < summed.replay.size(); ++k) rows[key(m, summed.replay.row(k))] = summed.replay.row(k);
+  EXPECT_EQ(rows.size(), summed.replay.size());
+  std::size_t compared = 0, cut_short = 0;
+  for (std::size_t i = 0; i < one.flappers; ++i)
+    for (int step = 0; step + 3 <= kSteps; ++step) {
+      const float* row = s.row(step, i);
+      double sum = 0, weight = 1;
+      const float* last = row;
+      for (int k = 0; k < 3; ++k) {
+        last = s.row(step + k, i);
+        sum += weight * s.reward(last);
+        weight *= 0.9;
+        if (s.discount(last) == 0) {
+          weight = 0;
+          cut_short += k < 2;
+          break;
+        }
+      }
+      const auto found = rows.find(key(s, row));
+      ASSERT_NE(found, rows.end()) << i << " " << step;
+      EXPECT_NEAR(m.reward(found->second), sum, 1e-5 * (1 + std::abs(sum)));
+      EXPECT_NEAR(m.discount(found->second), weight, 1e-6);
+      EXPECT_TRUE(m.same(m.next(found->second), s.next(last)));
+      ++compared;
+    }
+  EXPECT_EQ(compared, (kSteps - 2) * one.flappers);
+  EXPECT_GE(cut_short, 2 * one.flappers);
+}
+
+TEST(Collector, ATimeOutIsNoTermination) {
+  Overrides list = plain(2);
+  list.push_back("task.end.time_s=0.05");
+  const TrainConfig c = small_training(list);
+  const Collected all = collect(c, 10);
+  EXPECT_EQ(all.sums.terminated, 0);
+  EXPECT_EQ(all.sums.handed_back, 0);
+  EXPECT_EQ(all.sums.episodes, 2 * c.flappers);
+  std::size_t of_one = 0, of_two = 0;
+  for (std::size_t k = 0; k < all.replay.size(); ++k) {
+    const float discount = all.replay.row(k)[all.replay.layout().discount];
+    of_one += std::abs(discount - 0.9F) < 1e-6F;
+    of_two += std::abs(discount - 0.81F) < 1e-6F;
+  }
+  EXPECT_EQ(of_one, 2 * c.flappers);  // the last action of each episode
+  EXPECT_EQ(of_one + of_two, all.replay.size());
+}
+
+TEST(Collector, VehiclesAndStartsDiffer) {
+  const TrainConfig c = small_training(plain(1));
+  const Collected all = collect(c, 1);
+  const Transitions t(c, all.replay);
+  std::set<std::vector<float>> starts, trims;
+  for (std::size_t i = 0; i < c.flappers; ++i) {
+    const float* o = t.seen(t.row(0, i));
+    std::vector<float> start, trim;
+    const auto signals = c.fly.fleet.task.observation();
+    for (std::size_t k = 0; k < signals.size(); ++k) {
+      if (signals[k].name.ends_with("_error")) start.push_back(o[k]);
+      if (signals[k].name.starts_with("trim_")) trim.push_back(std::round(o[k] * 1e3F));
+    }
+    EXPECT_EQ(start.size(), 3u);
+    starts.insert(start);
+    trims.insert(trim);
+  }
+  EXPECT_EQ(starts.size(), c.flappers);
+  EXPECT_GT(trims.size(), 4u);  // of 8 vehicles, drawn 40 times: all but 1 in 25 of them
+  EXPECT_LE(trims.size(), 8u);
+}
+
+}  // namespace
+}  // namespace flappy::learn

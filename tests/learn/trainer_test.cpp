@@ -1,0 +1,238 @@
+// A run from its start to its end: the same bytes for any number of threads and instruction set, and through any stop.
+#include "learn/trainer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "learn/checkpoint.hpp"
+#include "learn/metrics.hpp"
+#include "training.hpp"
+
+namespace flappy::learn {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path fresh(const std::string& name) {
+  const fs::path folder = fs::path(testing::TempDir()) / ("trainer_test_" + name);
+  fs::remove_all(folder);
+  return folder;
+}
+
+TrainSummary train_in(const fs::path& folder, const TrainConfig& config,
+                      const std::function<bool(const TrainProgress&)>& keep_going = {},
+                      const std::optional<fs::path>& from = {}) {
+  TrainOptions o;
+  o.folder = folder;
+  o.keep_going = keep_going;
+  o.from = from;
+  o.commit = "test";
+  return train(config, o);
+}
+
+/// Policies, metrics, and the payload of the last checkpoint.
+std::string left_in(const fs::path& folder) {
+  std::string all = newest_checkpoint(folder).payload_sha256();
+  for (const char* name : {"best.json", "last.json", "metrics.jsonl", "metrics.csv"})
+    all += "\n" + io::read_text(folder / name);
+  return all;
+}
+
+TEST(Trainer, LeavesTheSameBytesWhateverTheThreadsAndTheInstructionSet) {
+  const fs::path folder = fresh("one");
+  const TrainSummary s = train_in(folder, small_training());
+  EXPECT_EQ(s.updates, 24u);
+  EXPECT_FALSE(s.stopped);
+  EXPECT_EQ(s.payload_sha256, newest_checkpoint(folder).payload_sha256());
+  const std::string expected = left_in(folder);
+  for (const int threads : {1, 2, 3}) {
+    const fs::path other = fresh("threads");
+    train_in(other, small_training({"threads=" + std::to_string(threads)}));
+    EXPECT_TRUE(left_in(other) == expected) << threads << " threads";
+  }
+  for (const std::string& set : sim::instruction_sets()) {
+    const fs::path other = fresh("set");
+    TrainConfig c = small_training();
+    c.fly.fleet.batch.instruction_set = c.learner.instruction_set = set;
+    train_in(other, c);
+    EXPECT_TRUE(left_in(other) == expected) << set;
+  }
+  const fs::path seeded = fresh("seed");
+  train_in(seeded, small_training({"seed=4"}));
+  EXPECT_FALSE(left_in(seeded) == expected);
+}
+
+TEST(Trainer, GoesOnFromAnyStopAsIfNothingHadBeen) {
+  const fs::path whole = fresh("whole"), stopped = fresh("stopped");
+  const TrainConfig c = small_training({"threads=2"});
+  train_in(whole, c);
+  const std::string expected = left_in(whole);
+  // after every step, warm-up included
+  std::uint64_t at = 0;
+  int stops = 0;
+  std::optional<fs::path> from;
+  while (at < c.updates) {
+    const TrainSummary s = train_in(
+        stopped, c, [&](const TrainProgress&) { return false; }, from);
+    EXPECT_EQ(s.stopped, s.updates < c.updates);
+    at = s.updates;
+    from = newest_checkpoint(stopped).path();
+    ASSERT_LT(++stops, 30);
+  }
+  EXPECT_GT(stops, 15);
+  EXPECT_TRUE(left_in(stopped) == expected);
+}
+
+/// A killed process leaves metrics behind its checkpoint, which the run that goes on cuts off.
+TEST(Trainer, ForgetsWhatCameAfterTheCheckpoint) {
+  const fs::path whole = fresh("kept"), resumed = fresh("resumed");
+  const TrainConfig c = small_training({"checkpoint.keep=9"});
+  train_in(whole, c);
+  const std::string expected = left_in(whole);
+  fs::copy(whole, resumed, fs::copy_options::recursive);
+  const TrainSummary s = train_in(resumed, c, {}, resumed / checkpoint_name(8));
+  EXPECT_EQ(s.updates, 24u);
+  EXPECT_TRUE(left_in(resumed) == expected);
+  EXPECT_EQ(read_metrics(resumed / "metrics.jsonl").column("update"), (std::vector<double>{8, 16, 24}));
+  EXPECT_EQ(read_metrics(resumed / "timing.jsonl").column("update").size(), 3u);
+}
+
+TEST(Trainer, LeavesARunFolder) {
+  const fs::path folder = fresh("folder");
+  const TrainConfig c = small_training({"checkpoint.every=4", "checkpoint.keep=2"});
+  std::vector<std::uint64_t> evaluated;
+  train_in(folder, c, [&](const TrainProgress& p) {
+    if (p.evaluated) evaluated.push_back(p.update);
+    return true;
+  });
+  EXPECT_EQ(evaluated, (std::vector<std::uint64_t>{8, 16, 24}));
+  for (const char* name :
+       {"config/train.toml", "config/fly.toml", "config/task.toml", "config/vehicle.toml", "run.json", "metrics.jsonl",
+        "metrics.csv", "timing.jsonl", "events.out.tfevents.flappy", "best.json", "last.json", "summary.json"})
+    EXPECT_TRUE(fs::is_regular_file(folder / name)) << name;
+  EXPECT_EQ(checkpoints_in(folder).size(), 2u);
+  const auto json = nlohmann::json::parse(io::read_text(folder / "summary.json"));
+  for (const char* key : {"seed", "wall_s", "env_steps", "updates", "time_to_50_s", "time_to_80_s", "time_to_90_s",
+                          "time_to_95_s", "share_simulation", "share_learning"})
+    EXPECT_TRUE(json.contains(key)) << key;
+  EXPECT_TRUE(json["time_to_90_s"].is_null());
+  EXPECT_EQ(json["seed"], 3);
+  const double simulation = json["share_simulation"], learning = json["share_learning"];
+  EXPECT_GT(simulation, 0);
+  EXPECT_GT(learning, 0);
+  EXPECT_LE(simulation + learning, 1.001);
+  // the configuration it leaves is the one it had, and flies the best policy
+  const TrainConfig again = read_train_config(folder / "config" / "train.toml");
+  EXPECT_EQ(again.sha256, c.sha256);
+  EXPECT_EQ(again.resolved, c.resolved);
+  ASSERT_TRUE(again.fly.actor);
+  EXPECT_EQ(again.fly.actor->weights, flight::read_actor(folder / "best.json").weights);
+  // and what it costs is what was said
+  const TrainCosts costs = costs_of(c);
+  std::uintmax_t bytes = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder))
+    if (entry.is_regular_file()) bytes += entry.file_size();
+  EXPECT_LT(bytes, costs.disk_bytes);
+}
+
+TEST(Trainer, StartsFromATrainedActor) {
+  const fs::path first = fresh("first"), second = fresh("second");
+  const TrainConfig c = small_training({"learn.policy_averaging=1"});
+  train_in(first, c);
+  TrainOptions o;
+  o.folder = second;
+  o.init = std::make_shared<flight::Actor>(flight::read_actor(first / "last.json"));
+  o.keep_going = [](const TrainProgress&) { return false; };  // before it learns
+  train(c, o);
+  EXPECT_EQ(flight::read_actor(second / "last.json").weights, o.init->weights);
+
+  const auto refused = [&](const std::shared_ptr<flight::Actor>& init, const char* why) {
+    o.folder = fresh("refused");
+    o.init = init;
+    try {
+      train(c, o);
+      ADD_FAILURE() << why;
+    } catch (const io::InputError& e) {
+      EXPECT_NE(std::string(e.what()).find(why), std::string::npos) << e.what();
+    }
+  };
+  auto other = std::make_shared<flight::Actor>(*o.init);
+  other->observation[0] = "something";
+  refused(other, "--init: the policy observes or does something else");
+  const TrainConfig wide = small_training({"networks.actor=[8]"});
+  const fs::path third = fresh("third");
+  train_in(third, wide, [](const TrainProgress&) { return false; });
+  refused(std::make_shared<flight::Actor>(flight::read_actor(third / "last.json")), "of the same networks");
+}
+
+TEST(Trainer, RefusesWhatDoesNotFit) {
+  const fs::path folder = fresh("refusing");
+  const TrainConfig c = small_training();
+  train_in(folder, c, [](const TrainProgress&) { return false; });
+  const auto refused = [&](const TrainConfig& config, const std::optional<fs::path>& from, const char* why) {
+    try {
+      train_in(folder, config, {}, from);
+      ADD_FAILURE() << why;
+    } catch (const io::InputError& e) {
+      EXPECT_NE(std::string(e.what()).find(why), std::string::npos) << e.what();
+    }
+  };
+  refused(c, {}, "holds a run; accepted: a new folder, or --resume");
+  refused(small_training({"reward.scale=2.0"}), newest_checkpoint(folder).path(), "is of another configuration");
+  TrainConfig wild = small_training();
+  wild.reward_scale = 1e30;
+  try {
+    train_in(fresh("wild"), wild);
+    ADD_FAILURE() << "no divergence";
+  } catch (const io::InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("the critics diverged at update"), std::string::npos) << e.what();
+  }
+}
+
+TEST(TrainConfig, SaysWhatIsWrong) {
+  const auto refused = [](const Overrides& overrides, const std::string& why) {
+    try {
+      small_training(overrides);
+      ADD_FAILURE() << why;
+    } catch (const io::InputError& e) {
+      EXPECT_NE(std::string(e.what()).find(why), std::string::npos) << e.what();
+    }
+  };
+  refused({"learn.batch=100"}, "learn.batch: is no multiple of 64");
+  refused({"networks.actor=[32, 500]"}, "networks.actor");
+  refused({"networks.actor=[]"}, "networks.actor: is no list of hidden layers");
+  refused({"learn.replay=1024", "collect.flappers=2000"}, "learn.replay: is less than one step adds");
+  refused({"observation.time=[1, 2]"}, "observation.time");
+  refused({"observation.colour=[1]"}, "observation.colour: unknown key");
+  refused({"learn.speed=3"}, "learn.speed: unknown key");
+  refused({"task.reward.gaol=3"}, "--set task.reward.gaol=3: reward.gaol: unknown key");
+  refused({"precision=double"}, "flies in double");
+  refused({"flight.support=welded"}, "holds its vehicle on a stand");
+  try {
+    read_train_config(test::source_path("configs/train/escape.toml"), {"task=../tasks/hover.toml"});
+    ADD_FAILURE() << "no success to train for";
+  } catch (const io::InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("says no success"), std::string::npos) << e.what();
+  }
+}
+
+TEST(TrainConfig, CountsInWholeSteps) {
+  const TrainConfig c = small_training({"learn.updates=25", "learn.updates_per_step=4", "evaluate.every=1"});
+  EXPECT_EQ(c.updates, 28u);
+  EXPECT_EQ(c.evaluate_every, 4u);
+  EXPECT_EQ(c.checkpoint_every, 8u);
+}
+
+TEST(TrainConfig, ScalesObservationsByTheirRangeUnlessTold) {
+  const TrainConfig c = small_training();
+  const auto signals = c.fly.fleet.task.observation();
+  for (std::size_t k = 0; k < signals.size(); ++k) {
+    EXPECT_EQ(c.learner.actor_input.mean[k], (signals[k].low + signals[k].high) / 2);
+    if (signals[k].name == "x_error") EXPECT_EQ(c.learner.actor_input.scale[k], 5);
+    if (signals[k].name == "previous_bias") EXPECT_EQ(c.learner.actor_input.scale[k], 1);
+  }
+}
+
+}  // namespace
+}  // namespace flappy::learn

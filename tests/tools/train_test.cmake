@@ -1,0 +1,116 @@
+# flappy-train as a person meets it: what it prints, writes and refuses, and what is left of a run that is killed.
+#   cmake -DPROGRAM=flappy-train -DSOURCE=the project -DWORK=a folder to use -P train_test.cmake
+cmake_minimum_required(VERSION 3.25)
+include(${CMAKE_CURRENT_LIST_DIR}/program.cmake)
+find_program(TIMEOUT timeout REQUIRED)
+set(escape ${SOURCE}/configs/train/escape.toml)
+set(small --set collect.flappers=48 --set collect.vehicles=16 --set networks.critic=[32,32] --set learn.replay=4000
+  --set learn.batch=64 --set evaluate.vehicles=32 --set flight.duration_s=0.4 --set task.success.keep.from_s=0.36
+  --set task.success.keep.until_s=0.4)
+set(some ${small} --set learn.updates=6000 --set evaluate.every=1200 --set checkpoint.every=120)
+
+# ---- a run and what it leaves
+
+run(${escape} ${some} --out ${WORK}/whole --threads 1 --json ${WORK}/whole.json)
+expect_equal("stderr" "${err}" "")
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "^${WORK}/whole: seed 0, 1 threads, [0-9]+ MB of memory, at most [0-9]+ MB on disk\n")
+foreach(row IN ITEMS "trained: seed 0, 6000 updates in [0-9.]+ s .and [0-9.]+ s of evaluation., [0-9.]+ million environment steps\n"
+    "best success on validation vehicles: [0-9.]+ %, at update [0-9]+\n" "time to 50, 80, 90, 95 % success:( [-0-9.s]+)+\n"
+    "simulation [0-9]+ %, learning [0-9]+ %, the rest [0-9]+ %" "policy ${WORK}/whole/best.json, last checkpoint's payload [0-9a-f]+\n")
+  expect_match("stdout" "${out}" "${row}")
+endforeach()
+set(figures seed=NUMBER wall_s=NUMBER env_steps=NUMBER updates=NUMBER time_to_95_s=NULL share_simulation=NUMBER
+  share_learning=NUMBER payload_sha256=STRING)
+expect_keys(${WORK}/whole.json ${figures})
+expect_keys(${WORK}/whole/summary.json ${figures})
+expect_keys(${WORK}/whole/run.json commit=STRING processor=STRING instruction_set=STRING seed=NUMBER)
+
+# What a run must leave, to the byte.
+function(digest folder result)
+  set(all)
+  foreach(name IN ITEMS best.json last.json metrics.jsonl metrics.csv)
+    file(SHA256 ${folder}/${name} hash)
+    list(APPEND all ${name} ${hash})
+  endforeach()
+  file(READ ${folder}/summary.json json)
+  string(JSON payload GET "${json}" payload_sha256)
+  set(${result} ${all} payload ${payload} PARENT_SCOPE)
+endfunction()
+digest(${WORK}/whole expected)
+
+# ---- killed ten times at random moments: the same bytes in the end
+
+string(RANDOM LENGTH 10 ALPHABET 0123456789 moments)
+set(command ${escape} ${some} --out ${WORK}/killed --threads 2)
+set(kills 0)
+foreach(k RANGE 9)
+  string(SUBSTRING "${moments}" ${k} 1 moment)
+  execute_process(COMMAND ${TIMEOUT} -s KILL 0.${moment}7 ${PROGRAM} ${command} OUTPUT_QUIET ERROR_VARIABLE err RESULT_VARIABLE code)
+  if(code EQUAL 137 OR code MATCHES "killed")
+    math(EXPR kills "${kills} + 1")
+  elseif(NOT code EQUAL 0)
+    message(SEND_ERROR "after kills at 0.[${moments}]7 s: exit code ${code}: ${err}")
+  endif()
+  if(EXISTS ${WORK}/killed/run.json)
+    set(command --resume ${WORK}/killed --threads 1)
+  endif()
+endforeach()
+run(${command})
+expect_equal("exit code after kills at 0.[${moments}]7 s: ${err}" "${code}" 0)
+if(kills LESS 3)
+  message(SEND_ERROR "killed but ${kills} times: the run is too short for this test")
+endif()
+digest(${WORK}/killed actual)
+expect_equal("after kills at 0.[${moments}]7 s" "${actual}" "${expected}")
+
+# ---- Ctrl-C: checkpoint, summary, and how to go on
+
+execute_process(COMMAND ${TIMEOUT} --foreground --preserve-status -s INT 1 ${PROGRAM} ${escape} ${small} --set learn.updates=1000000
+  --set evaluate.every=1000000 --set checkpoint.every=1000000 --out ${WORK}/stopped OUTPUT_VARIABLE out ERROR_VARIABLE err RESULT_VARIABLE code)
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "stopped: seed 0, [0-9]+ updates in .*go on: flappy-train --resume ${WORK}/stopped\n")
+expect_keys(${WORK}/stopped/summary.json updates=NUMBER stopped=BOOLEAN)
+file(GLOB checkpoints ${WORK}/stopped/checkpoint_*.flappy)
+list(LENGTH checkpoints count)
+expect_equal("checkpoints, of the start and of the stop" "${count}" 2)
+
+# ---- several seeds
+
+run(${escape} ${small} --set learn.updates=60 --set evaluate.every=30 --seeds 1-2 --out ${WORK}/seeds --json ${WORK}/seeds.json)
+expect_equal("exit code: ${err}" "${code}" 0)
+file(STRINGS ${WORK}/seeds/curve.csv lines)
+list(LENGTH lines count)
+expect_equal("lines of curve.csv" "${count}" 3)
+file(READ ${WORK}/seeds/curve.svg svg)
+expect_match("curve.svg" "${svg}" "<svg ")
+file(READ ${WORK}/seeds.json json)
+string(JSON count LENGTH "${json}")
+expect_equal("summaries" "${count}" 2)
+
+# ---- what is refused
+
+expect_refused("${WORK}/whole: holds a run; accepted: a new folder, or --resume ${WORK}/whole" ${escape} ${some} --out ${WORK}/whole)
+expect_refused("flappy-train: what to train is not clear; accepted: a configuration, or --resume RUN")
+expect_refused("${WORK}/none: is no run folder; accepted: a folder that flappy-train left" --resume ${WORK}/none)
+expect_refused("--seeds 4-2: is no range of seeds; accepted: 0-4" ${escape} --seeds 4-2)
+expect_refused("--set learn.speed=1: learn.speed: unknown key; accepted: actor_rate, averaging, batch, critic_rate, huber, last_rate, policy_averaging, policy_delay, replay, target_noise, target_noise_clip, twin, updates, updates_per_step"
+  ${escape} --set learn.speed=1 --out ${WORK}/refused)
+expect_refused("${WORK}/none.json: cannot be read: No such file or directory" ${escape} --init ${WORK}/none.json --out ${WORK}/refused)
+file(TOUCH ${WORK}/file)
+expect_refused("${WORK}/file: cannot be written: Not a directory" ${escape} --out ${WORK}/file)
+
+# a damaged checkpoint is named, and the one before is offered
+file(GLOB checkpoints ${WORK}/whole/checkpoint_*.flappy)
+list(SORT checkpoints)
+list(GET checkpoints -1 newest)
+list(GET checkpoints -2 before)
+get_filename_component(before_name ${before} NAME)
+execute_process(COMMAND sh -c "head -c -5 ${newest} > ${newest}.cut && mv ${newest}.cut ${newest}")
+run(--resume ${WORK}/whole)
+expect_equal("exit code" "${code}" 2)
+expect_match("stderr" "${err}" "^${newest}: .*${before_name}, is good: --resume ${WORK}/whole --from ${before_name}\n$")
+run(--resume ${WORK}/whole --from ${before_name})
+expect_equal("exit code" "${code}" 0)
+digest(${WORK}/whole actual)
+expect_equal("from the one before" "${actual}" "${expected}")

@@ -1,0 +1,27 @@
+// Updates per second of the learner, beside LibTorch.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "learn/learner.hpp"
+#include "speed.hpp"
+
+namespace flappy::bench {
+
+struct LearnerRow {
+  std::string name;
+  learn::LearnerOptions options;
+  double multiply_adds = 0;           ///< of an update, without padding
+  Figure updates_per_s;               ///< one core
+  std::optional<Figure> torch_per_s;  ///< one core, the same update in plain LibTorch
+  std::optional<Figure> times_torch;  ///< pair by pair
+  Figure two_thread_scaling;          ///< wall time, pair by pair
+};
+
+/// `progress(done, total)` is called between measurements.
+std::vector<LearnerRow> measure_learner(const SpeedOptions& options, const std::function<void(int, int)>& progress);
+
+}  // namespace flappy::bench
