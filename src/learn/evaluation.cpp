@@ -38,13 +38,6 @@ Task without_policy(Task task) {
   return task;
 }
 
-/// Control periods between a policy's actions.
-template <class AnyTask>
-std::int64_t hold_of(const AnyTask& task) {
-  if constexpr (requires { task.hold; }) return task.hold;
-  else return 1;
-}
-
 /// What one motor draws, signed: V (V - K N psi')/R; what it gives back counts.
 struct MotorDraw {
   double back_emf_V_s, per_ohm;
@@ -63,7 +56,7 @@ class Part {
  public:
   Part(const FlyConfig& config, const flight::FleetOptions& options, std::size_t count,
        const std::vector<flight::Snapshot<T>>& hover, const Pilot& pilot, Detail detail)
-      : fleet_(count, config.vehicle, options), pilot_(pilot), outcomes_(count), hold_(hold_of(options.task)) {
+      : fleet_(count, config.vehicle, options), pilot_(pilot), outcomes_(count), hold_(options.task.hold) {
     for (std::size_t i = 0; i < count; ++i) {
       if (!hover.empty()) {
         fleet_.start(i, 0, hover[i]);

@@ -146,7 +146,7 @@ TEST(Evaluator, JudgesTheSameInBothDetails) {
 }
 
 TEST(Evaluator, FliesThePolicyFromOutsideAsTheActor) {
-  const FlyConfig config = escape();
+  const FlyConfig config = escape({"task.action.hold_s=0.004"});
   const auto actor = random_actor(config.fleet.task);
   const Outside outside(*actor, config.fleet.task);
   Evaluator evaluator(config, {.count = 20, .part = 12});
@@ -160,15 +160,20 @@ TEST(Evaluator, FliesThePolicyFromOutsideAsTheActor) {
     EXPECT_EQ(beside[i].manoeuvre_s, inside[i].manoeuvre_s);
     EXPECT_NEAR(inside[i].manoeuvre_s, 0.35, 1e-9);  // nobody is handed back to before
   }
-  // all at once, each control period until hand-back at 0.35 s
-  ASSERT_EQ(outside.calls.size(), 2 * 175u);
+  // all at once, every other control period of the 175 until hand-back at 0.35 s
+  ASSERT_EQ(outside.calls.size(), 2 * 88u);
   EXPECT_EQ(outside.calls.front(), 12u);
   EXPECT_EQ(outside.calls.back(), 8u);
 
   // what -1 and 1 stand for, to the bit
   const auto extreme = actor_for(config.fleet.task, 0, {30, -30, 30, -30});
   const Outside same(*extreme, config.fleet.task);
-  EXPECT_EQ(hash(evaluator.fly({extreme, nullptr}, Detail::full)), hash(evaluator.fly({nullptr, &same}, Detail::full)));
+  const auto flown = [&](const Pilot& pilot) {
+    Evaluation e = evaluator.fly(pilot, Detail::full);
+    for (Outcome& o : e.flights) o.hash = 0;  // the fleet adds up what an actor of its own earns with an action
+    return hash(e);
+  };
+  EXPECT_EQ(flown({extreme, nullptr}), flown({nullptr, &same}));
 }
 
 TEST(Evaluator, RefusesPilotsOfAnotherTask) {
