@@ -69,7 +69,7 @@ std::string first_error(const fs::path& header, const std::string& complaints) {
   constexpr std::string_view kMark = "error: ";
   const std::size_t mark = complaints.find(kMark);
   const std::size_t begin = mark == std::string::npos ? 0 : complaints.rfind('\n', mark) + 1;
-  const std::string line = complaints.substr(begin, complaints.find('\n', begin) - begin);
+  std::string line = complaints.substr(begin, complaints.find('\n', begin) - begin);
   if (line.starts_with(header.string() + ":")) return line;
   return header.string() +
          ": does not compile: " + (mark == std::string::npos ? line : line.substr(mark - begin + kMark.size()));

@@ -21,8 +21,8 @@ std::string reason(const std::string& complaint) {
 
 class TorchScript : public Policy {
  public:
-  TorchScript(torch::jit::Module module, int observations, int actions)
-      : Policy(observations, actions), module_(std::move(module)) {
+  TorchScript(const torch::jit::Module& module, int observations, int actions)
+      : Policy(observations, actions), module_(module) {
     module_.eval();
   }
 

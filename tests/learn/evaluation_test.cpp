@@ -266,6 +266,9 @@ TEST(Evaluator, StartsWhereTasksDoNotStartSettled) {
   EXPECT_EQ(hash(evaluator.fly(pilot, Detail::full)), hash(once));
   EXPECT_NE(hash(Evaluator(escape(), {.count = 70}).fly(pilot, Detail::full)), hash(once));
   EXPECT_EQ(once.steps, 70 * 7000);
+  config.randomisation.reset();
+  const Evaluation alike = Evaluator(config, {.count = 70}).fly(pilot, Detail::full);
+  for (std::size_t i = 0; i < 70; ++i) EXPECT_NE(alike.flights[i].hash, once.flights[i].hash);
 }
 
 TEST(Evaluator, StopsWhenAsked) {
@@ -280,7 +283,7 @@ TEST(Evaluator, StopsWhenAsked) {
   };
   EXPECT_TRUE(until(0.01).stopped);
   EXPECT_EQ(until(0.01).flights.size(), 0u);
-  const Evaluation most = until(0.9);
+  const Evaluation most = until(0.98);  // amid the flight of the last part
   EXPECT_TRUE(most.stopped);
   EXPECT_EQ(most.flights.size(), 16u);  // whole parts
   const Evaluation all = until(2);
