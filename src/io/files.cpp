@@ -167,15 +167,16 @@ void AtomicFile::commit() {
   if (std::fflush(file_) != 0 || fsync(fileno(file_)) != 0) refuse(errno);
   if (std::rename(temporary_.c_str(), path_.c_str()) != 0) refuse(errno);
   std::fclose(std::exchange(file_, nullptr));
-  // The name is on the disk once its folder is; a file system that cannot do that has done what it can.
-  const auto folder = path_.has_parent_path() ? path_.parent_path() : std::filesystem::path(".");
-  if (const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); descriptor >= 0) {
-    fsync(descriptor);
-    close(descriptor);
-  }
 }
 
 void AtomicFile::refuse(int error) const { refuse_file(path_, "cannot be written", error); }
+
+void sync_folder(const std::filesystem::path& folder) {
+  const int descriptor = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) refuse_file(folder, "cannot be read", errno);
+  fsync(descriptor);  // some file systems refuse this of a folder: then they have done what they can
+  close(descriptor);
+}
 
 void write_atomically(const std::filesystem::path& path, std::string_view text) {
   AtomicFile file(path);

@@ -44,7 +44,8 @@ class AtomicFile {
   AtomicFile& operator=(const AtomicFile&) = delete;
 
   void write(std::string_view text);
-  /// Flushes to the disk and renames; call it once, last.
+  /// Flushes to the disk and renames; call it once, last. Should the power fail, the new name is there only after
+  /// sync_folder().
   void commit();
 
  private:
@@ -54,6 +55,9 @@ class AtomicFile {
   std::filesystem::path temporary_;
   std::FILE* file_ = nullptr;
 };
+
+/// Brings the names of a folder's files onto the disk.
+void sync_folder(const std::filesystem::path& folder);
 
 /// Writes a whole file through AtomicFile.
 void write_atomically(const std::filesystem::path& path, std::string_view text);

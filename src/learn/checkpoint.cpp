@@ -54,7 +54,7 @@ std::optional<std::uint64_t> update_of(const std::filesystem::path& path) {
 }  // namespace
 
 CheckpointWriter::CheckpointWriter(const std::filesystem::path& path, CheckpointHeader header)
-    : file_(path), header_(std::move(header)) {
+    : folder_(path.parent_path()), file_(path), header_(std::move(header)) {
   file_.write(kFirst);
 }
 
@@ -84,6 +84,7 @@ std::string CheckpointWriter::commit() {
   file_.write(io::sha256(text));
   file_.write(kEnd);
   file_.commit();
+  io::sync_folder(folder_);
   return list["payload_sha256"];
 }
 

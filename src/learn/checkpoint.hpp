@@ -65,10 +65,11 @@ class CheckpointWriter {
   }
   void put_bytes(std::string_view name, std::span<const std::byte> bytes);
 
-  /// Call it once, last. Returns the payload's SHA-256, see Checkpoint.
+  /// On the disk, power failure or not, when it returns: the payload's SHA-256, see Checkpoint. Call it once, last.
   std::string commit();
 
  private:
+  std::filesystem::path folder_;
   io::AtomicFile file_;
   CheckpointHeader header_;
   std::vector<CheckpointSection> sections_;

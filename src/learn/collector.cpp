@@ -9,8 +9,6 @@
 namespace flappy::learn {
 namespace {
 
-constexpr double kSettle_s = 3;  // of hover before an episode that starts settled
-
 flight::FlyConfig of_training(const TrainConfig& config) {
   flight::FlyConfig fly = config.fly;
   fly.fleet.seed = config.seed;
@@ -34,7 +32,7 @@ Collector::Collector(const TrainConfig& config)
       staged_(fleet_.blocks()),
       seconds_(fleet_.blocks()) {
   if (fly_.fleet.task.start.settled)
-    pool_ = flight::settle<float>(fly_.fleet, config.vehicles, kSettle_s,
+    pool_ = flight::settle<float>(fly_.fleet, config.vehicles, flight::kHover_s,
                                   [&](std::uint32_t flapper) { return fly_.vehicle_of(flapper); });
   fleet_.set_exploration(config.exploration);
   for (std::size_t i = 0; i < fleet_.size(); ++i) start(i);

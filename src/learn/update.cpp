@@ -68,7 +68,8 @@ FLAPPY_INLINE void add_noise(const UpdatePlan<T>& plan, std::uint32_t sample, in
     }
 }
 
-/// What the critics are to predict, into w.goal. A transition that ended its episode does not look at what came next.
+/// What the critics are to predict, into w.goal. A discount of 0 hides what comes next, which the clip has made finite
+/// whatever it was.
 template <class T>
 FLAPPY_INLINE void find_goal(const UpdatePlan<T>& plan, const Workplace<T>& w, std::uint32_t sample) {
   const int actions = plan.actor.widths[plan.actor.layers];
@@ -90,8 +91,7 @@ FLAPPY_INLINE void find_goal(const UpdatePlan<T>& plan, const Workplace<T>& w, s
   for_rows<T>(1, [&](std::ptrdiff_t s) {
     const L<T> reward = L<T>::load(w.columns + plan.reward * kRow + s);
     const L<T> discount = L<T>::load(w.columns + plan.discount * kRow + s);
-    const L<T> goal = discount * L<T>::load(w.goal + s) + reward;
-    where(discount == L<T>(0), reward, goal).store(w.goal + s);
+    L<T>(discount * L<T>::load(w.goal + s) + reward).store(w.goal + s);
   });
 }
 

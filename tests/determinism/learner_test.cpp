@@ -22,10 +22,12 @@ struct Case {
 std::vector<Case> cases() {
   LearnerOptions many = ddpg(kPlain), huber = td3(kPlain);
   many.batch = 17 * kChunk;
+  many.actor_hidden = {16};
+  many.critic_hidden = {24};
   huber.huber = 0.5;
-  return {{"td3", td3(kPrivileged), 0x7829ecffb37dd2e4, 0x5c136c0702aa76d7},
-          {"ddpg", many, 0xeae4313e68e26525, 0x28f4b9356167a01b},
-          {"huber", huber, 0x13d12cc8e8693862, 0x655294ab6e936990}};
+  return {{"td3", td3(kPrivileged), 0x76204f9c1e125239, 0xfed1cb92aaf8870b},
+          {"ddpg", many, 0x4d7ac9b0f0fcbaf0, 0xd171fbb8277f2b65},
+          {"huber", huber, 0x18d717264c53828c, 0xe001f25fd5ce2200}};
 }
 
 template <class T>
@@ -42,7 +44,7 @@ void train(Learner<T>& learner, const Replay& replay, int updates, const Compani
   for (int i = 0; i < updates; ++i) learner.update(replay, 3e-4, 1e-3, beside);
 }
 
-constexpr int kUpdates = 5;
+constexpr int kUpdates = 4;
 
 template <class T>
 void one_result(const Case& c) {
@@ -52,7 +54,8 @@ void one_result(const Case& c) {
   for (const std::string& set : sim::instruction_sets())
     for (const int threads : {1, 2, 3})
       for (const std::size_t beside : {0U, 7U}) {
-        if (set != sim::best_instruction_set() && threads != 2) continue;  // v2 emulates fused multiply-adds
+        // once is enough for the others, of which two emulate fused multiply-adds
+        if (set != sim::best_instruction_set() && (threads != 2 || beside == 0)) continue;
         o.instruction_set = set;
         o.threads = threads;
         Learner<T> learner(o);

@@ -31,8 +31,8 @@ TEST(Tensorboard, WritesTheBytesOfTheFormat) {
   EXPECT_EQ(start.substr(0, 8), bytes({24, 0, 0, 0, 0, 0, 0, 0}));
   EXPECT_EQ(start.substr(12, 24), bytes({0x09, 0, 0, 0, 0, 0, 0, 0xf8, 0x3f, 0x1a, 13}) + "brain.Event:2");
   const std::string event =
-      scalar_event(1.5, 300, {"a", "gone", "bc"}, std::vector{0.5, std::numeric_limits<double>::infinity(), -0.5});
-  const std::string data = bytes({0x09, 0, 0, 0, 0, 0, 0, 0xf8, 0x3f}) + bytes({0x10, 0xac, 0x02}) + bytes({0x2a, 21}) +
+      scalar_event(1.5, 200, {"a", "gone", "bc"}, std::vector{0.5, std::numeric_limits<double>::infinity(), -0.5});
+  const std::string data = bytes({0x09, 0, 0, 0, 0, 0, 0, 0xf8, 0x3f}) + bytes({0x10, 0xc8, 0x01}) + bytes({0x2a, 21}) +
                            bytes({0x0a, 8, 0x0a, 1, 'a', 0x15, 0, 0, 0, 0x3f}) +
                            bytes({0x0a, 9, 0x0a, 2, 'b', 'c', 0x15, 0, 0, 0, 0xbf});
   EXPECT_EQ(event.substr(12, event.size() - 16), data);

@@ -163,7 +163,8 @@ TEST_F(CheckpointTest, RefusesEveryOtherLength) {
   EXPECT_NE(open_bytes(good + std::string(1, '\0')), "accepted");
   EXPECT_NE(open_bytes(good + good), "accepted");
   EXPECT_NE(open_bytes("flappy checkpoint 1\n" + good), "accepted");
-  // a byte that belongs to no section
+  EXPECT_EQ(open_bytes(std::string(good).erase(20 + 16 + 8 + 1, 1)),
+            (run_ / "changed").string() + ": is damaged: section config is cut short");
   EXPECT_EQ(open_bytes(std::string(good).insert(20 + 16 + 8 + 1 + 6, "x")),
             (run_ / "changed").string() + ": is damaged: bytes that belong to no section");
 }
@@ -184,6 +185,8 @@ TEST_F(CheckpointTest, RefusesOtherSections) {
   std::vector<float> actor(5);
   EXPECT_EQ(refusal([&] { checkpoint.get("actor", actor); }),
             name + ": section actor has 16 bytes; accepted: 20, as this configuration has it");
+  EXPECT_EQ(refusal([&] { checkpoint.get("actor", std::span(actor).first(3)); }),
+            name + ": section actor has 16 bytes; accepted: 12, as this configuration has it");
   EXPECT_EQ(refusal([&] { checkpoint.get("critic", actor); }),
             name + ": has no section critic; sections here: actor, update, phase, config, empty");
   EXPECT_EQ(refusal([&] { static_cast<void>(checkpoint.text("critic")); }),
@@ -242,12 +245,16 @@ TEST_F(CheckpointTest, AFullDiskLeavesTheEarlierOne) {
     const rlimit limit{1 << 20, 1 << 20};
     setrlimit(RLIMIT_FSIZE, &limit);
     std::signal(SIGXFSZ, SIG_IGN);
-    const std::string message = refusal([&] {
-      CheckpointWriter writer(run_ / checkpoint_name(7), {});
-      writer.put("replay", std::vector<char>(2 << 20));
-      writer.commit();
-    });
-    _exit(message == (run_ / checkpoint_name(7)).string() + ": cannot be written: File too large" ? 0 : 1);
+    // the section does not fit, or only the list behind it
+    const auto message = [&](std::size_t size, bool commit) {
+      return refusal([&] {
+        CheckpointWriter writer(run_ / checkpoint_name(7), {});
+        writer.put("replay", std::vector<char>(size));
+        if (commit) writer.commit();
+      });
+    };
+    const std::string refused = (run_ / checkpoint_name(7)).string() + ": cannot be written: File too large";
+    _exit(message(2 << 20, false) == refused && message((1 << 20) - 100, true) == refused ? 0 : 1);
   }
   int status = 0;
   ASSERT_EQ(waitpid(child, &status, 0), child);

@@ -87,7 +87,8 @@ struct TorchLearner::Storage {
   }
 };
 
-TorchLearner::TorchLearner(const LearnerOptions& o, const learn::Replay& replay, bool twice, const Numbers (&start)[3])
+TorchLearner::TorchLearner(const LearnerOptions& o, const learn::Replay& replay, bool twice,
+                           const std::array<Numbers, 3>& start)
     : storage_(std::make_unique<Storage>()) {
   version();
   Storage& s = *storage_;
@@ -129,7 +130,8 @@ TorchLearner::TorchLearner(const LearnerOptions& o, const learn::Replay& replay,
   for (int c = 0; c < (o.twin ? 2 : 1); ++c) {
     for (auto* list : {&s.critics, &s.critic_targets})
       list->push_back(std::make_shared<Perceptron>(widths(seen + o.shape.action, o.critic_hidden, 1),
-                                                   o.critic_activation, false, s.type, start[c]));
+                                                   o.critic_activation, false, s.type,
+                                                   start.at(static_cast<std::size_t>(c))));
     for (const auto& p : s.critics.back()->parameters()) parameters.push_back(p);
   }
   const auto options = torch::optim::AdamOptions().betas({o.beta1, o.beta2}).eps(o.epsilon);

@@ -79,25 +79,16 @@ double per_second(double seconds, double (*clock)(), const std::function<void()>
 class Torch {
  public:
   Torch(const LearnerOptions& o, const Replay& replay, const Learner<float>& start)
-      : options_(o), replay_(replay), rows_(o.batch) {
-    std::vector<double> numbers[3];
-    for (int n = 0; n < 3; ++n)
-      for (const auto& layer : start.layers(static_cast<Learner<float>::Network>(n)))
-        for (int out = 0; out < layer.outputs; ++out)
-          for (int in = 0; in <= layer.inputs; ++in)
-            numbers[n].push_back(layer.numbers[static_cast<std::size_t>(in * layer.padded + out)]);
-    peer_ = std::make_unique<oracle::TorchLearner>(o, replay, false, numbers);
-  }
+      : replay_(replay), rows_(o.batch), peer_(o, replay, false, oracle::TorchLearner::start(start)) {}
   void update() {
     replay_.draw(0, count_++, 0, rows_);
-    peer_->update(rows_, {}, kRate, kRate);
+    peer_.update(rows_, {}, kRate, kRate);
   }
 
  private:
-  LearnerOptions options_;
   const Replay& replay_;
   std::vector<std::uint32_t> rows_;
-  std::unique_ptr<oracle::TorchLearner> peer_;
+  oracle::TorchLearner peer_;
   std::uint64_t count_ = 0;
 };
 #endif
