@@ -204,15 +204,15 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   const bool by_estimate = plan.task.hand_back.on_estimate > 0;
   const auto done = by_estimate ? arrived(plan.task.hand_back, score_of(estimate, ref), estimate.body_rate_rad_s, now)
                                 : arrived(plan.task.hand_back, score, truth.body_rate_rad_s, now);
-  if (pays.goal != 0 || pays.arrival != 0) {
-    const L<T> there = closeness(pays, score, truth);
-    const L<T> early = L<T>(pays.early) * max(L<T>(L<T>(plan.task.hand_back.at_s) - now), L<T>(0));
-    const L<T> once = where(done & (episode.handed_back == L<T>(0)), L<T>(L<T>(pays.arrival) * there + early), L<T>(0));
-    episode.reward += L<T>(pays.goal) * there + once;
+  note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode);
+  if (pays.goal != 0) episode.reward += L<T>(pays.goal) * closeness(pays, score, truth);
+  if (pays.kept != 0) {
+    const auto then = (now > L<T>(pays.until_s)) & (now < L<T>(pays.until_s + plan.task.tick_s));
+    const auto kept = (episode.captured_s > L<T>(0)) & (episode.lost_s == L<T>(0));
+    episode.reward += where(then & kept, L<T>(pays.kept), L<T>(0));
   }
   episode.gain += episode.reward;
   episode.handed_back = where(done, L<T>(1), episode.handed_back);
-  note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode);
   for (int i = 0; i < kActions; ++i) episode.previous[i] = episode.action[i];
 
   look_for_ends(plan.task.limits, score, now, [&](typename L<T>::Mask mask, std::uint32_t bit) {

@@ -124,7 +124,7 @@ struct Fleet<T>::Storage {
     TaskConstants<double> task = options.task.constants;
     task.tick_s = period_s;
     // half-way between ticks, so that rounding cannot move an end by one
-    for (double* from : {&task.limits.time_s, &task.hand_back.at_s, &task.success.keep_from_s})
+    for (double* from : {&task.limits.time_s, &task.hand_back.at_s, &task.success.keep_from_s, &task.reward.until_s})
       *from = (std::ceil(*from / period_s - 1e-6) - 0.5) * period_s;
     for (double* after :
          {&task.limits.faced_by_s, &task.limits.arrived_by_s, &task.success.by_s, &task.success.keep_until_s})

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "flight/settle.hpp"
@@ -25,6 +26,8 @@ Collector::Collector(const TrainConfig& config)
       fleet_(config.flappers, fly_.vehicle, fly_.fleet),
       inputs_(fly_.fleet.task.observation().size()),
       kept_(config.return_steps),
+      paid_ticks_(
+          static_cast<std::uint32_t>(std::lround(fly_.fleet.task.constants.reward.until_s * fly_.fleet.control_hz))),
       pending_(config.flappers),
       observations_(config.flappers * kept_ * inputs_),
       actions_(config.flappers * kept_ * flight::kActions),
@@ -52,6 +55,7 @@ void Collector::start(std::size_t i) {
     fleet_.start(i, p.episode);
   }
   p.count = 0;
+  p.waits = 0;
   p.gain = 0;
   fleet_.observation(i, observation(i, 0));
 }
@@ -73,17 +77,24 @@ void Collector::run(std::size_t item) {
 /// What the last action of a flapper led to.
 void Collector::gather(std::size_t i, std::size_t item) {
   Pending& p = pending_[i];
-  const auto action = fleet_.action(i);
-  std::copy(action.begin(), action.end(), &actions_[(i * kept_ + p.count) * flight::kActions]);
-  gains_[i * kept_ + p.count] = static_cast<float>(config_.reward_scale) * fleet_.gain(i);
-  p.gain += gains_[i * kept_ + p.count];
-  ++p.count;
+  const float gain = static_cast<float>(config_.reward_scale) * fleet_.gain(i);
+  p.gain += gain;
+  if (p.waits == 0) {
+    const auto action = fleet_.action(i);
+    std::copy(action.begin(), action.end(), &actions_[(i * kept_ + p.count) * flight::kActions]);
+    gains_[i * kept_ + p.count] = gain;
+    ++p.count;
+  } else {
+    gains_[i * kept_ + p.count - 1] += gain;  // the last action is the one that is paid
+  }
 
   float next[flight::kMaxObservation];
   fleet_.observation(i, next);
   const std::uint32_t ended = fleet_.ended(i);
   const bool handed_back = fleet_.handed_back(i);
   const bool terminated = handed_back || (ended & ~std::uint32_t{flight::kTimeOut}) != 0;
+  p.waits = handed_back && ended == 0 && fleet_.tick(i) < paid_ticks_;
+  if (p.waits != 0) return;
   if (terminated || ended != 0) {
     while (p.count > 0) emit(i, item, next, terminated);
     ++p.episodes;

@@ -40,7 +40,7 @@ class Collector {
   struct Pending {
     std::uint32_t count = 0;  // actions, at most `return_steps`
     std::uint32_t episode = 0;
-    std::uint64_t episodes = 0;
+    std::uint64_t episodes = 0, waits = 0;  // 1: handed back, and paid until the task's reward ends
     EpisodeSums sums;
     double gain = 0;  // of its episode
   };
@@ -54,6 +54,7 @@ class Collector {
   flight::Fleet<float> fleet_;
   std::vector<flight::Snapshot<float>> pool_;
   std::size_t inputs_, kept_;
+  std::uint32_t paid_ticks_;
   std::vector<Pending> pending_;            // of each flapper
   std::vector<float> observations_;         // [flapper][kept_][inputs_]: before each action that is pending
   std::vector<float> actions_, gains_;      // [flapper][kept_][kActions], [flapper][kept_]

@@ -107,40 +107,50 @@ TEST(Trim, IsAllThatActsUntilHandedBack) {
   EXPECT_GT(mean, 10.5);                       // and more than what the controller takes off with
 }
 
-/// What arriving pays, what the time left pays, and the trim and time that a policy may observe.
-TEST(HandBack, PaysOnceForWhereItIsAndWhenItComes) {
+/// Time and trim that a policy may observe, what closeness pays, and what keeping the goal does.
+TEST(HandBack, PaysAtTheGoalAndOnceForKeepingIt) {
   std::string text = holding(0, 0);
   text.insert(text.find("[start]"), "base = \"trim\"\n");
   text.replace(text.find("\"beat_phase\""), 12, "\"time\", \"trim\"");
   text.replace(text.find("alive = 1.0\nposition_1_m = 2.0"), 30,
-               "arrival = 40.0\nearly_1_s = 7.0\ngoal = 2.0\ngoal_m = 0.06\ngoal_m_s = 0.6\ngoal_rad_s = "
+               "until_s = 0.02\nkept = 40.0\ngoal = 2.0\ngoal_m = 0.06\ngoal_m_s = 0.6\ngoal_rad_s = "
                "10.0\ngoal_tilt_rad = 0.5\ngoal_heading_rad = 0.8");
   text += "[hand_back]\non = \"estimate\"\nat_s = 0.1\ndistance_m = 0.05\n";
+  text +=
+      "[success.capture]\nby_s = 0.35\ndistance_m = 0.06\nspeed_m_s = 1.0\nbody_rate_rad_s = 15.0\ntilt_rad = "
+      "0.7\nheading_rad = 0.8\n"
+      "[success.keep]\nfrom_s = 0.01\nuntil_s = 0.3\ndistance_m = 0.1\ntilt_rad = 0.8\nheading_rad = 0.8\n";
   FleetOptions o = fleet_options(sensors("paper"), controller("arc"), task(text));
   const auto vehicle = [](std::uint32_t) { return test::identified(); };
   const auto pool = settle<double>(o, 1, 3, vehicle);
-  Fleet<double> fleet(1, test::identified(), o);
+  Fleet<double> fleet(2, test::identified(), o);
   fleet.start(0, 0, pool[0]);
+  sim::FlapperState away;
+  away.position_m[0] = 1;
+  fleet.start(1, 0, away, sim::Start::flying);
   const auto observed = fleet.observation(0);  // position error, time, trim
   EXPECT_EQ(observed[3], 0);
-  fleet.step();
-  EXPECT_TRUE(fleet.handed_back(0));  // at the goal from the start
-  EXPECT_NEAR(fleet.observation(0)[3], 0.002, 1e-15);
-  const sim::Input u = fleet.input(0);  // of which the trim is all, until then
-  EXPECT_NEAR(observed[4], u.amplitude_V, 1e-9);
-  EXPECT_NEAR(observed[5], u.difference_V, 1e-9);
-  EXPECT_NEAR(observed[6], u.bias_V, 1e-9);
-  EXPECT_NEAR(observed[7], u.split_cycle, 1e-9);
-  std::vector<double> as_true(8);
-  fleet.true_observation(0, as_true.data());
-  EXPECT_EQ(as_true[0], fleet.truth(0).position_m[0] - fleet.target(0).position_m[0]);
-  const double first = fleet.reward(0);
-  fleet.step();
-  const double then = fleet.reward(0);  // 2 G alone
-  EXPECT_GT(then, 0.5);
-  EXPECT_LT(then, 2);
-  // at_s counts to the middle of its last period; G moves by some per cent within a period of the beat
-  EXPECT_NEAR(first - 7 * (0.099 - 0.002), 42 / 2 * then, 0.1 * 21 * then);
+  double last = 0;
+  for (int tick = 1; tick <= 12; ++tick) {
+    fleet.step();
+    if (tick == 1) {
+      EXPECT_TRUE(fleet.handed_back(0));  // at the goal from the start
+      EXPECT_NEAR(fleet.observation(0)[3], 0.002, 1e-15);
+      const sim::Input u = fleet.input(0);  // of which the trim is all, until then
+      const double learnt[] = {u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle};
+      for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(observed[4 + k], learnt[k], 1e-9);
+      std::vector<double> as_true(8);
+      fleet.true_observation(0, as_true.data());
+      EXPECT_EQ(as_true[0], fleet.truth(0).position_m[0] - fleet.target(0).position_m[0]);
+    }
+    // 2 G, which moves by some per cent within a period of the beat; kept at 0.02 s, the tenth tick
+    const double reward = fleet.reward(0) - (tick == 10 ? 40 : 0);
+    EXPECT_GT(reward, 0.5) << tick;
+    EXPECT_LT(reward, 2) << tick;
+    if (tick > 1) EXPECT_NEAR(reward, last, 0.2 * last) << tick;
+    last = reward;
+    EXPECT_LT(fleet.reward(1), 0.01) << tick;  // never captured, so it keeps nothing
+  }
 }
 
 TEST(Fleet, FliesOnFromItsMemory) {

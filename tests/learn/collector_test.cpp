@@ -44,12 +44,12 @@ Collected collect(const TrainConfig& c, int steps = kSteps) {
   return {std::move(replay), collector.take_sums(), episodes, env_steps};
 }
 
-/// A reward that can be told from what is observed: 1 a period, and 100 a second for what is left at hand-back.
+/// A reward that can be told from how long a flight lasts: 1 a period.
 Overrides plain(std::size_t steps) {
-  Overrides list = {"learn.replay=20000",        "reward.scale=0.5",
-                    "reward.discount=0.9",       "reward.steps=" + std::to_string(steps),
-                    "task.reward.early_1_s=100", "task.reward.alive=1"};
-  for (const char* off : {"action", "near", "facing", "level", "goal", "arrival"})
+  Overrides list = {"learn.replay=20000",  "reward.scale=0.5",
+                    "reward.discount=0.9", "reward.steps=" + std::to_string(steps),
+                    "task.reward.alive=1", "task.reward.until_s=0"};
+  for (const char* off : {"action", "near", "facing", "level", "goal", "kept"})
     list.push_back(std::string("task.reward.") + off + "=0");
   return list;
 }
@@ -86,22 +86,13 @@ TEST(Collector, OneStepTransitionsAreWhatWasFlown) {
   ASSERT_EQ(all.replay.size(), kSteps * c.flappers);
   const Transitions t(c, all.replay);
   double episodes = 0, gain = 0;
-  int early = 0;
   for (std::size_t i = 0; i < c.flappers; ++i) {
     double since = 0;
     for (int step = 0; step < kSteps; ++step) {
       const float* row = t.row(step, i);
       ASSERT_NEAR(t.time_s(t.next(row)), t.time_s(t.seen(row)) + 0.01, 1e-6);
       const bool ended = t.discount(row) == 0;
-      double expected = 0.5 * 5;  // periods of an action
-      // at_s counts to the middle of its last period, 0.349 s; a flight may be handed back within an action, and flies on
-      if (ended && t.time_s(t.next(row)) < 0.3499) {
-        EXPECT_GT(t.reward(row), expected + 0.5 * 100 * (0.349 - t.time_s(t.next(row))) - 1e-4);
-        EXPECT_LT(t.reward(row), expected + 0.5 * 100 * (0.349 - t.time_s(t.seen(row))));
-        expected = t.reward(row);
-        ++early;
-      }
-      ASSERT_NEAR(t.reward(row), expected, 1e-5);
+      ASSERT_NEAR(t.reward(row), 0.5 * 5, 1e-5);  // the periods of an action, handed back within it or not
       since += t.reward(row);
       if (ended) episodes += 1, gain += since, since = 0;
       else ASSERT_FLOAT_EQ(t.discount(row), 0.9F);
@@ -156,6 +147,32 @@ TEST(Collector, ReturnsAreSumsOverTheirSteps) {
     }
   EXPECT_EQ(compared, (kSteps - 2) * one.flappers);
   EXPECT_GE(cut_short, 2 * one.flappers);
+}
+
+/// After the hand-back the controller flies on, and what that earns is the last action's.
+TEST(Collector, PaysTheLastActionForWhatComesAfterIt) {
+  Overrides list = plain(1);
+  list.back() = "task.reward.until_s=0.5";
+  list.push_back("task.end.distance_m=100");
+  const TrainConfig c = small_training(list);
+  const Collected all = collect(c, 100);
+  EXPECT_GE(all.sums.handed_back, c.flappers);
+  std::size_t last = 0, others = 0;
+  for (std::size_t k = 0; k < all.replay.size(); ++k) {
+    const float* row = all.replay.row(k);
+    if (row[all.replay.layout().discount] > 0) {
+      EXPECT_FLOAT_EQ(row[all.replay.layout().reward], 2.5F);
+      ++others;
+    } else if (row[all.replay.layout().reward] > 2.5F) {
+      // by 0.35 s at the latest, to 0.5 s: 15 steps and its own at the least
+      EXPECT_GE(row[all.replay.layout().reward], 2.5F * 16 - 1e-3F);
+      ++last;
+    }
+  }
+  EXPECT_EQ(last, static_cast<std::size_t>(all.sums.handed_back));
+  EXPECT_GT(others, 20 * last);
+  EXPECT_EQ(all.sums.terminated, 0);
+  EXPECT_NEAR(all.sums.gain / all.sums.episodes, 0.5 * 250, 1e-3);  // 0.5 s each
 }
 
 TEST(Collector, ATimeOutIsNoTermination) {

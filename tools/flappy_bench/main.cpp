@@ -130,8 +130,8 @@ Json convergence(const model::Vehicle& vehicle) {
 
 Json learner(const SpeedOptions& options) {
   io::ProgressLine progress("measured");
-  const std::vector<LearnerRow> rows = measure_learner(
-      options, [&](int done, int total) { progress.show(static_cast<double>(done) / total); });
+  const std::vector<LearnerRow> rows =
+      measure_learner(options, [&](int done, int total) { progress.show(static_cast<double>(done) / total); });
   progress.clear();
   const double peak = peak_multiply_adds_per_s();
   std::printf("updates/s, actor 32-32, one core, median of %d [range], %s\n", options.rounds,
