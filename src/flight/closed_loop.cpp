@@ -205,11 +205,16 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   const auto done = by_estimate ? arrived(plan.task.hand_back, score_of(estimate, ref), estimate.body_rate_rad_s, now)
                                 : arrived(plan.task.hand_back, score, truth.body_rate_rad_s, now);
   note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode);
-  if (pays.goal != 0) episode.reward += L<T>(pays.goal) * closeness(pays, score, truth);
-  if (pays.kept != 0) {
+  const auto flies_on = episode.handed_back > L<T>(0), captured = episode.captured_s > L<T>(0);
+  if (pays.goal != 0 || pays.arrival != 0) {
+    const L<T> just = where(done & !flies_on, L<T>(pays.arrival), L<T>(0));
+    episode.reward += L<T>(L<T>(pays.goal) + just) * closeness(pays, score, truth);
+  }
+  if (pays.until_s > 0) {
     const auto then = (now > L<T>(pays.until_s)) & (now < L<T>(pays.until_s + plan.task.tick_s));
-    const auto kept = (episode.captured_s > L<T>(0)) & (episode.lost_s == L<T>(0));
+    const auto kept = captured & (episode.lost_s == L<T>(0));
     episode.reward += where(then & kept, L<T>(pays.kept), L<T>(0));
+    episode.reward = where(flies_on & !captured, L<T>(0), episode.reward);
   }
   episode.gain += episode.reward;
   episode.handed_back = where(done, L<T>(1), episode.handed_back);

@@ -185,6 +185,7 @@ Reward<double> read_reward(const io::Table& table) {
   r.level = weight("level");
   r.near = weight("near");
   r.goal = weight("goal");
+  r.arrival = weight("arrival");
   r.kept = weight("kept");
   r.until_s = table.number_or("reward.until_s", 0, {0, 1e6});
   const auto per = [&](const char* name) {

@@ -52,8 +52,9 @@ enum Ended : std::uint32_t {
 ///   C = |a|^2 action + |a - a_prev|^2 action_change + |p| position + |(roll, pitch, yaw)| angles + |v| velocity + |w| rate
 ///   r = inverse_square / (C^2 + 1e-6) - cost C + facing R'_00 + upright min(0, R'_22) + behind min(0, x + behind_m) + alive
 ///       + level R'_22 + near s(|p| / near_m) + goal G
-/// and once, at until_s: kept, if the goal was captured and is not lost by then. What a policy leads to after the hand-back counts
-/// as its own until until_s. p, x and R' are relative to the set point, and
+/// and once, when it is handed back: arrival G, and at until_s: kept, if the goal was captured and is not lost by then. After the
+/// hand-back only who captured the goal earns; what he earns until until_s is the policy's. p, x and R' are relative to the set
+/// point, and
 ///   G = s(|p| / goal_m) s(|v| / goal_m_s) s(|w| / goal_rad_s) s(tilt / goal_tilt) s(heading error / goal_heading)
 ///   s(x) = 1 / (1 + x^2)
 template <class T>
@@ -61,7 +62,7 @@ struct Reward {
   T action, action_change, position, angles, velocity, body_rate;
   T inverse_square, cost, facing, upright, behind, behind_m, alive;
   T level, near, near_1_m;
-  T goal, kept, until_s;
+  T goal, arrival, kept, until_s;
   T goal_1_m, goal_s_m, goal_s_rad, goal_1_tilt, goal_1_heading;  // of what G falls off with
 };
 

@@ -108,12 +108,12 @@ TEST(Trim, IsAllThatActsUntilHandedBack) {
 }
 
 /// Time and trim that a policy may observe, what closeness pays, and what keeping the goal does.
-TEST(HandBack, PaysAtTheGoalAndOnceForKeepingIt) {
+TEST(HandBack, PaysAtTheGoalAndOnceForArrivingAndForKeepingIt) {
   std::string text = holding(0, 0);
   text.insert(text.find("[start]"), "base = \"trim\"\n");
   text.replace(text.find("\"beat_phase\""), 12, "\"time\", \"trim\"");
   text.replace(text.find("alive = 1.0\nposition_1_m = 2.0"), 30,
-               "until_s = 0.02\nkept = 40.0\ngoal = 2.0\ngoal_m = 0.06\ngoal_m_s = 0.6\ngoal_rad_s = "
+               "until_s = 0.02\nkept = 40.0\narrival = 30.0\ngoal = 2.0\ngoal_m = 0.06\ngoal_m_s = 0.6\ngoal_rad_s = "
                "10.0\ngoal_tilt_rad = 0.5\ngoal_heading_rad = 0.8");
   text += "[hand_back]\non = \"estimate\"\nat_s = 0.1\ndistance_m = 0.05\n";
   text +=
@@ -123,11 +123,14 @@ TEST(HandBack, PaysAtTheGoalAndOnceForKeepingIt) {
   FleetOptions o = fleet_options(sensors("paper"), controller("arc"), task(text));
   const auto vehicle = [](std::uint32_t) { return test::identified(); };
   const auto pool = settle<double>(o, 1, 3, vehicle);
-  Fleet<double> fleet(2, test::identified(), o);
+  Fleet<double> fleet(3, test::identified(), o);
   fleet.start(0, 0, pool[0]);
   sim::FlapperState away;
   away.position_m[0] = 1;
   fleet.start(1, 0, away, sim::Start::flying);
+  away.position_m[0] = 0, away.position_m[1] = 0.3;
+  away.velocity_m_s[0] = 2;
+  fleet.start(2, 0, away, sim::Start::flying);
   const auto observed = fleet.observation(0);  // position error, time, trim
   EXPECT_EQ(observed[3], 0);
   double last = 0;
@@ -143,13 +146,17 @@ TEST(HandBack, PaysAtTheGoalAndOnceForKeepingIt) {
       fleet.true_observation(0, as_true.data());
       EXPECT_EQ(as_true[0], fleet.truth(0).position_m[0] - fleet.target(0).position_m[0]);
     }
-    // 2 G, which moves by some per cent within a period of the beat; kept at 0.02 s, the tenth tick
-    const double reward = fleet.reward(0) - (tick == 10 ? 40 : 0);
+    // 2 G, which moves by some per cent within a period of the beat; 30 G more at the hand-back; kept at 0.02 s, the tenth tick
+    const double reward = (fleet.reward(0) - (tick == 10 ? 40 : 0)) / (tick == 1 ? 16 : 1);
     EXPECT_GT(reward, 0.5) << tick;
     EXPECT_LT(reward, 2) << tick;
     if (tick > 1) EXPECT_NEAR(reward, last, 0.2 * last) << tick;
     last = reward;
+    EXPECT_TRUE(fleet.handed_back(2));  // while it rushes through the goal
+    if (tick > 1) EXPECT_EQ(fleet.reward(2), 0) << tick;
+    else EXPECT_GT(fleet.reward(2), 0) << tick;
     EXPECT_LT(fleet.reward(1), 0.01) << tick;  // never captured, so it keeps nothing
+    EXPECT_GT(fleet.reward(1), 0) << tick;
   }
 }
 

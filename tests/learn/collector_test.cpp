@@ -49,7 +49,7 @@ Overrides plain(std::size_t steps) {
   Overrides list = {"learn.replay=20000",  "reward.scale=0.5",
                     "reward.discount=0.9", "reward.steps=" + std::to_string(steps),
                     "task.reward.alive=1", "task.reward.until_s=0"};
-  for (const char* off : {"action", "near", "facing", "level", "goal", "kept"})
+  for (const char* off : {"action", "near", "facing", "level", "goal", "arrival", "kept"})
     list.push_back(std::string("task.reward.") + off + "=0");
   return list;
 }
@@ -149,11 +149,14 @@ TEST(Collector, ReturnsAreSumsOverTheirSteps) {
   EXPECT_GE(cut_short, 2 * one.flappers);
 }
 
-/// After the hand-back the controller flies on, and what that earns is the last action's.
+/// After the hand-back the controller flies on, and what that earns is the last action's. Here every flight captures its goal.
 TEST(Collector, PaysTheLastActionForWhatComesAfterIt) {
   Overrides list = plain(1);
   list.back() = "task.reward.until_s=0.5";
-  list.push_back("task.end.distance_m=100");
+  for (const char* wide :
+       {"end.distance_m=100", "success.capture.distance_m=100", "success.capture.speed_m_s=1000",
+        "success.capture.body_rate_rad_s=1e4", "success.capture.tilt_rad=3.2", "success.capture.heading_rad=3.2"})
+    list.push_back(std::string("task.") + wide);
   const TrainConfig c = small_training(list);
   const Collected all = collect(c, 100);
   EXPECT_GE(all.sums.handed_back, c.flappers);
