@@ -379,7 +379,7 @@ TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
     throw io::InputError(options.folder.string() + ": holds a run; accepted: a new folder, or --resume " +
                          options.folder.string());
   Trainer trainer(config, options);
-  const TrainSummary summary = trainer.run();
+  TrainSummary summary = trainer.run();
   write_summary(options.folder, summary);
   return summary;
 }

@@ -26,14 +26,11 @@ const auto started = std::chrono::steady_clock::now();
 std::vector<std::uint64_t> seeds_of(const std::string& text) {
   std::array<std::uint64_t, 2> ends{};
   const char *at = text.data(), *end = at + text.size();
-  auto [next, error] = std::from_chars(at, end, ends[0]);
+  std::from_chars_result read = std::from_chars(at, end, ends[0]);
   ends[1] = ends[0];
-  if (error == std::errc{} && next != end && *next == '-')
-    std::tie(next, error) = [&] {
-      const auto r = std::from_chars(next + 1, end, ends[1]);
-      return std::pair(r.ptr, r.ec);
-    }();
-  if (error != std::errc{} || next != end || ends[1] < ends[0] || ends[1] - ends[0] >= 1000 || ends[1] > INT32_MAX)
+  if (read.ec == std::errc{} && read.ptr != end && *read.ptr == '-') read = std::from_chars(read.ptr + 1, end, ends[1]);
+  if (read.ec != std::errc{} || read.ptr != end || ends[1] < ends[0] || ends[1] - ends[0] >= 1000 ||
+      ends[1] > INT32_MAX)
     throw io::InputError("--seeds " + text + ": is no range of seeds; accepted: 0-4");
   std::vector<std::uint64_t> list;
   for (std::uint64_t seed = ends[0]; seed <= ends[1]; ++seed) list.push_back(seed);
@@ -83,7 +80,7 @@ void print(const fs::path& folder, const TrainSummary& s) {
 
 /// The configuration that a run was started with.
 fs::path config_of(const fs::path& run) {
-  const fs::path config = run / "config" / "train.toml";
+  fs::path config = run / "config" / "train.toml";
   if (!fs::is_regular_file(config))
     throw io::InputError(run.string() + ": is no run folder; accepted: a folder that flappy-train left");
   return config;
@@ -103,7 +100,7 @@ TrainSummary train_one(const TrainConfig& config, TrainOptions options) {
     if (line.due()) line.show(static_cast<double>(p.update) / static_cast<double>(p.updates), words(p));
     return !io::interrupted();
   };
-  const TrainSummary summary = learn::train(config, options);
+  TrainSummary summary = learn::train(config, options);
   line.clear();
   print(options.folder, summary);
   std::fflush(stdout);
