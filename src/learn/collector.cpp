@@ -26,8 +26,8 @@ Collector::Collector(const TrainConfig& config)
       fleet_(config.flappers, fly_.vehicle, fly_.fleet),
       inputs_(fly_.fleet.task.observation().size()),
       kept_(config.return_steps),
-      paid_ticks_(
-          static_cast<std::uint32_t>(std::lround(fly_.fleet.task.constants.reward.until_s * fly_.fleet.control_hz))),
+      paid_ticks_(static_cast<std::uint32_t>(
+          std::ceil(fly_.fleet.task.constants.reward.until_s * fly_.fleet.control_hz - 1e-6))),
       pending_(config.flappers),
       observations_(config.flappers * kept_ * inputs_),
       actions_(config.flappers * kept_ * flight::kActions),

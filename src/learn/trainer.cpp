@@ -44,6 +44,7 @@ class Trainer {
         options_(options),
         learner_(config.learner),
         replay_(config.learner.shape, config.replay),
+        evaluator_(config.fly, {config.evaluate_vehicles, kValidationFlappers, 1024}),
         collector_(config) {
     if (options.init) start_from(*options.init);
     actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
@@ -54,13 +55,13 @@ class Trainer {
     const fs::path& folder = options_.folder;
     if (options_.from) resume(Checkpoint(*options_.from));
     else write_config();
+    if (options_.from) forget_after(updates());
     Metrics metrics(folder, kColumns, records_);
     metrics_ = &metrics;
     publish();
-    if (!options_.from) {
-      save();  // from now on it can be resumed, whenever it is killed
-      write_start();
-    }
+    if (options_.from && records_ > 0) wall_before_s_ = read_metrics(folder / "timing.jsonl").column("wall_s").back();
+    if (!options_.from) save();  // from now on it can be resumed, whenever it is killed
+    if (!fs::exists(folder / "run.json")) write_start();
     start_ = last_ = mark();
     bool going = true;
     while (going && updates() < config_.updates) {
@@ -101,10 +102,13 @@ class Trainer {
   }
 
   void start_from(const flight::Actor& actor) {
-    const flight::Actor names = config_.blank_actor();
+    const flight::Actor names = config_.blank_actor(), own = learner_.actor();
     if (actor.observation != names.observation || actor.action != names.action)
       throw io::InputError("--init: the policy observes or does something else than task " + names.task +
                            "; accepted: a policy of this task");
+    if (actor.mean != own.mean || actor.scale != own.scale || actor.clip != own.clip)
+      throw io::InputError(
+          "--init: the policy scales its observations in another way; accepted: the same [observation] as its run");
     try {
       learner_.set_actor(actor);
     } catch (const std::invalid_argument& e) {
@@ -131,7 +135,9 @@ class Trainer {
         throw io::InputError("the critics diverged at update " + std::to_string(updates()) +
                              "; accepted: lower learn.critic_rate, reward.scale or reward.discount");
       losses_ += learner_.metrics().critic_loss, values_ += learner_.metrics().mean_q;
-      actor_values_ += learner_.metrics().actor_q, ++samples_;
+      ++samples_;
+      if (updates() % static_cast<std::uint64_t>(config_.learner.policy_delay) == 0)
+        actor_values_ += learner_.metrics().actor_q, ++actor_samples_;
       actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
       for (std::size_t k = 0; k < average_.size(); ++k)
         average_[k] += config_.policy_averaging * (actor_->weights[k] - average_[k]);
@@ -157,10 +163,8 @@ class Trainer {
   void evaluate() {
     const auto from = Clock::now();
     const double wall = wall_s();
-    if (!evaluator_)
-      evaluator_.emplace(config_.fly, EvaluationOptions{config_.evaluate_vehicles, kValidationFlappers, 1024});
     policy_ = averaged();
-    const Evaluation e = evaluator_->fly({std::make_shared<flight::Actor>(policy_), nullptr}, Detail::success);
+    const Evaluation e = evaluator_.fly({std::make_shared<flight::Actor>(policy_), nullptr}, Detail::success);
     std::vector<double> capture_s;
     double successes = 0;
     for (const Outcome& o : e.flights) {
@@ -189,13 +193,13 @@ class Trainer {
                               share(sums.terminated),
                               losses_ / samples,
                               values_ / samples,
-                              actor_values_ / samples,
+                              actor_values_ / static_cast<double>(actor_samples_),
                               static_cast<double>(replay_.size()),
                               success_,
                               static_cast<double>(capture_s.size()) / n,
                               median(capture_s)};
     return_mean_ = share(sums.gain);
-    losses_ = values_ = actor_values_ = 0, samples_ = 0;
+    losses_ = values_ = actor_values_ = 0, samples_ = actor_samples_ = 0;
     evaluation_s_ += seconds_since(from);
     const auto [updates_per_s, env_steps_per_s] = rates_since(last_);
     const double times[] = {wall, evaluation_s_, updates_per_s, env_steps_per_s, simulation, learning};
@@ -251,7 +255,7 @@ class Trainer {
     to.put("steps", steps_);
     to.put("records", records_);
     to.put("sums", std::array<double, 5>{losses_, values_, actor_values_, success_, best_success_});
-    to.put("samples", samples_);
+    to.put("samples", std::array<std::uint64_t, 2>{samples_, actor_samples_});
     to.put("best_update", best_update_);
     to.put("average", average_);
     to.put("best_weights", best_.weights);
@@ -279,7 +283,9 @@ class Trainer {
     std::array<double, 5> sums{};
     from.get("sums", sums);
     losses_ = sums[0], values_ = sums[1], actor_values_ = sums[2], success_ = sums[3], best_success_ = sums[4];
-    from.get("samples", samples_);
+    std::array<std::uint64_t, 2> samples{};
+    from.get("samples", samples);
+    samples_ = samples[0], actor_samples_ = samples[1];
     from.get("best_update", best_update_);
     actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
     policy_ = best_ = averaged();
@@ -288,9 +294,13 @@ class Trainer {
     from.get("policy_weights", policy_.weights);
     saved_step_ = steps_;
     payload_sha256_ = from.payload_sha256();
-    const MetricsTable timing = read_metrics(options_.folder / "timing.jsonl");
-    if (records_ > 0 && timing.column("wall_s").size() >= records_) {
-      wall_before_s_ = timing.column("wall_s")[records_ - 1];
+  }
+
+  /// Checkpoints of a future that is flown anew, newest first, so that a kill leaves a run that can go on.
+  void forget_after(std::uint64_t update) const {
+    for (const fs::path& path : checkpoints_in(options_.folder)) {
+      if (path.filename() <= checkpoint_name(update)) break;
+      fs::remove(path);
     }
   }
 
@@ -309,7 +319,7 @@ class Trainer {
     s.wall_s = wall_s();
     s.evaluation_s = evaluation_s_;
     std::tie(s.share_simulation, s.share_learning) = shares();
-    s.best_success = best_success_;
+    if (best_success_ >= 0) s.best_success = best_success_;
     s.best_update = best_update_;
     s.payload_sha256 = payload_sha256_;
     if (records_ == 0) return s;
@@ -326,14 +336,14 @@ class Trainer {
   const TrainOptions& options_;
   Learner<float> learner_;
   Replay replay_;
+  Evaluator evaluator_;
   Collector collector_;
-  std::optional<Evaluator> evaluator_;
   Metrics* metrics_ = nullptr;
 
   bool learnt_ = false;  // in the last step
   std::uint64_t steps_ = 0, records_ = 0, saved_step_ = ~std::uint64_t{0};
   double losses_ = 0, values_ = 0, actor_values_ = 0, return_mean_ = std::numeric_limits<double>::quiet_NaN();
-  std::uint64_t samples_ = 0;
+  std::uint64_t samples_ = 0, actor_samples_ = 0;
   double success_ = -1, best_success_ = -1;
   std::uint64_t best_update_ = 0;
   std::shared_ptr<const flight::Actor> actor_;  // that flies
@@ -361,7 +371,7 @@ void write_summary(const fs::path& folder, const TrainSummary& s) {
                                        {"share_simulation", s.share_simulation},
                                        {"share_learning", s.share_learning},
                                        {"evaluation_s", s.evaluation_s},
-                                       {"best_success_rate", s.best_success},
+                                       {"best_success_rate", or_null(s.best_success)},
                                        {"best_update", s.best_update},
                                        {"stopped", s.stopped},
                                        {"payload_sha256", s.payload_sha256}};
@@ -375,7 +385,12 @@ TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
   fs::create_directories(options.folder, error);
   if (error) throw io::InputError(options.folder.string() + ": cannot be written: " + error.message());
   const io::FolderLock lock(options.folder);
-  if (!options.from && fs::exists(options.folder / "run.json", error))
+  const auto has_run = [&] {
+    const auto left = checkpoints_in(options.folder);
+    return fs::exists(options.folder / "run.json", error) ||
+           (!left.empty() && left.front().filename() != checkpoint_name(0));
+  };
+  if (!options.from && has_run())
     throw io::InputError(options.folder.string() + ": holds a run; accepted: a new folder, or --resume " +
                          options.folder.string());
   Trainer trainer(config, options);
@@ -389,7 +404,7 @@ TrainCosts costs_of(const TrainConfig& config) {
   const std::size_t replay = config.replay * layout.row * sizeof(float);
   constexpr std::size_t kFlapper = 2500,
                         kRest = 20'000'000;  // bytes, rounded up: of a flapper; of networks and records
-  const std::size_t flappers = (config.flappers + 1024) * kFlapper + config.vehicles * kFlapper;
+  const std::size_t flappers = (config.flappers + 1024 + config.vehicles + config.evaluate_vehicles) * kFlapper;
   return {replay + flappers + kRest, (config.keep + 1) * (replay + config.flappers * kFlapper + kRest)};
 }
 

@@ -44,7 +44,7 @@ struct TrainSummary {
   double wall_s = 0;     ///< since the process started, evaluations excluded
   double evaluation_s = 0;
   double share_simulation = 0, share_learning = 0;  ///< of the time of all threads; waiting counts as learning
-  double best_success = 0;
+  std::optional<double> best_success;               ///< nothing: never evaluated
   std::uint64_t best_update = 0;
   /// When 50, 80, 90, 95 % success were reached: the wall_s of the first evaluation at which, and at the next one, that many
   /// vehicles succeeded. Nothing: not reached.

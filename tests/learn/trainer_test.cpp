@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "learn/checkpoint.hpp"
@@ -98,6 +99,29 @@ TEST(Trainer, ForgetsWhatCameAfterTheCheckpoint) {
   EXPECT_EQ(read_metrics(resumed / "timing.jsonl").column("update").size(), 3u);
 }
 
+/// Nor does anything of that future stand in the way when it is stopped again: checkpoints, half a line of a power cut.
+TEST(Trainer, GoesOnAfterAnOlderCheckpointAndAStop) {
+  const fs::path whole = fresh("old_whole"), resumed = fresh("old_resumed");
+  const TrainConfig c = small_training({"checkpoint.keep=2", "learn.updates_per_step=1", "learn.policy_delay=3"});
+  train_in(whole, c);
+  const std::string expected = left_in(whole);
+  fs::copy(whole, resumed, fs::copy_options::recursive);
+  const auto paths = checkpoints_in(resumed);
+  ASSERT_EQ(paths.size(), 2u);
+  {
+    std::ofstream torn(resumed / "timing.jsonl", std::ios::app);
+    torn << "{\"upd";
+  }
+  fs::remove(resumed / "run.json");
+  int steps = 0;
+  train_in(
+      resumed, c, [&](const TrainProgress&) { return ++steps < 4; }, paths.back());
+  EXPECT_TRUE(fs::exists(resumed / "run.json"));
+  EXPECT_EQ(newest_checkpoint(resumed).header().update, 20u);
+  train_in(resumed, c, {}, newest_checkpoint(resumed).path());
+  EXPECT_TRUE(left_in(resumed) == expected);
+}
+
 TEST(Trainer, LeavesARunFolder) {
   const fs::path folder = fresh("folder");
   const TrainConfig c = small_training({"checkpoint.every=4", "checkpoint.keep=2"});
@@ -158,6 +182,8 @@ TEST(Trainer, StartsFromATrainedActor) {
     }
   };
   auto other = std::make_shared<flight::Actor>(*o.init);
+  other->scale[0] *= 2;
+  refused(other, "scales its observations in another way");
   other->observation[0] = "something";
   refused(other, "--init: the policy observes or does something else");
   const TrainConfig wide = small_training({"networks.actor=[8]"});
@@ -180,6 +206,9 @@ TEST(Trainer, RefusesWhatDoesNotFit) {
   };
   refused(c, {}, "holds a run; accepted: a new folder, or --resume");
   refused(small_training({"reward.scale=2.0"}), newest_checkpoint(folder).path(), "is of another configuration");
+  const fs::path brief = fresh("brief");  // flies too short for its task: nothing has begun
+  EXPECT_THROW(train_in(brief, small_training({"flight.duration_s=0.3"})), io::InputError);
+  EXPECT_FALSE(fs::exists(brief / "config"));
   TrainConfig wild = small_training();
   wild.reward_scale = 1e30;
   try {

@@ -56,7 +56,7 @@ Json json_of(const TrainSummary& s) {
   for (std::size_t k = 0; k < 4; ++k) json[names[k]] = s.time_to_s[k] ? Json(*s.time_to_s[k]) : Json(nullptr);
   json["share_simulation"] = s.share_simulation;
   json["share_learning"] = s.share_learning;
-  json["best_success_rate"] = s.best_success;
+  json["best_success_rate"] = s.best_success ? Json(*s.best_success) : Json(nullptr);
   json["best_update"] = s.best_update;
   json["stopped"] = s.stopped;
   json["payload_sha256"] = s.payload_sha256;
@@ -68,8 +68,9 @@ void print(const fs::path& folder, const TrainSummary& s) {
               s.stopped ? "stopped" : "trained", static_cast<unsigned long long>(s.seed),
               static_cast<unsigned long long>(s.updates), s.wall_s, s.evaluation_s,
               static_cast<double>(s.env_steps) / 1e6);
-  std::printf("  best success on validation vehicles: %.2f %%, at update %llu\n", 100 * s.best_success,
-              static_cast<unsigned long long>(s.best_update));
+  if (s.best_success)
+    std::printf("  best success on validation vehicles: %.2f %%, at update %llu\n", 100 * *s.best_success,
+                static_cast<unsigned long long>(s.best_update));
   std::printf("  time to 50, 80, 90, 95 %% success:");
   for (const auto& t : s.time_to_s) t ? std::printf(" %.1f s", *t) : std::printf(" -");
   std::printf("\n  simulation %.0f %%, learning %.0f %%, the rest %.0f %% of the time of all threads\n",
@@ -120,8 +121,10 @@ int main(int argc, char** argv) {
   std::vector<std::string> overrides;
   int threads = 0;
   app.add_option("config", config_name, "what to train: configs/train/*.toml");
-  app.add_option("--out", out, "run folder, or folder of runs with --seeds (runs/ and the configuration's name)");
-  CLI::Option* resumed = app.add_option("--resume", resume, "run folder to go on with, from its newest checkpoint");
+  CLI::Option* placed =
+      app.add_option("--out", out, "run folder, or folder of runs with --seeds (runs/ and the configuration's name)");
+  CLI::Option* resumed =
+      app.add_option("--resume", resume, "run folder to go on with, from its newest checkpoint")->excludes(placed);
   app.add_option("--seeds", seeds, "several runs: 0-4; writes their learning curve")->excludes(resumed);
   app.add_option("--from", from, "another checkpoint of that folder")->needs(resumed);
   app.add_option("--init", init, "actor, or run folder whose best one, to start with")->excludes(resumed);
