@@ -144,10 +144,7 @@ class Part {
 
   static Fleet<T> make_fleet(const FlyConfig& config, std::size_t first, std::size_t count) {
     FleetOptions o = config.fleet;
-    if (!config.actor) {  // nobody acts, so not even the middle of the action's range is added
-      std::ranges::fill(o.task.constants.action_low, 0);
-      std::ranges::fill(o.task.constants.action_high, 0);
-    }
+    if (!config.actor) o.task.forbid_actions();
     o.first_flapper += static_cast<std::uint32_t>(first);
     // threads that share a few blocks wait for each other more than they fly
     const int procs = o.batch.threads > 0 ? o.batch.threads : omp_get_num_procs();

@@ -262,6 +262,11 @@ std::vector<Signal> Task::action() const {
   return list;
 }
 
+void Task::forbid_actions() {
+  std::ranges::fill(constants.action_low, 0);
+  std::ranges::fill(constants.action_high, 0);
+}
+
 sim::FlapperState Task::sample_start(sim::RandomKey key) const {
   key.stream = sim::Stream::start;
   std::uint32_t index = 0;

@@ -127,6 +127,8 @@ struct Task {
   std::vector<std::pair<std::string, std::vector<Signal>>> observed_parts() const;
   std::vector<Signal> observation() const;
   std::vector<Signal> action() const;
+  /// Nobody acts: not even the middle of the action's range is added.
+  void forbid_actions();
   /// Where the episode of this key starts.
   sim::FlapperState sample_start(sim::RandomKey key) const;
 };

@@ -30,9 +30,8 @@ using Hovers = std::vector<std::vector<flight::Snapshot<T>>>;
 
 /// The controller alone: not even the middle of the action's range is added.
 Task without_policy(Task task) {
+  task.forbid_actions();
   auto& k = task.constants;
-  std::ranges::fill(k.action_low, 0);
-  std::ranges::fill(k.action_high, 0);
   k.holds_trim = k.hand_back.enabled = 0;
   k.limits.faced_by_s = k.limits.arrived_by_s = kNever_s;
   return task;

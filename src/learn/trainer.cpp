@@ -31,17 +31,12 @@ std::string processor() {
   return "unknown";
 }
 
-double median(std::vector<double> list) {
-  if (list.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::ranges::sort(list);
-  return list[list.size() / 2];
-}
-
 class Trainer {
  public:
   Trainer(const TrainConfig& config, const TrainOptions& options)
       : config_(config),
         options_(options),
+        names_(config.blank_actor()),
         learner_(config.learner),
         replay_(config.learner.shape, config.replay),
         evaluator_(config.fly, {config.evaluate_vehicles, kValidationFlappers, 1024}),
@@ -96,15 +91,14 @@ class Trainer {
   }
 
   flight::Actor named(flight::Actor actor) const {
-    const flight::Actor names = config_.blank_actor();
-    actor.task = names.task, actor.observation = names.observation, actor.action = names.action;
+    actor.task = names_.task, actor.observation = names_.observation, actor.action = names_.action;
     return actor;
   }
 
   void start_from(const flight::Actor& actor) {
-    const flight::Actor names = config_.blank_actor(), own = learner_.actor();
-    if (actor.observation != names.observation || actor.action != names.action)
-      throw io::InputError("--init: the policy observes or does something else than task " + names.task +
+    const flight::Actor own = learner_.actor();
+    if (actor.observation != names_.observation || actor.action != names_.action)
+      throw io::InputError("--init: the policy observes or does something else than task " + names_.task +
                            "; accepted: a policy of this task");
     if (actor.mean != own.mean || actor.scale != own.scale || actor.clip != own.clip)
       throw io::InputError(
@@ -165,14 +159,8 @@ class Trainer {
     const double wall = wall_s();
     policy_ = averaged();
     const Evaluation e = evaluator_.fly({std::make_shared<flight::Actor>(policy_), nullptr}, Detail::success);
-    std::vector<double> capture_s;
-    double successes = 0;
-    for (const Outcome& o : e.flights) {
-      successes += o.success();
-      if (o.captured_s > 0) capture_s.push_back(o.captured_s);
-    }
-    const auto n = static_cast<double>(e.flights.size());
-    success_ = successes / n;
+    const Summary flown = learn::summarise(e.flights);
+    success_ = flown.success.value;
     if (success_ > best_success_) {
       best_success_ = success_;
       best_update_ = updates();
@@ -196,8 +184,8 @@ class Trainer {
                               actor_values_ / static_cast<double>(actor_samples_),
                               static_cast<double>(replay_.size()),
                               success_,
-                              static_cast<double>(capture_s.size()) / n,
-                              median(capture_s)};
+                              flown.captured.value,
+                              flown.capture_s.median.value_or(std::numeric_limits<double>::quiet_NaN())};
     return_mean_ = share(sums.gain);
     losses_ = values_ = actor_values_ = 0, samples_ = actor_samples_ = 0;
     evaluation_s_ += seconds_since(from);
@@ -334,6 +322,7 @@ class Trainer {
 
   const TrainConfig& config_;
   const TrainOptions& options_;
+  const flight::Actor names_;  // of the task, its inputs and outputs
   Learner<float> learner_;
   Replay replay_;
   Evaluator evaluator_;
@@ -355,30 +344,29 @@ class Trainer {
   double wall_before_s_ = 0, evaluation_s_ = 0, learning_s_ = 0, warming_s_ = 0;
 };
 
-void write_summary(const fs::path& folder, const TrainSummary& s) {
+}  // namespace
+
+nlohmann::ordered_json json_of(const TrainSummary& s) {
   const auto or_null = [](const std::optional<double>& x) {
     return x ? nlohmann::ordered_json(*x) : nlohmann::ordered_json(nullptr);
   };
-  const nlohmann::ordered_json json = {{"seed", s.seed},
-                                       {"wall_s", s.wall_s},
-                                       {"env_steps", s.env_steps},
-                                       {"updates", s.updates},
-                                       {"episodes", s.episodes},
-                                       {"time_to_50_s", or_null(s.time_to_s[0])},
-                                       {"time_to_80_s", or_null(s.time_to_s[1])},
-                                       {"time_to_90_s", or_null(s.time_to_s[2])},
-                                       {"time_to_95_s", or_null(s.time_to_s[3])},
-                                       {"share_simulation", s.share_simulation},
-                                       {"share_learning", s.share_learning},
-                                       {"evaluation_s", s.evaluation_s},
-                                       {"best_success_rate", or_null(s.best_success)},
-                                       {"best_update", s.best_update},
-                                       {"stopped", s.stopped},
-                                       {"payload_sha256", s.payload_sha256}};
-  io::write_atomically(folder / "summary.json", json.dump(2) + "\n");
+  return {{"seed", s.seed},
+          {"wall_s", s.wall_s},
+          {"env_steps", s.env_steps},
+          {"updates", s.updates},
+          {"episodes", s.episodes},
+          {"time_to_50_s", or_null(s.time_to_s[0])},
+          {"time_to_80_s", or_null(s.time_to_s[1])},
+          {"time_to_90_s", or_null(s.time_to_s[2])},
+          {"time_to_95_s", or_null(s.time_to_s[3])},
+          {"share_simulation", s.share_simulation},
+          {"share_learning", s.share_learning},
+          {"evaluation_s", s.evaluation_s},
+          {"best_success_rate", or_null(s.best_success)},
+          {"best_update", s.best_update},
+          {"stopped", s.stopped},
+          {"payload_sha256", s.payload_sha256}};
 }
-
-}  // namespace
 
 TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
   std::error_code error;
@@ -395,7 +383,7 @@ TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
                          options.folder.string());
   Trainer trainer(config, options);
   TrainSummary summary = trainer.run();
-  write_summary(options.folder, summary);
+  io::write_atomically(options.folder / "summary.json", json_of(summary).dump(2) + "\n");
   return summary;
 }
 

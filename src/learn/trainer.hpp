@@ -13,6 +13,7 @@
 #pragma once
 
 #include <chrono>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 
 #include "learn/train_config.hpp"
@@ -61,5 +62,7 @@ struct TrainCosts {
 /// io::InputError where the run folder is taken, a checkpoint does not fit, the disk is full, or learning diverged.
 TrainSummary train(const TrainConfig& config, const TrainOptions& options);
 TrainCosts costs_of(const TrainConfig& config);
+/// What summary.json holds.
+nlohmann::ordered_json json_of(const TrainSummary& summary);
 
 }  // namespace flappy::learn

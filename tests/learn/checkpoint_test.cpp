@@ -14,20 +14,14 @@
 #include <map>
 #include <set>
 
+#include "refusal.hpp"
+
 namespace flappy::learn {
 namespace {
 
 enum class Phase : std::uint8_t { warm_up, training };
 
-/// What the call was refused with.
-std::string refusal(const std::function<void()>& call) {
-  try {
-    call();
-    return "accepted";
-  } catch (const io::InputError& error) {
-    return error.what();
-  }
-}
+using test::refusal;
 
 class CheckpointTest : public testing::Test {
  protected:

@@ -9,18 +9,12 @@
 
 #include "io/files.hpp"
 #include "learn/metrics.hpp"
+#include "refusal.hpp"
 
 namespace flappy::learn {
 namespace {
 
-std::string refusal(const std::function<void()>& call) {
-  try {
-    call();
-    return "accepted";
-  } catch (const io::InputError& error) {
-    return error.what();
-  }
-}
+using test::refusal;
 
 void expect_interval(const std::vector<double>& values, double low, double high) {
   const Interval interval = bootstrap_interval(values);

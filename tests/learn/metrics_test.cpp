@@ -9,6 +9,7 @@
 
 #include "io/files.hpp"
 #include "io/tensorboard.hpp"
+#include "refusal.hpp"
 
 namespace flappy::learn {
 namespace {
@@ -16,14 +17,7 @@ namespace {
 const double kNone = std::nan("");
 const MetricsColumns kColumns = {{"update", "env_steps", "return_mean", "success"}, {"wall_s"}};
 
-std::string refusal(const std::function<void()>& call) {
-  try {
-    call();
-    return "accepted";
-  } catch (const io::InputError& error) {
-    return error.what();
-  }
-}
+using test::refusal;
 
 // ---- a reader of event files that shares nothing with the writer but the checksum, which has a test of its own
 

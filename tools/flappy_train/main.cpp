@@ -50,19 +50,6 @@ std::string words(const TrainProgress& p) {
   return text;
 }
 
-Json json_of(const TrainSummary& s) {
-  Json json = {{"seed", s.seed}, {"wall_s", s.wall_s}, {"env_steps", s.env_steps}, {"updates", s.updates}};
-  const char* names[] = {"time_to_50_s", "time_to_80_s", "time_to_90_s", "time_to_95_s"};
-  for (std::size_t k = 0; k < 4; ++k) json[names[k]] = s.time_to_s[k] ? Json(*s.time_to_s[k]) : Json(nullptr);
-  json["share_simulation"] = s.share_simulation;
-  json["share_learning"] = s.share_learning;
-  json["best_success_rate"] = s.best_success ? Json(*s.best_success) : Json(nullptr);
-  json["best_update"] = s.best_update;
-  json["stopped"] = s.stopped;
-  json["payload_sha256"] = s.payload_sha256;
-  return json;
-}
-
 void print(const fs::path& folder, const TrainSummary& s) {
   std::printf("%s: seed %llu, %llu updates in %.1f s (and %.1f s of evaluation), %.1f million environment steps\n",
               s.stopped ? "stopped" : "trained", static_cast<unsigned long long>(s.seed),
@@ -147,7 +134,7 @@ int main(int argc, char** argv) {
       const learn::TrainConfig config = learn::read_train_config(train::config_of(resume), with_threads({}));
       options.folder = resume;
       options.from = from.empty() ? learn::newest_checkpoint(resume).path() : fs::path(resume) / from;
-      program.write_json(train::json_of(train::train_one(config, options)));
+      program.write_json(learn::json_of(train::train_one(config, options)));
       return;
     }
     if (!init.empty()) {
@@ -158,7 +145,7 @@ int main(int argc, char** argv) {
     if (seeds.empty()) {
       options.folder = folder;
       program.write_json(
-          train::json_of(train::train_one(learn::read_train_config(config_name, with_threads(overrides)), options)));
+          learn::json_of(train::train_one(learn::read_train_config(config_name, with_threads(overrides)), options)));
       return;
     }
     std::vector<learn::SeedCurve> curves;
@@ -169,7 +156,7 @@ int main(int argc, char** argv) {
       options.folder = folder / ("seed_" + std::to_string(seed));
       options.started = curves.empty() ? train::started : std::chrono::steady_clock::now();
       const learn::TrainSummary s = train::train_one(learn::read_train_config(config_name, list), options);
-      all.push_back(train::json_of(s));
+      all.push_back(learn::json_of(s));
       if (s.stopped) break;
       curves.push_back(learn::read_seed_curve(options.folder, seed, "success_rate"));
     }
