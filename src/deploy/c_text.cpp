@@ -1,0 +1,58 @@
+#include "deploy/c_text.hpp"
+
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+namespace flappy::deploy {
+
+std::string c_number(float value) {
+  if (!std::isfinite(value)) throw std::invalid_argument("a number that is not finite has no literal in C");
+  char text[40];
+  std::snprintf(text, sizeof text, "%aF", static_cast<double>(value));
+  return text;
+}
+
+std::string c_number(std::int32_t value) { return std::to_string(value); }
+
+template <class N>
+std::string c_array(const std::string& declaration, std::span<const N> numbers) {
+  constexpr std::size_t kColumns = 118;
+  std::string text = declaration + " = {", line = "\n   ";
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const std::string next = " " + c_number(numbers[i]) + (i + 1 < numbers.size() ? "," : "");
+    if (line.size() + next.size() > kColumns) {
+      text += line;
+      line = "\n   ";
+    }
+    line += next;
+  }
+  return text + line + "};\n";
+}
+
+template std::string c_array(const std::string&, std::span<const float>);
+template std::string c_array(const std::string&, std::span<const std::int32_t>);
+
+std::string c_string(const std::string& text) {
+  std::string literal = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') literal += '\\';
+    literal += c;
+  }
+  return literal + '"';
+}
+
+std::uint32_t crc32(std::uint32_t crc, std::span<const float> numbers) {
+  crc = ~crc;
+  for (const float number : numbers) {
+    const auto bits = std::bit_cast<std::uint32_t>(number);
+    for (unsigned shift = 0; shift < 32; shift += 8) {
+      crc ^= bits >> shift & 0xffU;
+      for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (0xedb88320U & (0U - (crc & 1U)));
+    }
+  }
+  return ~crc;
+}
+
+}  // namespace flappy::deploy

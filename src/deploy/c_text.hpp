@@ -1,0 +1,27 @@
+// Pieces of C source.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace flappy::deploy {
+
+/// A number as C writes it, to the bit: hexadecimal, single precision ("-0x1.8p+3F").
+std::string c_number(float value);
+std::string c_number(std::int32_t value);
+
+/// `static const float name[n] = {...};`, a whole statement; `type` and the brackets are the caller's.
+template <class N>
+std::string c_array(const std::string& declaration, std::span<const N> numbers);
+
+extern template std::string c_array(const std::string&, std::span<const float>);
+extern template std::string c_array(const std::string&, std::span<const std::int32_t>);
+
+/// A string literal.
+std::string c_string(const std::string& text);
+
+/// CRC-32 (IEEE 802.3) of the numbers' bytes, lowest first, after those that gave `crc`, or 0.
+std::uint32_t crc32(std::uint32_t crc, std::span<const float> numbers);
+
+}  // namespace flappy::deploy
