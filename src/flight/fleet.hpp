@@ -78,6 +78,8 @@ class Fleet {
   void set_actor(const std::shared_ptr<const Actor>& actor);
   /// Action of flapper `i` for the next period, each in [-1, 1]; an actor would overwrite it.
   void set_action(std::size_t i, const double (&action)[kActions]);
+  /// The same by what the action adds to the controller's output: V, V, V, split cycle, each within the task's range.
+  void set_adds(std::size_t i, const double (&adds)[kActions]);
   /// Adds to the controller's output from now on: open-loop flight, excitation.
   void set_added(std::size_t i, const sim::Input& input);
 

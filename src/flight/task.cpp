@@ -15,7 +15,8 @@ struct PartInfo {
   std::vector<Signal> signals;
 };
 
-/// What each Part shows, in the order of their bits. Ranges are what a flying vehicle stays in.
+/// What each Part shows, in the order of their bits; the previous action's signals are those of the task's action. Ranges are
+/// what a flying vehicle stays in.
 const std::vector<PartInfo>& part_infos() {
   static const std::vector<PartInfo> infos = [] {
     std::vector<PartInfo> list = {
@@ -38,7 +39,6 @@ const std::vector<PartInfo>& part_infos() {
     const char* inputs[kActions] = {"amplitude", "difference", "bias", "split_cycle"};
     const double trim_high[kActions] = {18, 3, 3.5, 0.15};
     for (int i = 0; i < kActions; ++i) {
-      list[6].signals.push_back({std::string("previous_") + inputs[i], "1", -1, 1});
       list[9].signals.push_back(
           {std::string("trim_") + inputs[i], i < 3 ? "V" : "1", i > 0 ? -trim_high[i] : 0, trim_high[i]});
     }
@@ -243,8 +243,15 @@ void read_success(const io::Table& table, Success<double>& s) {
 
 std::vector<std::pair<std::string, std::vector<Signal>>> Task::observed_parts() const {
   std::vector<std::pair<std::string, std::vector<Signal>>> list;
-  for (std::size_t i = 0; i < part_infos().size(); ++i)
-    if (parts >> i & 1) list.emplace_back(part_infos()[i].name, part_infos()[i].signals);
+  for (std::size_t i = 0; i < part_infos().size(); ++i) {
+    if (!(parts >> i & 1)) continue;
+    list.emplace_back(part_infos()[i].name, part_infos()[i].signals);
+    if (static_cast<Part>(i) != Part::previous_action) continue;
+    for (Signal s : action()) {
+      s.name = "added_" + s.name;
+      list.back().second.push_back(s);
+    }
+  }
   return list;
 }
 

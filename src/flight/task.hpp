@@ -23,8 +23,8 @@ struct Signal {
 };
 
 /// Parts an observation may have, in the order of their bits. Those of a flapper's state are estimated; goal_rotation is the
-/// attitude seen from the heading of the set point, time runs from the start, and trim is what the controller has learnt to
-/// hold.
+/// attitude seen from the heading of the set point, previous_action is what the policy adds to the controller's output, time
+/// runs from the start, and trim is what the controller has learnt to hold.
 enum class Part {
   rotation_matrix,
   position_error,
