@@ -3,6 +3,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdio>
+#include <sstream>
 #include <stdexcept>
 
 namespace flappy::deploy {
@@ -17,22 +18,31 @@ std::string c_number(float value) {
 std::string c_number(std::int32_t value) { return std::to_string(value); }
 
 template <class N>
-std::string c_array(const std::string& declaration, std::span<const N> numbers) {
-  constexpr std::size_t kColumns = 118;
-  std::string text = declaration + " = {", line = "\n   ";
+std::string c_row(std::span<const N> numbers) {
+  constexpr std::size_t kColumns = 120;
+  std::string text, line = "    {";
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const std::string next = " " + c_number(numbers[i]) + (i + 1 < numbers.size() ? "," : "");
+    const std::string next = c_number(numbers[i]) + (i + 1 < numbers.size() ? ", " : "}");
     if (line.size() + next.size() > kColumns) {
-      text += line;
-      line = "\n   ";
+      text += line + "\n";
+      line = "     ";
     }
     line += next;
   }
-  return text + line + "};\n";
+  return text + line;
 }
 
-template std::string c_array(const std::string&, std::span<const float>);
-template std::string c_array(const std::string&, std::span<const std::int32_t>);
+template std::string c_row(std::span<const float>);
+template std::string c_row(std::span<const std::int32_t>);
+
+std::string c_comment(const std::string& text) {
+  std::istringstream lines(text);
+  std::string comment = "/* ";
+  bool first = true;
+  for (std::string line; std::getline(lines, line); first = false)
+    comment += (first ? "" : line.empty() ? "\n" : "\n   ") + line;
+  return comment + " */\n";
+}
 
 std::string c_string(const std::string& text) {
   std::string literal = "\"";

@@ -11,12 +11,20 @@ namespace flappy::deploy {
 std::string c_number(float value);
 std::string c_number(std::int32_t value);
 
-/// `static const float name[n] = {...};`, a whole statement; `type` and the brackets are the caller's.
+/// Numbers in braces, over as many lines as they need, the first of them where the caller is.
 template <class N>
-std::string c_array(const std::string& declaration, std::span<const N> numbers);
+std::string c_row(std::span<const N> numbers);
+/// `declaration = {...};`
+template <class N>
+std::string c_array(const std::string& declaration, std::span<const N> numbers) {
+  return declaration + " = " + c_row(numbers) + ";\n";
+}
 
-extern template std::string c_array(const std::string&, std::span<const float>);
-extern template std::string c_array(const std::string&, std::span<const std::int32_t>);
+extern template std::string c_row(std::span<const float>);
+extern template std::string c_row(std::span<const std::int32_t>);
+
+/// The lines of a text in one comment.
+std::string c_comment(const std::string& text);
 
 /// A string literal.
 std::string c_string(const std::string& text);

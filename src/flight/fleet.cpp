@@ -345,6 +345,14 @@ std::array<T, kActions> Fleet<T>::action(std::size_t i) const {
   return action;
 }
 template <class T>
+std::array<T, kActions> Fleet<T>::adds(std::size_t i) const {
+  const auto [f, lane] = storage_->at(i);
+  std::array<T, kActions> adds;
+  constexpr std::size_t kFirst = offsetof(Episode<T>, adds) / sizeof(T);
+  for (std::size_t k = 0; k < kActions; ++k) adds[k] = f.episode[kFirst + k][lane];
+  return adds;
+}
+template <class T>
 T Fleet<T>::gain(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
   return f.episode[offsetof(Episode<T>, gain) / sizeof(T)][lane];

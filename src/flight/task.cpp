@@ -12,6 +12,7 @@ constexpr double kFar = 1e9;
 
 struct PartInfo {
   const char* name;
+  const char* frame;
   std::vector<Signal> signals;
 };
 
@@ -20,17 +21,18 @@ struct PartInfo {
 const std::vector<PartInfo>& part_infos() {
   static const std::vector<PartInfo> infos = [] {
     std::vector<PartInfo> list = {
-        {"rotation_matrix", {}},
-        {"position_error", {{"x_error", "m", -1, 1}, {"y_error", "m", -1, 1}, {"z_error", "m", -1, 1}}},
-        {"velocity", {{"x_velocity", "m/s", -3, 3}, {"y_velocity", "m/s", -3, 3}, {"z_velocity", "m/s", -3, 3}}},
+        {"rotation_matrix", "B in W", {}},
+        {"position_error", "W", {{"x_error", "m", -1, 1}, {"y_error", "m", -1, 1}, {"z_error", "m", -1, 1}}},
+        {"velocity", "W", {{"x_velocity", "m/s", -3, 3}, {"y_velocity", "m/s", -3, 3}, {"z_velocity", "m/s", -3, 3}}},
         {"body_rate",
+         "B",
          {{"roll_rate", "rad/s", -50, 50}, {"pitch_rate", "rad/s", -50, 50}, {"yaw_rate", "rad/s", -50, 50}}},
-        {"beat_phase", {{"beat_sin", "1", -1, 1}, {"beat_cos", "1", -1, 1}}},
-        {"heading_error", {{"heading_sin", "1", -1, 1}, {"heading_cos", "1", -1, 1}}},
-        {"previous_action", {}},
-        {"goal_rotation", {}},
-        {"time", {{"time", "s", 0, 1}}},
-        {"trim", {}}};
+        {"beat_phase", "", {{"beat_sin", "1", -1, 1}, {"beat_cos", "1", -1, 1}}},
+        {"heading_error", "about z of W", {{"heading_sin", "1", -1, 1}, {"heading_cos", "1", -1, 1}}},
+        {"previous_action", "", {}},
+        {"goal_rotation", "B in the goal's heading frame", {}},
+        {"time", "", {{"time", "s", 0, 1}}},
+        {"trim", "", {}}};
     for (const char* row : {"x", "y", "z"})
       for (const char* column : {"x", "y", "z"})
         for (const auto& [part, name] :
@@ -42,6 +44,8 @@ const std::vector<PartInfo>& part_infos() {
       list[9].signals.push_back(
           {std::string("trim_") + inputs[i], i < 3 ? "V" : "1", i > 0 ? -trim_high[i] : 0, trim_high[i]});
     }
+    for (PartInfo& info : list)
+      for (Signal& s : info.signals) s.frame = info.frame;
     return list;
   }();
   return infos;

@@ -19,7 +19,8 @@ inline constexpr int kMaxObservation = 40;  // all parts together
 /// A row of the observation or the action, for who reads or exports it.
 struct Signal {
   std::string name, unit;
-  double low, high;  ///< expected range; values outside are possible
+  double low, high;     ///< expected range; values outside are possible
+  std::string frame{};  ///< what its axes are; empty: it has none
 };
 
 /// Parts an observation may have, in the order of their bits. Those of a flapper's state are estimated; goal_rotation is the

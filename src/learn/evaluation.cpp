@@ -95,7 +95,7 @@ class Part {
   void finish(Evaluation& result) {
     for (std::size_t i = 0; i < outcomes_.size(); ++i) {
       note(i);
-      outcomes_[i].hash = fleet_.hash(i, i + 1);
+      outcomes_[i].hash = fleet_.batch().hash(i, i + 1);
       if (!followers_.empty()) followers_[i].finish(outcomes_[i]);
     }
     result.flights.insert(result.flights.end(), outcomes_.begin(), outcomes_.end());
