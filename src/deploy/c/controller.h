@@ -286,8 +286,9 @@ static inline flappy_setpoint flappy_controller_setpoint(uint32_t tick, uint32_t
   float t, value[4], rate[4], bend[4];
   flappy_setpoint s;
   uint32_t i;
-  while (*segment + 1 < FLAPPY_CONTROLLER_SEGMENTS && tick >= flappy_controller_path_start[*segment + 1]) ++*segment;
-  t = (float)(tick - flappy_controller_path_start[*segment]) * flappy_controller_k.period_s;
+  while (*segment + 1 < FLAPPY_CONTROLLER_SEGMENTS && tick >= (uint32_t)flappy_controller_path_start[*segment + 1])
+    ++*segment;
+  t = (float)(tick - (uint32_t)flappy_controller_path_start[*segment]) * flappy_controller_k.period_s;
   a = flappy_controller_path + 24 * *segment;
   for (i = 0; i < 4; ++i, a += 6) {
     value[i] = flappy_fma(flappy_fma(flappy_fma(flappy_fma(flappy_fma(a[5], t, a[4]), t, a[3]), t, a[2]), t, a[1]), t, a[0]);
