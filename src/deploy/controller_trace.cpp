@@ -134,6 +134,7 @@ ControllerTrace record_controller(const flight::FlyConfig& config, int periods, 
         if (i.to_us > t.horizon_us || i.to_us == t.last_imu_us - lag_us) t.ring.push_back(i);
       }
     }
+    if (period == begin && t.ring.empty()) t.ring.push_back({{}, {}, t.horizon_us, t.horizon_us});  // of no time
     fleet.step();
     schedule.next();
     for (const auto& s : fleet.imu_samples(0)) {
