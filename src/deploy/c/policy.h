@@ -35,3 +35,12 @@ static inline int flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float a
   }
   return refused;
 }
+
+static inline uint32_t flappy_policy_crc32(void) {
+  uint32_t crc = 0;
+  crc = flappy_crc32(crc, flappy_policy_mean, FLAPPY_POLICY_OBS);
+  crc = flappy_crc32(crc, flappy_policy_scale, FLAPPY_POLICY_OBS);
+  crc = flappy_crc32(crc, flappy_policy_middle, FLAPPY_POLICY_ACT);
+  crc = flappy_crc32(crc, flappy_policy_half, FLAPPY_POLICY_ACT);
+  return flappy_crc32(crc, flappy_policy_weights, FLAPPY_POLICY_WEIGHTS);
+}
