@@ -33,8 +33,8 @@ std::string text_of(const std::vector<Line>& lines, std::size_t numbers) {
       row.append(kGap, ' ');
     }
     row += line.rest;
-    if (row.size() > kColumns) row = row.substr(0, kColumns - 3) + "...";
     row.erase(row.find_last_not_of(' ') + 1);
+    if (row.size() > kColumns) row = row.substr(0, kColumns - 3) + "...";
     text += row + '\n';
   }
   return text;
@@ -46,13 +46,17 @@ std::string short_number(double value) {
   return text.data();
 }
 
-/// "passed", or the code.
-std::string outcome(int code) { return code == 0 ? "passed" : "code " + std::to_string(code); }
+/// "passed", or who did not, with the code.
+std::string selftest_of(const Parity& row) {
+  if (row.policy_selftest != 0) return "policy: " + std::to_string(row.policy_selftest);
+  if (row.controller_selftest != 0) return "control: " + std::to_string(row.controller_selftest);
+  return "passed";
+}
 
 }  // namespace
 
 std::string table_of(const std::vector<Parity>& rows) {
-  std::vector<Line> lines = {{{"compiler", "target", "options", "policy", "control", "differ", "of", "by"}, ""}};
+  std::vector<Line> lines = {{{"compiler", "target", "options", "self-test", "differ", "of", "by"}, ""}};
   std::string counted;
   for (const auto& row : rows) {
     const std::string compiler = row.compiler + (row.version.empty() ? "" : " " + row.version);
@@ -62,8 +66,8 @@ std::string table_of(const std::vector<Parity>& rows) {
       lines.push_back({{compiler, row.target, options}, row.why_not});
       continue;
     }
-    lines.push_back({{compiler, row.target, options, outcome(row.policy_selftest), outcome(row.controller_selftest),
-                      std::to_string(row.differing), std::to_string(row.outputs), short_number(row.largest_difference)},
+    lines.push_back({{compiler, row.target, options, selftest_of(row), std::to_string(row.differing),
+                      std::to_string(row.outputs), short_number(row.largest_difference)},
                      ""});
     if (row.instructions_per_inference > 0) {
       std::array<char, 32> number;
@@ -71,7 +75,7 @@ std::string table_of(const std::vector<Parity>& rows) {
       counted += row.target + ": " + number.data() + " instructions per inference\n";
     }
   }
-  return text_of(lines, 5) + counted;
+  return text_of(lines, 4) + counted;
 }
 
 std::string table_of(const std::vector<Footprint>& rows) {

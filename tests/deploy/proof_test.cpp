@@ -293,26 +293,23 @@ TEST(Proof, ControllerIsTriedToo) {
   for (const auto& row : rows) EXPECT_EQ(row.function, "flappy_controller_selftest");
 }
 
-/// A policy that spins: two instructions a turn, and little beside them.
+/// A policy that spins: a load, two stores, a count and two instructions a turn; the empty function has the rest as well.
 double instructions_of(int turns) {
   Toy toy;
   toy.before =
       "  (void)w;\n  (void)middle;\n  action[0] = action[1] = obs[0];\n#if defined __arm__\n  {\n    int n = " +
       std::to_string(turns) +
-      ";\n    __asm__ volatile(\"1: subs %0, %0, #1\\n bne 1b\" : \"+r\"(n) : : \"cc\");\n  }\n#endif\n"
-      "  if (obs[0] < 100.0F) return 0;\n";
+      ";\n    __asm__ volatile(\"1: subs %0, %0, #1\\n bne 1b\" : \"+r\"(n) : : \"cc\");\n    return 0;\n  }\n"
+      "#endif\n";
   const std::vector<Parity> rows = proof_of(toy, vectors_of(toy, 7));
   EXPECT_EQ(board(rows).why_not, "");
   return board(rows).instructions_per_inference;
 }
 
 TEST(Proof, CountsInstructions) {
-  const double few = instructions_of(100), many = instructions_of(1100);
-  // two durations are each off by less than a microsecond, which is 1,000 instructions in 1,000 inferences
-  EXPECT_NEAR(many - few, 2000, 2);
-  // a load, two stores, a comparison and its branch, the count, what saves and restores registers
-  EXPECT_GE(few, 200 + 3);
-  EXPECT_LE(few, 200 + 40);
+  // two durations are each off by less than a microsecond, which is 1,000 instructions in 1,001 inferences
+  EXPECT_NEAR(instructions_of(100), 204, 2);
+  EXPECT_NEAR(instructions_of(1100), 2204, 2);
 }
 
 /// Compiles one C program for the board and runs it.
@@ -335,7 +332,7 @@ TEST(Board, SerialLineCarriesEveryByte) {
 static uint8_t bytes[768];
 int main(void) {
   unsigned i;
-  if (board_us() > 10000000U || !board_read(bytes, 1) || !board_read(bytes + 1, 700) || !board_read(bytes + 701, 67)) return 1;
+  if (!board_read(bytes, 1) || !board_read(bytes + 1, 700) || !board_read(bytes + 701, 67)) return 1;
   for (i = 0; i < 768; ++i)
     if (bytes[i] != (uint8_t)(i * (2 * (i / 256) + 1))) return 2;
   board_write(bytes, 700);
@@ -427,7 +424,7 @@ TEST(Footprints, FindMemoryAndRecursion) {
   toy.before = "held[calls++ % 25] = obs[0];\n";
   for (const auto& row : footprints_of(toy)) {
     EXPECT_GE(row.ram_bytes, 104) << row.target << " " << row.why_not;
-    EXPECT_LE(row.ram_bytes, 104 + 16) << row.target;  // sections begin at multiples of up to 16
+    EXPECT_LE(row.ram_bytes, 104 + 32) << row.target;  // its three sections begin at multiples of up to 16
   }
   toy.before = "if (turn(obs[0]) > 3.0F) return 0;\n";
   toy.other =
@@ -451,8 +448,8 @@ TEST(Tables, FitATerminal) {
              .version = "14.0.6",
              .options = "-std=gnu99 -O3 -march=native",
              .target = "x86_64",
-             .policy_selftest = 2,
-             .outputs = 4000};
+             .controller_selftest = 2,
+             .outputs = 120000};
   rows[2] = {.compiler = "gcc",
              .version = "12.2.0",
              .options = "-std=c99 -O0",
@@ -462,8 +459,8 @@ TEST(Tables, FitATerminal) {
   std::istringstream lines(table);
   std::string line;
   while (std::getline(lines, line)) EXPECT_LE(line.size(), 100u) << line;
-  EXPECT_NE(table.find("passed   passed      12  4000  5.9e-08\n"), table.npos) << table;
-  EXPECT_NE(table.find("gnu99 -O3 -march=native  code 2"), table.npos) << table;
+  EXPECT_NE(table.find("passed          12    4000  5.9e-08\n"), table.npos) << table;
+  EXPECT_NE(table.find("gnu99 -O3 -march=native  control: 2       0  120000        0\n"), table.npos) << table;
   EXPECT_NE(table.find("Cortex-M4F: 12345 instructions per inference\n"), table.npos) << table;
   const auto json = json_of(rows);
   EXPECT_EQ(json.size(), 3u);
