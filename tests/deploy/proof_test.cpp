@@ -273,7 +273,7 @@ TEST(Proof, BadCallsAreRefused) {
 
   vectors = vectors_of(toy, 2);
   vectors.actions = 1;
-  vectors.observation.resize(4 * kObs);
+  vectors.observation.resize(std::size_t{4} * kObs);
   const NarrowPath path({"gcc", "as", "ld", "timeout"});
   const std::vector<Parity> rows = proof_of(toy, vectors);
   EXPECT_NE(rows[0].why_not.find("are not those of the policy"), std::string::npos) << rows[0].why_not;
