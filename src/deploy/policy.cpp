@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 
+#include <stdexcept>
 #include <string>
 #include <system_error>
 
@@ -111,6 +112,10 @@ std::unique_ptr<const Policy> load_policy(const fs::path& path, int observations
 
 #ifndef FLAPPY_HAVE_TORCH
 bool reads_torch_script() { return false; }
+
+std::string torch_script(const PolicyNetwork&, const std::string&) {
+  throw std::invalid_argument("TorchScript is not written by a build without LibTorch");
+}
 
 std::unique_ptr<const Policy> load_torch_script(const fs::path& path, int, int) {
   io::read_text(path);

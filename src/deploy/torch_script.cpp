@@ -46,6 +46,43 @@ class TorchScript : public Policy {
 
 bool reads_torch_script() { return true; }
 
+std::string torch_script(const PolicyNetwork& n, const std::string& contract) {
+  const auto tensor = [](const std::vector<float>& numbers) { return torch::tensor(numbers); };
+  torch::jit::Module module("FlappyPolicy");
+  module.register_attribute("contract", torch::jit::StringType::get(), contract);
+  module.register_buffer("mean", tensor(n.mean));
+  module.register_buffer("scale", tensor(n.scale));
+  module.register_buffer("middle", tensor(n.middle));
+  module.register_buffer("half", tensor(n.half));
+  std::ostringstream forward;
+  forward.precision(9);
+  forward << "def forward(self, observation):\n"
+          << "    x = torch.clamp((observation - self.mean) * self.scale, " << -n.clip << ", " << n.clip << ")\n";
+  const float* weights = n.weights.data();
+  for (std::size_t layer = 0; layer + 1 < n.widths.size(); ++layer) {
+    const std::int64_t inputs = n.widths[layer], outputs = n.widths[layer + 1];
+    // for every output its bias, then one weight for each input
+    const torch::Tensor all =
+        torch::from_blob(const_cast<float*>(weights), {outputs, inputs + 1}, torch::kFloat).transpose(0, 1);
+    weights += outputs * (inputs + 1);
+    const std::string number = std::to_string(layer);
+    module.register_parameter("bias" + number, all.select(0, 0).clone(), false);
+    module.register_parameter("weight" + number, all.narrow(0, 1, inputs).clone(torch::MemoryFormat::Contiguous),
+                              false);
+    const bool last = layer + 2 == n.widths.size();
+    forward << "    x = torch." << (n.relu && !last ? "relu" : "tanh") << "(torch.addmm(self.bias" << number
+            << ", x, self.weight" << number << "))\n";
+  }
+  forward << "    action = self.middle + self.half * x\n"
+          << "    refused = torch.isnan(observation).any(1, True)\n"
+          << "    return torch.where(refused, torch.zeros_like(action), action)\n";
+  module.define(forward.str());
+  module.eval();
+  std::ostringstream file;  // a file on disk would hold its own name
+  module.save(file);
+  return file.str();
+}
+
 std::unique_ptr<const Policy> load_torch_script(const std::filesystem::path& path, int observations, int actions) {
   const auto refuse = [&](const std::string& what, const std::string& accepted) {
     throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);

@@ -35,9 +35,10 @@ FLAPPY_INLINE Setpoint<L<T>> setpoint(FlightBlock<T>& f, const FlightPlan<T>& pl
 template <class T>
 FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episode<L<T>>& episode, int first) {
   const FlightBlock<T>& f = s.flight;
-  T due[kWidth<T>];
+  T due[kWidth<T>], index[kWidth<T>];
   bool any_due = false;
   for (int i = 0; i < kWidth<T>; ++i) {
+    index[i] = static_cast<T>(f.flapper[first + i] - plan.first_flapper);
     due[i] = f.tick[first + i] % plan.hold == 0 ? T(1) : T(0);
     any_due |= due[i] > 0;
   }
@@ -49,13 +50,17 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
   if (plan.explores) {
     const auto fresh = sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::exploration), plan.period,
                                           f.flapper + first, f.flight + first);
+    const L<T> size = L<T>(plan.noise_low) + L<T>(plan.noise_more) * L<T>::load(index);
     for (int i = 0; i < kActions; ++i) {
       const L<T> noise = L<T>(plan.noise_kept) * episode.noise[i] + L<T>(plan.noise_fresh) * fresh.n[i];
       episode.noise[i] = where(acts, noise, episode.noise[i]);
-      action[i] = clamp(L<T>(action[i] + episode.exploration * noise), L<T>(-1), L<T>(1));
+      action[i] = clamp(L<T>(action[i] + size * noise), L<T>(-1), L<T>(1));
     }
   }
-  for (int i = 0; i < kActions; ++i) episode.action[i] = where(acts, action[i], episode.action[i]);
+  for (int i = 0; i < kActions; ++i) {
+    episode.action[i] = where(acts, action[i], episode.action[i]);
+    episode.adds[i] = where(acts, scaled_action(plan.task, i, action[i]), episode.adds[i]);
+  }
   episode.gain = where(acts, L<T>(0), episode.gain);
   store_rows(episode, s.flight.episode, first);
 }
@@ -96,7 +101,7 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   if (plan.controller == static_cast<int>(Controller::Kind::pid)) fly(plan.pid, Pid<L<T>>{});
   else if (plan.controller == static_cast<int>(Controller::Kind::arc)) fly(plan.arc, Arc<L<T>>{});
   auto drive = load_rows<sim::Drive<L<T>>>(s.body.drive, first);
-  drive.input = add_action(plan.task, episode, base);
+  drive.input = add_action(episode, base);
   store_rows(drive, s.body.drive, first);
 }
 

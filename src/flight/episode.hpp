@@ -12,25 +12,28 @@ template <class T>
 struct Episode {
   T action[kActions];    // of the policy, in [-1, 1]
   T previous[kActions];  // the one before
-  T added[kActions];     // besides: V, V, V, split cycle
+  T adds[kActions];      // what its action adds to the controller's output: V, V, V, split cycle
+  T added[kActions];     // besides
   T handed_back;         // 0 or 1
   T reward;              // of the last control period
   T gain;                // sum of rewards since the policy last acted
-  T exploration;         // standard deviation of the noise on its actions
-  T noise[kActions];     // of which this is the present one, of deviation 1
+  T noise[kActions];     // on its actions, of deviation 1
   T captured_s;          // when the goal was captured first; 0: not yet
   T lost_s;              // when it was not kept first; 0: never
 };
 
+/// What an action of the policy adds to input `i`.
+template <class T>
+FLAPPY_INLINE T scaled_action(const TaskConstants<Element<T>>& k, int i, const T& action) {
+  const T middle(0.5 * (k.action_low[i] + k.action_high[i])), half(0.5 * (k.action_high[i] - k.action_low[i]));
+  return middle + half * clamp(action, T(-1), T(1));
+}
+
 /// What a policy and whoever else may add do to the controller's output.
 template <class T>
-FLAPPY_INLINE WingBeat<T> add_action(const TaskConstants<Element<T>>& k, const Episode<T>& e, const WingBeat<T>& base) {
+FLAPPY_INLINE WingBeat<T> add_action(const Episode<T>& e, const WingBeat<T>& base) {
   T sum[kActions] = {base.amplitude_V, base.difference_V, base.bias_V, base.split_cycle};
-  for (int i = 0; i < kActions; ++i) {
-    const T middle(0.5 * (k.action_low[i] + k.action_high[i])), half(0.5 * (k.action_high[i] - k.action_low[i]));
-    const T acts = middle + half * clamp(e.action[i], T(-1), T(1));
-    sum[i] = sum[i] + (e.added[i] + where(e.handed_back > T(0), T(0), acts));
-  }
+  for (int i = 0; i < kActions; ++i) sum[i] = sum[i] + (e.added[i] + where(e.handed_back > T(0), T(0), e.adds[i]));
   return {sum[0], sum[1], sum[2], sum[3]};
 }
 
@@ -159,7 +162,7 @@ FLAPPY_INLINE int observe(std::uint32_t parts, const Estimate<T>& x, const Setpo
     row[n++] = yaw.cos * ref.heading.cos + yaw.sin * ref.heading.sin;
   }
   if (observes(Part::previous_action))
-    for (int i = 0; i < kActions; ++i) row[n++] = e.action[i];
+    for (int i = 0; i < kActions; ++i) row[n++] = e.adds[i];
   if (observes(Part::goal_rotation)) {
     const auto turned_back = [&](const Vec3<T>& x_row, const Vec3<T>& y_row) {
       return add_scaled(ref.heading.cos * x_row, ref.heading.sin, y_row);

@@ -148,7 +148,19 @@ template <class T>
 void Fleet<T>::set_action(std::size_t i, const double (&action)[kActions]) {
   const auto [f, lane] = storage_->at(i);
   auto e = get<Episode<double>>(f.episode, lane);
-  for (int k = 0; k < kActions; ++k) e.action[k] = action[k];
+  for (int k = 0; k < kActions; ++k) e.action[k] = action[k], e.adds[k] = storage_->scaled(k, action[k]);
+  put(e, f.episode, lane);
+}
+
+template <class T>
+void Fleet<T>::set_adds(std::size_t i, const double (&adds)[kActions]) {
+  const auto [f, lane] = storage_->at(i);
+  auto e = get<Episode<double>>(f.episode, lane);
+  for (int k = 0; k < kActions; ++k) {
+    const double low = storage_->scaled(k, -1), high = storage_->scaled(k, 1);
+    e.adds[k] = std::min(std::max(adds[k], low), high);
+    e.action[k] = high > low ? 2 * (e.adds[k] - low) / (high - low) - 1 : 0;
+  }
   put(e, f.episode, lane);
 }
 
@@ -164,11 +176,12 @@ void Fleet<T>::set_added(std::size_t i, const sim::Input& input) {
 template <class T>
 void Fleet<T>::set_exploration(const Exploration& exploration) {
   Storage& s = *storage_;
-  s.exploration = exploration;
   s.plan.explores = exploration.high > 0;
   s.plan.noise_kept = static_cast<T>(exploration.kept);
   s.plan.noise_fresh = static_cast<T>(std::sqrt(1 - square(exploration.kept)));
-  for (std::size_t i = 0; i < size(); ++i) s.start_exploration(i);
+  const double more = size() > 1 ? (exploration.high - exploration.low) / static_cast<double>(size() - 1) : 0;
+  s.plan.noise_low = static_cast<T>(exploration.low);
+  s.plan.noise_more = static_cast<T>(more);
 }
 
 template <class T>
@@ -330,6 +343,14 @@ std::array<T, kActions> Fleet<T>::action(std::size_t i) const {
   std::array<T, kActions> action;
   for (int k = 0; k < kActions; ++k) action[static_cast<std::size_t>(k)] = f.episode[k][lane];
   return action;
+}
+template <class T>
+std::array<T, kActions> Fleet<T>::adds(std::size_t i) const {
+  const auto [f, lane] = storage_->at(i);
+  std::array<T, kActions> adds;
+  constexpr std::size_t kFirst = offsetof(Episode<T>, adds) / sizeof(T);
+  for (std::size_t k = 0; k < kActions; ++k) adds[k] = f.episode[kFirst + k][lane];
+  return adds;
 }
 template <class T>
 T Fleet<T>::gain(std::size_t i) const {

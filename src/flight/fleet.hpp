@@ -78,6 +78,8 @@ class Fleet {
   void set_actor(const std::shared_ptr<const Actor>& actor);
   /// Action of flapper `i` for the next period, each in [-1, 1]; an actor would overwrite it.
   void set_action(std::size_t i, const double (&action)[kActions]);
+  /// The same by what the action adds to the controller's output: V, V, V, split cycle, each within the task's range.
+  void set_adds(std::size_t i, const double (&adds)[kActions]);
   /// Adds to the controller's output from now on: open-loop flight, excitation.
   void set_added(std::size_t i, const sim::Input& input);
 
@@ -110,6 +112,7 @@ class Fleet {
   /// What the policy would observe if the estimate were true.
   void true_observation(std::size_t i, T* row) const;
   std::array<T, kActions> action(std::size_t i) const;  ///< of the policy, its noise included
+  std::array<T, kActions> adds(std::size_t i) const;    ///< what that adds: V, V, V, split cycle
   T gain(std::size_t i) const;                          ///< rewards since the policy last acted
   /// Squared innovations of the last pose over their variance: angle and position, three degrees of freedom each.
   std::pair<double, double> innovation(std::size_t i) const;

@@ -56,8 +56,7 @@ struct Fleet<T>::Storage {
   std::vector<T> actor_numbers;
   std::vector<Period> periods;       // being flown, or flown last
   std::vector<FlightPlan<T>> plans;  // of each of them
-  Exploration exploration;
-  int observed = 0;  // rows of the observation
+  int observed = 0;                  // rows of the observation
   std::vector<T> imu_tap, mocap_tap;
   std::size_t imu_tap_size = 0, mocap_tap_size = 0;
   bool recording = false;
@@ -88,6 +87,7 @@ struct Fleet<T>::Storage {
     const double gravity = options.batch.world.gravity_m_s2, period_s = period_steps * options.batch.step_s;
     plan.step = batch.storage().kernel;
     plan.seed = options.seed;
+    plan.first_flapper = options.first_flapper;
     plan.losses = s.mocap.loss_probability > 0;
     const auto& at = s.imu.position_m;
     plan.imu = rounded<T>(ImuConstants<double>{{at.x, at.y, at.z},
@@ -156,6 +156,12 @@ struct Fleet<T>::Storage {
     return out;
   }
 
+  /// What an action adds to input `k`, as the lanes work it out.
+  double scaled(int k, double action) const {
+    using L = model::Lanes<T, 1>;
+    return L(scaled_action(plan.task, k, L(action))).raw[0];
+  }
+
   /// Calls `add(time taken, sample)` for what the tap holds of flapper `i`; `taken`: by which slices.
   template <template <class> class Sample>
   void for_samples(std::size_t i, const std::vector<T>& tap, std::size_t tap_size, bool Slice::*taken,
@@ -177,7 +183,6 @@ struct Fleet<T>::Storage {
   void start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot);
   Snapshot<T> snapshot(std::size_t i, const Target& target);
   void start_lane(std::size_t i, std::uint32_t episode, const Truth<double>& truth);
-  void start_exploration(std::size_t i);
   void show(std::size_t i);
   void observe_as(std::size_t i, const Estimate<double>& x, double* row);
   void start_fusion(std::size_t i, const Truth<double>& truth, sim::RandomKey key);
@@ -203,16 +208,9 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
   imu.gyro_bias_rad_s = {sd.x * sim::normal(key, 0), sd.y * sim::normal(key, 1), sd.z * sim::normal(key, 2)};
   put(imu, f.imu, lane);
   start_fusion(i, truth, key);
-  put(Episode<double>{}, f.episode, lane);
-  start_exploration(i);
-}
-
-template <class T>
-void Fleet<T>::Storage::start_exploration(std::size_t i) {
-  const auto [f, lane] = at(i);
-  const double place = batch.size() > 1 ? static_cast<double>(i) / static_cast<double>(batch.size() - 1) : 1;
-  f.episode[offsetof(Episode<T>, exploration) / sizeof(T)][lane] =
-      static_cast<T>(exploration.low + (exploration.high - exploration.low) * place);
+  Episode<double> fresh{};
+  for (int k = 0; k < kActions; ++k) fresh.adds[k] = scaled(k, 0);
+  put(fresh, f.episode, lane);
 }
 
 /// The observation before the first period.

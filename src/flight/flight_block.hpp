@@ -83,7 +83,9 @@ struct FlightPlan {
   std::uint32_t hold;    // control periods between its actions
   std::uint32_t period;  // since the fleet began; counts draws of exploration
   bool explores;
-  T noise_kept, noise_fresh;        // shares of the last and of a new normal in the noise, from action to action
+  T noise_kept, noise_fresh;  // shares of the last and of a new normal in the noise, from action to action
+  T noise_low, noise_more;    // its standard deviation: of the fleet's first flapper, and from each to the next
+  std::uint32_t first_flapper;
   std::uint64_t* cycles = nullptr;  // spent in each stage, for a benchmark on one thread
 };
 

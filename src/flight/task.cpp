@@ -12,24 +12,27 @@ constexpr double kFar = 1e9;
 
 struct PartInfo {
   const char* name;
+  const char* frame;
   std::vector<Signal> signals;
 };
 
-/// What each Part shows, in the order of their bits. Ranges are what a flying vehicle stays in.
+/// What each Part shows, in the order of their bits; the previous action's signals are those of the task's action. Ranges are
+/// what a flying vehicle stays in.
 const std::vector<PartInfo>& part_infos() {
   static const std::vector<PartInfo> infos = [] {
     std::vector<PartInfo> list = {
-        {"rotation_matrix", {}},
-        {"position_error", {{"x_error", "m", -1, 1}, {"y_error", "m", -1, 1}, {"z_error", "m", -1, 1}}},
-        {"velocity", {{"x_velocity", "m/s", -3, 3}, {"y_velocity", "m/s", -3, 3}, {"z_velocity", "m/s", -3, 3}}},
+        {"rotation_matrix", "B in W", {}},
+        {"position_error", "W", {{"x_error", "m", -1, 1}, {"y_error", "m", -1, 1}, {"z_error", "m", -1, 1}}},
+        {"velocity", "W", {{"x_velocity", "m/s", -3, 3}, {"y_velocity", "m/s", -3, 3}, {"z_velocity", "m/s", -3, 3}}},
         {"body_rate",
+         "B",
          {{"roll_rate", "rad/s", -50, 50}, {"pitch_rate", "rad/s", -50, 50}, {"yaw_rate", "rad/s", -50, 50}}},
-        {"beat_phase", {{"beat_sin", "1", -1, 1}, {"beat_cos", "1", -1, 1}}},
-        {"heading_error", {{"heading_sin", "1", -1, 1}, {"heading_cos", "1", -1, 1}}},
-        {"previous_action", {}},
-        {"goal_rotation", {}},
-        {"time", {{"time", "s", 0, 1}}},
-        {"trim", {}}};
+        {"beat_phase", "", {{"beat_sin", "1", -1, 1}, {"beat_cos", "1", -1, 1}}},
+        {"heading_error", "about z of W", {{"heading_sin", "1", -1, 1}, {"heading_cos", "1", -1, 1}}},
+        {"previous_action", "", {}},
+        {"goal_rotation", "B in the goal's heading frame", {}},
+        {"time", "", {{"time", "s", 0, 1}}},
+        {"trim", "", {}}};
     for (const char* row : {"x", "y", "z"})
       for (const char* column : {"x", "y", "z"})
         for (const auto& [part, name] :
@@ -38,10 +41,11 @@ const std::vector<PartInfo>& part_infos() {
     const char* inputs[kActions] = {"amplitude", "difference", "bias", "split_cycle"};
     const double trim_high[kActions] = {18, 3, 3.5, 0.15};
     for (int i = 0; i < kActions; ++i) {
-      list[6].signals.push_back({std::string("previous_") + inputs[i], "1", -1, 1});
       list[9].signals.push_back(
           {std::string("trim_") + inputs[i], i < 3 ? "V" : "1", i > 0 ? -trim_high[i] : 0, trim_high[i]});
     }
+    for (PartInfo& info : list)
+      for (Signal& s : info.signals) s.frame = info.frame;
     return list;
   }();
   return infos;
@@ -243,8 +247,15 @@ void read_success(const io::Table& table, Success<double>& s) {
 
 std::vector<std::pair<std::string, std::vector<Signal>>> Task::observed_parts() const {
   std::vector<std::pair<std::string, std::vector<Signal>>> list;
-  for (std::size_t i = 0; i < part_infos().size(); ++i)
-    if (parts >> i & 1) list.emplace_back(part_infos()[i].name, part_infos()[i].signals);
+  for (std::size_t i = 0; i < part_infos().size(); ++i) {
+    if (!(parts >> i & 1)) continue;
+    list.emplace_back(part_infos()[i].name, part_infos()[i].signals);
+    if (static_cast<Part>(i) != Part::previous_action) continue;
+    for (Signal s : action()) {
+      s.name = "added_" + s.name;
+      list.back().second.push_back(s);
+    }
+  }
   return list;
 }
 

@@ -19,12 +19,13 @@ inline constexpr int kMaxObservation = 40;  // all parts together
 /// A row of the observation or the action, for who reads or exports it.
 struct Signal {
   std::string name, unit;
-  double low, high;  ///< expected range; values outside are possible
+  double low, high;     ///< expected range; values outside are possible
+  std::string frame{};  ///< what its axes are; empty: it has none
 };
 
 /// Parts an observation may have, in the order of their bits. Those of a flapper's state are estimated; goal_rotation is the
-/// attitude seen from the heading of the set point, time runs from the start, and trim is what the controller has learnt to
-/// hold.
+/// attitude seen from the heading of the set point, previous_action is what the policy adds to the controller's output, time
+/// runs from the start, and trim is what the controller has learnt to hold.
 enum class Part {
   rotation_matrix,
   position_error,

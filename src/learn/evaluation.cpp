@@ -95,7 +95,7 @@ class Part {
   void finish(Evaluation& result) {
     for (std::size_t i = 0; i < outcomes_.size(); ++i) {
       note(i);
-      outcomes_[i].hash = fleet_.hash(i, i + 1);
+      outcomes_[i].hash = fleet_.batch().hash(i, i + 1);
       if (!followers_.empty()) followers_[i].finish(outcomes_[i]);
     }
     result.flights.insert(result.flights.end(), outcomes_.begin(), outcomes_.end());
@@ -145,7 +145,7 @@ class Part {
     return energy;
   }
 
-  /// A policy from elsewhere sees what the task shows and says what is added, which the task wants within -1 and 1.
+  /// A policy from elsewhere sees what the task shows and says what is added.
   void act() {
     const auto inputs = static_cast<std::size_t>(pilot_.policy->observations());
     acting_.clear(), observation_.clear();
@@ -159,16 +159,9 @@ class Part {
       throw std::invalid_argument("the policy's observation or action is not that of the task");
     action_.resize(acting_.size() * kActions);
     pilot_.policy->act(acting_.size(), observation_.data(), action_.data());
-    const auto& k = fleet_.options().task.constants;
     for (std::size_t row = 0; row < acting_.size(); ++row) {
-      double action[kActions];
-      for (int a = 0; a < kActions; ++a) {
-        const double middle = 0.5 * (k.action_low[a] + k.action_high[a]);
-        const double half = 0.5 * (k.action_high[a] - k.action_low[a]);
-        const double adds = action_[row * kActions + static_cast<std::size_t>(a)];
-        action[a] = half > 0 ? (adds - middle) / half : 0;
-      }
-      fleet_.set_action(acting_[row], action);
+      const float* a = &action_[row * kActions];
+      fleet_.set_adds(acting_[row], {a[0], a[1], a[2], a[3]});
     }
   }
 

@@ -49,7 +49,7 @@ struct Outcome {
   double position_error_m = 0, heading_error_rad = 0;  ///< at the end
   double energy_J = 0, manoeuvre_s = 0;  ///< electrical, of both motors, until hand-back or until capture is too late
 
-  std::uint64_t hash = 0;  ///< of all that moves, at the end
+  std::uint64_t hash = 0;  ///< of how the vehicle moves, at the end
 };
 
 /// Follows one flight, tick by tick.

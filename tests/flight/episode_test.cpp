@@ -314,7 +314,9 @@ TEST(Observation, RowsAreWhatTheirNamesSay) {
       }
       const char* inputs[4] = {"amplitude", "difference", "bias", "split_cycle"};
       for (int k = 0; k < 4; ++k)
-        expected["previous_" + std::string(inputs[k])] = period > 0 ? 0.01 * (period - 1) - 0.1 * k : 0;
+        expected["added_" + std::string(inputs[k])] =
+            t.constants.action_low[k] + (t.constants.action_high[k] - t.constants.action_low[k]) / 2 *
+                                            (1 + (period > 0 ? 0.01 * (period - 1) - 0.1 * k : 0));
       const std::vector<double> row = fleet.observation(i);
       ASSERT_EQ(row.size(), names.size());
       for (std::size_t k = 0; k < names.size(); ++k)

@@ -259,7 +259,7 @@ TEST(TrainConfig, ScalesObservationsByTheirRangeUnlessTold) {
   for (std::size_t k = 0; k < signals.size(); ++k) {
     EXPECT_EQ(c.learner.actor_input.mean[k], (signals[k].low + signals[k].high) / 2);
     if (signals[k].name == "x_error") EXPECT_EQ(c.learner.actor_input.scale[k], 5);
-    if (signals[k].name == "previous_bias") EXPECT_EQ(c.learner.actor_input.scale[k], 1);
+    if (signals[k].name == "added_bias") EXPECT_EQ(c.learner.actor_input.scale[k], 1 / 3.5);
   }
 }
 

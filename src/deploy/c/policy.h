@@ -1,0 +1,46 @@
+/* One layer: for every output its bias, then one weight for each input. */
+static inline const float *flappy_policy_layer(const float *weights, const float *in, uint32_t inputs, float *out,
+                                               uint32_t outputs) {
+  uint32_t o, i;
+  for (o = 0; o < outputs; ++o) {
+    float sum = *weights++;
+    for (i = 0; i < inputs; ++i) sum = flappy_fma(*weights++, in[i], sum);
+    out[o] = sum;
+  }
+  return weights;
+}
+
+/* Observation in, what is added to the feedback controller's output out, both in the units of the tables above. An
+   observation with a NaN in it is refused: it returns 1 and adds nothing. Otherwise it returns 0. */
+static inline int flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT]) {
+  static const uint32_t widths[FLAPPY_POLICY_LAYERS + 1] = FLAPPY_POLICY_WIDTHS;
+  float values[2][FLAPPY_POLICY_WIDEST];
+  const float *weights = flappy_policy_weights;
+  uint32_t layer, i;
+  int refused = 0;
+  for (i = 0; i < FLAPPY_POLICY_OBS; ++i) {
+    const float x = (obs[i] - flappy_policy_mean[i]) * flappy_policy_scale[i];
+    refused |= x != x;
+    values[0][i] = flappy_clamp(x, -FLAPPY_POLICY_CLIP, FLAPPY_POLICY_CLIP);
+  }
+  for (layer = 0; layer < FLAPPY_POLICY_LAYERS; ++layer) {
+    float *out = values[(layer + 1) % 2];
+    weights = flappy_policy_layer(weights, values[layer % 2], widths[layer], out, widths[layer + 1]);
+    for (i = 0; i < widths[layer + 1]; ++i)
+      out[i] = layer + 1 == FLAPPY_POLICY_LAYERS ? flappy_tanh(out[i]) : FLAPPY_POLICY_HIDDEN(out[i]);
+  }
+  for (i = 0; i < FLAPPY_POLICY_ACT; ++i) {
+    const float x = flappy_clamp(values[FLAPPY_POLICY_LAYERS % 2][i], -1.0F, 1.0F);
+    action[i] = refused ? 0.0F : flappy_fma(flappy_policy_half[i], x, flappy_policy_middle[i]);
+  }
+  return refused;
+}
+
+static inline uint32_t flappy_policy_crc32(void) {
+  uint32_t crc = 0;
+  crc = flappy_crc32(crc, flappy_policy_mean, FLAPPY_POLICY_OBS);
+  crc = flappy_crc32(crc, flappy_policy_scale, FLAPPY_POLICY_OBS);
+  crc = flappy_crc32(crc, flappy_policy_middle, FLAPPY_POLICY_ACT);
+  crc = flappy_crc32(crc, flappy_policy_half, FLAPPY_POLICY_ACT);
+  return flappy_crc32(crc, flappy_policy_weights, FLAPPY_POLICY_WEIGHTS);
+}

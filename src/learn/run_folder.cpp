@@ -1,0 +1,64 @@
+#include "learn/run_folder.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "io/files.hpp"
+#include "learn/train_config.hpp"
+
+namespace flappy::learn {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+[[noreturn]] void refuse(const fs::path& path, const std::string& what, const std::string& accepted) {
+  throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
+}
+
+/// Calls `read` with the file's content; what it lacks is one line.
+template <class Read>
+void read_json(const fs::path& path, const Read& read) {
+  try {
+    read(Json::parse(io::read_text(path)));
+  } catch (const Json::exception& e) {
+    refuse(path, "is damaged: " + std::string(e.what()), "the file as flappy-train left it");
+  }
+}
+
+}  // namespace
+
+FinishedRun read_finished_run(const fs::path& folder) {
+  const fs::path start = folder / "run.json", end = folder / "summary.json", actor = folder / "best.json";
+  std::error_code ignored;
+  if (!fs::is_regular_file(start, ignored) || !fs::is_directory(folder / "config", ignored))
+    refuse(folder, "is no run folder", "a folder that flappy-train left");
+  FinishedRun run;
+  read_json(start, [&](const Json& json) {
+    if (json.at("schema") != 1) refuse(start, "schema is " + json.at("schema").dump(), "schema 1");
+    run.info.task = json.at("task").get<std::string>();
+    run.info.config_sha256 = json.at("config_sha256").get<std::string>();
+    run.info.commit = json.at("commit").get<std::string>();
+  });
+  constexpr std::string_view kDirty = "-dirty";
+  run.info.dirty = run.info.commit.ends_with(kDirty);
+  if (run.info.dirty) run.info.commit.resize(run.info.commit.size() - kDirty.size());
+
+  const std::string go_on = "a run that is, after flappy-train --resume " + folder.string();
+  if (!fs::exists(end, ignored) || !fs::exists(actor, ignored)) refuse(folder, "is not finished", go_on);
+  read_json(end, [&](const Json& json) {
+    if (json.at("stopped").get<bool>())
+      refuse(folder, "is not finished: stopped at update " + json.at("updates").dump(), go_on);
+  });
+
+  const TrainConfig config = read_train_config(folder / "config" / "train.toml");
+  if (config.sha256 != run.info.config_sha256)
+    refuse(folder / "config", "is not the configuration of the run: SHA-256 " + config.sha256,
+           "the one with " + run.info.config_sha256 + ", as " + start.string() + " says");
+  run.fly = flight::read_fly_config(folder / "config" / "fly.toml");
+  if (!run.fly.actor) refuse(folder / "config" / "fly.toml", "names no actor", "the run's best.json");
+  if (run.fly.actor->task != run.info.task || run.fly.fleet.task.name != run.info.task)
+    refuse(actor, "is of task " + run.fly.actor->task, "a policy of the run's task " + run.info.task);
+  return run;
+}
+
+}  // namespace flappy::learn
