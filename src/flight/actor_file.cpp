@@ -1,5 +1,7 @@
 #include "flight/actor_file.hpp"
 
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "io/files.hpp"
@@ -10,7 +12,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& what, const std::string& accepted) {
-  throw io::InputError(path.string() + ": " + what + "; " + accepted);
+  throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
 }
 
 }  // namespace
@@ -68,7 +70,13 @@ Actor read_actor(const std::filesystem::path& path) {
   count("scale", a.scale.size(), inputs);
   count("action", a.action.size(), kActions);
   count("widths", static_cast<std::size_t>(a.widths.back()), kActions);
+  const std::vector<double> clip = {a.clip};
   count("weights", a.weights.size(), weight_count(a.widths));
+  for (const std::vector<double>* numbers : {&a.mean, &a.scale, &a.weights, &clip})
+    for (const double x : *numbers)
+      if (!(std::abs(x) <= std::numeric_limits<float>::max()))
+        refuse(path, "has " + io::shortest_digits(x) + " in it, which single precision does not hold",
+               "numbers up to 3.4e38");
   return a;
 }
 
