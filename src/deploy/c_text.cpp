@@ -1,5 +1,6 @@
 #include "deploy/c_text.hpp"
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdio>
@@ -53,16 +54,21 @@ std::string c_string(const std::string& text) {
   return literal + '"';
 }
 
-std::uint32_t crc32(std::uint32_t crc, std::span<const float> numbers) {
+std::uint32_t crc32(std::uint32_t crc, std::span<const std::int32_t> numbers) {
   crc = ~crc;
-  for (const float number : numbers) {
-    const auto bits = std::bit_cast<std::uint32_t>(number);
+  for (const std::int32_t number : numbers) {
+    const auto bits = static_cast<std::uint32_t>(number);
     for (unsigned shift = 0; shift < 32; shift += 8) {
       crc ^= bits >> shift & 0xffU;
       for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (0xedb88320U & (0U - (crc & 1U)));
     }
   }
   return ~crc;
+}
+
+std::uint32_t crc32(std::uint32_t crc, std::span<const float> numbers) {
+  for (const float number : numbers) crc = crc32(crc, std::array{std::bit_cast<std::int32_t>(number)});
+  return crc;
 }
 
 }  // namespace flappy::deploy

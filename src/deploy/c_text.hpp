@@ -29,7 +29,8 @@ std::string c_comment(const std::string& text);
 /// A string literal.
 std::string c_string(const std::string& text);
 
-/// CRC-32 (IEEE 802.3) of the numbers' bytes, lowest first, after those that gave `crc`, or 0.
+/// CRC-32 (IEEE 802.3) of the numbers' four bytes each, lowest first, after those that gave `crc`, or 0.
+std::uint32_t crc32(std::uint32_t crc, std::span<const std::int32_t> numbers);
 std::uint32_t crc32(std::uint32_t crc, std::span<const float> numbers);
 
 }  // namespace flappy::deploy

@@ -1,14 +1,12 @@
 #include "deploy/policy.hpp"
 
 #include <dlfcn.h>
-#include <unistd.h>
 
-#include <cerrno>
-#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 
+#include "deploy/temporary_folder.hpp"
 #include "deploy/torch_script.hpp"
 #include "io/files.hpp"
 #include "io/run_program.hpp"
@@ -26,27 +24,6 @@ const int flappy_loaded_observations = FLAPPY_POLICY_OBS, flappy_loaded_actions 
 void flappy_loaded_step(const float *observation, float *action) { flappy_policy_step(observation, action); }
 int flappy_loaded_selftest(void) { return flappy_policy_selftest(); }
 )";
-
-/// Gone with its contents.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "flappy_policy_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr)
-      throw io::InputError(name + ": cannot be written: " + std::generic_category().message(errno));
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  fs::path operator/(const char* name) const { return path_ / name; }
-
- private:
-  fs::path path_;
-};
 
 [[noreturn]] void refuse(const fs::path& header, const std::string& what, const std::string& accepted) {
   throw io::InputError(header.string() + ": " + what + "; accepted: " + accepted);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <type_traits>
 
 #include "deploy/c_text.hpp"
 #include "deploy/embedded.hpp"
@@ -35,79 +36,137 @@ std::string signals(const std::string& name, const char* count, const std::vecto
   return text + "};\n";
 }
 
-}  // namespace
-
-std::string policy_header(const flight::FlyConfig& config, const RunInfo& run, const PolicyNetwork& n,
-                          const PolicyVectors& vectors) {
-  const flight::Task& task = config.fleet.task;
-  const std::size_t rows = vectors.observation.size() / static_cast<std::size_t>(n.inputs());
-  std::uint32_t crc = 0;
-  std::size_t constants = 0;
-  for (const auto* part : {&n.mean, &n.scale, &n.middle, &n.half, &n.weights}) {
-    crc = crc32(crc, *part);
-    constants += part->size() * sizeof(float);
+/// The numbers of a network: their declarations, CRC-32 and bytes, in the order in which the C code sums them up.
+class Numbers {
+ public:
+  template <class N>
+  void add(const char* name, const char* count, const std::vector<N>& numbers) {
+    const char* type = sizeof(N) == 1 ? "int8_t" : std::is_same_v<N, float> ? "float" : "int32_t";
+    using Written = std::conditional_t<std::is_same_v<N, float>, float, std::int32_t>;
+    const std::vector<Written> list(numbers.begin(), numbers.end());
+    crc_ = crc32(crc_, std::span<const Written>(list));
+    bytes_ += sizeof(N) * list.size();
+    text_ += c_array<Written>(
+        std::string("static const ") + type + " flappy_policy_" + name + "[FLAPPY_POLICY_" + count + "]", list);
   }
-  const std::size_t layers = n.widths.size() - 1;
+  const std::string& text() const { return text_; }
+  std::uint32_t crc() const { return crc_; }
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  std::string text_;
+  std::uint32_t crc_ = 0;
+  std::size_t bytes_ = 0;
+};
+
+/// What differs between numbers of 32 and of 8 bits.
+struct Kind {
+  const char *title, *code, *hidden_tanh;
+  std::size_t scratch_bytes;  ///< for each neuron of the widest layer
+  Numbers numbers;
+};
+
+template <class Network>
+void add_common(const Network& n, Numbers& to) {
+  to.add("mean", "OBS", n.mean);
+  to.add("scale", "OBS", n.scale);
+  to.add("middle", "ACT", n.middle);
+  to.add("half", "ACT", n.half);
+}
+
+Kind kind_of(const PolicyNetwork& n) {
+  Kind kind{"A trained policy", "policy.h", "flappy_tanh(x)", 2 * sizeof(float), {}};
+  add_common(n, kind.numbers);
+  kind.numbers.add("weights", "WEIGHTS", n.weights);
+  return kind;
+}
+
+Kind kind_of(const QuantisedNetwork& n) {
+  Kind kind{"A trained policy in whole numbers of 8 bits",
+            "policy_int8.h",
+            "127.0F * flappy_tanh(x)",
+            1 + sizeof(std::int32_t),
+            {}};
+  add_common(n, kind.numbers);
+  kind.numbers.add("multiplier", "NEURONS", n.multiplier);
+  kind.numbers.add("bias", "NEURONS", n.bias);
+  kind.numbers.add("weights", "WEIGHTS", n.weights);
+  return kind;
+}
+
+template <class Network>
+std::string header(const flight::FlyConfig& config, const RunInfo& run, const Network& n,
+                   const PolicyVectors& vectors) {
+  const Kind kind = kind_of(n);
+  const auto inputs = static_cast<std::size_t>(n.inputs()), outputs = static_cast<std::size_t>(n.outputs());
   const int widest = *std::ranges::max_element(n.widths);
-  std::size_t multiply_adds = 0;
+  int neurons = 0, multiply_adds = 0;
   std::string widths;
-  for (std::size_t i = 0; i <= layers; ++i) {
+  for (std::size_t i = 0; i < n.widths.size(); ++i) {
     widths += (i > 0 ? ", " : "") + std::to_string(n.widths[i]);
-    if (i > 0) multiply_adds += static_cast<std::size_t>(n.widths[i - 1]) * static_cast<std::size_t>(n.widths[i]);
+    if (i == 0) continue;
+    neurons += n.widths[i];
+    multiply_adds += n.widths[i - 1] * n.widths[i];
   }
   std::ostringstream text;
   const auto define = [&](const char* name, const auto& value) {
     text << "#define FLAPPY_POLICY_" << name << " " << value << "\n";
   };
-  text << c_comment(
-              "A trained policy, exported by flappy-export. C99 or C++17, gcc or clang; nothing else is needed.\n\n" +
-              contract_text(config, run))
+  text << c_comment(std::string(kind.title) +
+                    ", exported by flappy-export. C99 or C++17, gcc or clang; nothing else is needed.\n\n" +
+                    contract_text(config, run))
        << "#ifndef FLAPPY_POLICY_H\n#define FLAPPY_POLICY_H\n\n#include <stdint.h>\n\n"
        << kEmbedded.at("begin.h") << "\n"
        << contract_macros("FLAPPY_POLICY_", config, run);
-  define("OBS", n.inputs());
-  define("ACT", n.outputs());
+  define("OBS", inputs);
+  define("ACT", outputs);
   define("WEIGHTS", n.weights.size());
   define("MULTIPLY_ADDS", multiply_adds);
-  define("CONSTANT_BYTES", constants);
-  define("SCRATCH_BYTES", 2 * static_cast<std::size_t>(widest) * sizeof(float));
-  define("CRC32", std::to_string(crc) + "U");
-  define("LAYERS", layers);
+  define("CONSTANT_BYTES", kind.numbers.bytes());
+  define("SCRATCH_BYTES", static_cast<std::size_t>(widest) * kind.scratch_bytes);
+  define("CRC32", std::to_string(kind.numbers.crc()) + "U");
+  define("LAYERS", n.widths.size() - 1);
+  define("NEURONS", neurons);
   define("WIDTHS", "{" + widths + "}");
   define("WIDEST", widest);
-  define("CLIP", c_number(n.clip));
-  define("HIDDEN(x)", n.relu ? "flappy_max(x, 0.0F)" : "flappy_tanh(x)");
-  define("VECTORS", rows);
+  if constexpr (std::is_same_v<Network, PolicyNetwork>) define("CLIP", c_number(n.clip));
+  define("HIDDEN(x)", n.relu ? "flappy_max(x, 0.0F)" : kind.hidden_tanh);
+  define("VECTORS", vectors.rows());
   text << kCodes << "\n"
        << kSignalType << "\n"
-       << signals("flappy_policy_observation", "FLAPPY_POLICY_OBS", task.observation())
-       << signals("flappy_policy_action", "FLAPPY_POLICY_ACT", task.action()) << "\n"
-       << kEmbedded.at("arithmetic.h") << "\n";
-  const auto array = [&](const char* name, const char* count, const std::vector<float>& numbers) {
-    text << c_array<float>(std::string("static const float flappy_policy_") + name + "[" + count + "]", numbers);
-  };
-  text << "/* input = clamp((observation - mean) scale, +-clip); output = middle + half * the network's */\n";
-  array("mean", "FLAPPY_POLICY_OBS", n.mean);
-  array("scale", "FLAPPY_POLICY_OBS", n.scale);
-  array("middle", "FLAPPY_POLICY_ACT", n.middle);
-  array("half", "FLAPPY_POLICY_ACT", n.half);
-  array("weights", "FLAPPY_POLICY_WEIGHTS", n.weights);
-  text << "\n"
-       << kEmbedded.at("policy.h")
+       << signals("flappy_policy_observation", "FLAPPY_POLICY_OBS", config.fleet.task.observation())
+       << signals("flappy_policy_action", "FLAPPY_POLICY_ACT", config.fleet.task.action()) << "\n"
+       << kEmbedded.at("arithmetic.h") << "\n"
+       << "/* The first layer's input is (observation - mean) scale, clipped; the output is middle + half * the last "
+          "layer's. */\n"
+       << kind.numbers.text() << "\n"
+       << kEmbedded.at(kind.code)
        << "\n/* Test vectors: observations of flights and corners of their range, and what was computed for them. */\n";
   std::vector<float> tolerance;
   for (const float half : n.half) tolerance.push_back(2 * half * kTolerance);
-  array("tolerance", "FLAPPY_POLICY_ACT", tolerance);
+  text << c_array<float>("static const float flappy_policy_tolerance[FLAPPY_POLICY_ACT]", tolerance);
   const auto table = [&](const char* name, const char* width, const std::vector<float>& numbers, std::size_t columns) {
     text << "static const float flappy_policy_test_" << name << "[FLAPPY_POLICY_VECTORS][" << width << "] = {\n";
-    for (std::size_t row = 0; row < rows; ++row)
+    for (std::size_t row = 0; row < vectors.rows(); ++row)
       text << c_row<float>(std::span(numbers).subspan(row * columns, columns)) << ",\n";
     text << "};\n";
   };
-  table("obs", "FLAPPY_POLICY_OBS", vectors.observation, static_cast<std::size_t>(n.inputs()));
-  table("action", "FLAPPY_POLICY_ACT", vectors.action, static_cast<std::size_t>(n.outputs()));
+  table("obs", "FLAPPY_POLICY_OBS", vectors.observation, inputs);
+  table("action", "FLAPPY_POLICY_ACT", vectors.action, outputs);
   text << "\n" << kEmbedded.at("selftest.h") << "\n" << kEmbedded.at("end.h") << "\n#endif\n";
   return text.str();
+}
+
+}  // namespace
+
+std::string policy_header(const flight::FlyConfig& config, const RunInfo& run, const PolicyNetwork& network,
+                          const PolicyVectors& vectors) {
+  return header(config, run, network, vectors);
+}
+
+std::string policy_header(const flight::FlyConfig& config, const RunInfo& run, const QuantisedNetwork& network,
+                          const PolicyVectors& vectors) {
+  return header(config, run, network, vectors);
 }
 
 }  // namespace flappy::deploy

@@ -18,7 +18,7 @@ ROOMS = {
     "learn": {"deploy", "flight", "sim", "model", "io"},
     "identify": {"flight", "sim", "model", "io"},
     "gap": {"flight", "sim", "model", "io"},
-    "deploy": {"flight", "io"},
+    "deploy": {"flight", "sim", "model", "io"},
     "blind": {"flight", "io"},
 }
 # Which room declares itself in which public header.

@@ -1,9 +1,13 @@
 // flappy-export: a finished run as TorchScript and as C headers that prove themselves.
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "deploy/policy_header.hpp"
+#include "deploy/proof.hpp"
 #include "deploy/rollout.hpp"
+#include "deploy/temporary_folder.hpp"
 #include "deploy/torch_script.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
@@ -14,8 +18,63 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+using deploy::PolicyVectors;
 
-constexpr std::size_t kSelftestVectors = 24, kRolloutFlights = 64;
+/// Flights whose observations become test vectors, those that the headers are proven on, and those that 8 bits are fitted to.
+constexpr std::size_t kProofFlights = 64, kFitFlights = 512;
+constexpr std::size_t kTestVectors = 24, kProofVectors = 1000, kFitVectors = 10000;
+
+struct Request {
+  std::string run, out;
+  bool int8 = false, prove = false;
+};
+
+/// What an export consists of, in memory until all of it is proven.
+struct Export {
+  std::map<std::string, std::string> files;
+  std::map<std::string, PolicyVectors> proofs;  ///< of each policy header: what has to come out
+  PolicyVectors flown;
+};
+
+/// With the rows that its self-test runs.
+template <class Network>
+void add_header(Export& e, const std::string& name, const learn::FinishedRun& run, const Network& network,
+                const PolicyVectors& tests) {
+  PolicyVectors own = tests;
+  own.action = evaluate(network, own.observation);
+  e.files[name] = policy_header(run.fly, run.info, network, own);
+  own = some_of(e.flown, kProofVectors);
+  own.action = evaluate(network, own.observation);
+  e.proofs[name] = own;
+}
+
+/// Largest and root-mean-square difference of each output, of its range.
+struct OutputError {
+  std::vector<double> largest, rms;
+};
+OutputError output_error(const std::vector<float>& action, const std::vector<float>& wanted,
+                         const std::vector<float>& half) {
+  OutputError e{std::vector<double>(half.size(), 0), std::vector<double>(half.size(), 0)};
+  for (std::size_t i = 0; i < action.size(); ++i) {
+    const std::size_t k = i % half.size();
+    const double d = half[k] > 0 ? (static_cast<double>(action[i]) - static_cast<double>(wanted[i])) /
+                                       (2 * static_cast<double>(half[k]))
+                                 : 0;
+    e.largest[k] = std::max(e.largest[k], std::abs(d));
+    e.rms[k] += d * d;
+  }
+  for (double& x : e.rms) x = std::sqrt(x * static_cast<double>(half.size()) / static_cast<double>(action.size()));
+  return e;
+}
+
+void print(const char* what, const OutputError& e, const std::vector<flight::Signal>& action) {
+  std::printf("%s, %% of an output's range: ", what);
+  for (std::size_t k = 0; k < action.size(); ++k)
+    std::printf("%s%s %.2g (rms %.2g)", k > 0 ? ", " : "", action[k].name.c_str(), 100 * e.largest[k], 100 * e.rms[k]);
+  std::printf("\n");
+}
+
+Json json_of(const OutputError& e) { return {{"largest", e.largest}, {"rms", e.rms}}; }
 
 void write_all(const fs::path& folder, const std::map<std::string, std::string>& files) {
   std::error_code error;
@@ -25,21 +84,59 @@ void write_all(const fs::path& folder, const std::map<std::string, std::string>&
   io::sync_folder(folder);
 }
 
-void run(const fs::path& from, const fs::path& out, const io::Program& program) {
-  const learn::FinishedRun run = learn::read_finished_run(from);
+void run(const Request& request, const io::Program& program) {
+  const learn::FinishedRun run = learn::read_finished_run(request.run);
   const deploy::PolicyNetwork network = deploy::network_of(run.fly);
-  const deploy::PolicyVectors rollouts = deploy::roll_out(run.fly, 0, kRolloutFlights);
-  deploy::PolicyVectors vectors = deploy::every_nth(rollouts, network.inputs(), network.outputs(), kSelftestVectors);
-  const deploy::PolicyVectors corners = deploy::corners(network, run.fly.fleet.task.observation());
-  vectors.observation.insert(vectors.observation.end(), corners.observation.begin(), corners.observation.end());
-  vectors.action.insert(vectors.action.end(), corners.action.begin(), corners.action.end());
+  const auto signals = run.fly.fleet.task.observation();
+  Export e;
+  e.flown = deploy::roll_out(run.fly, 0, kProofFlights);
+  PolicyVectors tests = some_of(e.flown, kTestVectors);
+  append(tests, deploy::corners(network, signals));
+  Json json = {{"run", request.run}, {"out", request.out}, {"config_sha256", run.info.config_sha256}};
 
-  std::map<std::string, std::string> files;
-  files["flappy_policy.h"] = deploy::policy_header(run.fly, run.info, network, vectors);
-  if (deploy::reads_torch_script())
-    files["policy.pt"] = deploy::torch_script(network, deploy::contract_text(run.fly, run.info));
-  write_all(out, files);
-  Json json = {{"run", from.string()}};
+  add_header(e, "flappy_policy.h", run, network, tests);
+  if (request.int8) {
+    const PolicyVectors fit = some_of(deploy::roll_out(run.fly, kProofFlights, kFitFlights), kFitVectors);
+    const deploy::QuantisedNetwork whole = deploy::quantise(network, fit.observation);
+    add_header(e, "flappy_policy_int8.h", run, whole, tests);
+    const OutputError error = output_error(evaluate(whole, e.flown.observation), e.flown.action, network.half);
+    print("8 bits differ by at most", error, run.fly.fleet.task.action());
+    json["int8_error"] = json_of(error);
+  }
+  const deploy::TemporaryFolder work;
+  if (deploy::reads_torch_script()) {
+    e.files["policy.pt"] = deploy::torch_script(network, deploy::contract_text(run.fly, run.info));
+    io::write_atomically(work / "policy.pt", e.files["policy.pt"]);
+    std::vector<float> action(e.flown.action.size());
+    deploy::load_policy(work / "policy.pt", network.inputs(), network.outputs())
+        ->act(e.flown.rows(), e.flown.observation.data(), action.data());
+    const OutputError error = output_error(action, e.flown.action, network.half);
+    print("TorchScript differs by at most", error, run.fly.fleet.task.action());
+    json["torch_script_error"] = json_of(error);
+    if (*std::ranges::max_element(error.largest) > 1e-5)
+      throw std::runtime_error("TorchScript does not act as the actor does");
+  } else {
+    std::printf("policy.pt is not written: this build has no LibTorch\n");
+  }
+
+  for (const auto& [name, vectors] : e.proofs) {
+    const fs::path folder = work / name.substr(0, name.find('.'));
+    fs::create_directory(folder);
+    io::write_atomically(folder / "flappy_policy.h", e.files[name]);
+    const std::vector<deploy::Parity> rows =
+        deploy::prove(folder, vectors, request.prove ? deploy::Reach::everywhere : deploy::Reach::here);
+    std::printf("%s\n%s", name.c_str(), table_of(rows).c_str());
+    json["parity"][name] = json_of(rows);
+    if (std::ranges::any_of(rows, &deploy::Parity::failed))
+      throw std::runtime_error(name + " does not compute what was trained; nothing is written");
+    if (!request.prove) continue;
+    const std::vector<deploy::Footprint> prints = deploy::footprints(folder, "flappy_policy.h");
+    std::printf("%s", table_of(prints).c_str());
+    json["footprints"][name] = json_of(prints);
+  }
+  write_all(request.out, e.files);
+  for (const auto& [name, text] : e.files)
+    std::printf("%s: %zu bytes\n", (fs::path(request.out) / name).c_str(), text.size());
   program.write_json(json);
 }
 
@@ -50,8 +147,12 @@ int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-export", "Exports a finished run as TorchScript and as C headers that prove themselves.",
                       {std::string("TorchScript ") + (deploy::reads_torch_script() ? "yes" : "no")});
-  std::string from, out;
-  program.app().add_option("run", from, "run folder that flappy-train left")->required();
-  program.app().add_option("--out", out, "folder for the exported files")->required();
-  return program.run(argc, argv, [&] { exports::run(from, out, program); });
+  exports::Request r;
+  program.app().add_option("run", r.run, "run folder that flappy-train left")->required();
+  program.app().add_option("--out", r.out, "folder for what is exported")->required();
+  program.app().add_flag("--int8", r.int8, "the policy in whole numbers of 8 bits too: flappy_policy_int8.h");
+  program.app().add_flag(
+      "--prove", r.prove,
+      "prove it on every compiler at hand and on a Cortex-M4F, and measure what microcontrollers need");
+  return program.run(argc, argv, [&] { exports::run(r, program); });
 }

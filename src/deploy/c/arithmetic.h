@@ -63,19 +63,25 @@ static inline float flappy_tanh(float x) {
   return flappy_copysign(below_one / (2.0F + below_one), x);
 }
 
-/* CRC-32 (IEEE 802.3) of the numbers' bytes, lowest first; `crc`: of what came before, or 0. */
-static inline uint32_t flappy_crc32(uint32_t crc, const float *numbers, uint32_t count) {
+/* CRC-32 (IEEE 802.3) of the four bytes of a number, lowest first; `crc`: of what came before, or 0. */
+static inline uint32_t flappy_crc32_word(uint32_t crc, uint32_t word) {
   static const uint32_t of_nibble[16] = {0x00000000U, 0x1db71064U, 0x3b6e20c8U, 0x26d930acU, 0x76dc4190U, 0x6b6b51f4U,
                                          0x4db26158U, 0x5005713cU, 0xedb88320U, 0xf00f9344U, 0xd6d6a3e8U, 0xcb61b38cU,
                                          0x9b64c2b0U, 0x86d3d2d4U, 0xa00ae278U, 0xbdbdf21cU};
-  uint32_t i, nibble;
+  uint32_t nibble;
   crc = ~crc;
+  for (nibble = 0; nibble < 8; ++nibble) crc = crc >> 4 ^ of_nibble[(crc ^ word >> 4 * nibble) & 15U];
+  return ~crc;
+}
+
+static inline uint32_t flappy_crc32(uint32_t crc, const float *numbers, uint32_t count) {
+  uint32_t i;
   for (i = 0; i < count; ++i) {
     flappy_float f;
     f.number = numbers[i];
-    for (nibble = 0; nibble < 8; ++nibble) crc = crc >> 4 ^ of_nibble[(crc ^ f.bits >> 4 * nibble) & 15U];
+    crc = flappy_crc32_word(crc, f.bits);
   }
-  return ~crc;
+  return crc;
 }
 
 #endif
