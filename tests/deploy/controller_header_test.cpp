@@ -241,10 +241,15 @@ TEST(ControllerHeader, HandsBackWhereItArrives) {
 
 TEST(ControllerHeader, SeesEveryPart) { fly_beside(config_of("escape", {kEveryPart}), 4, 250); }
 
+/// Turns on its way.
+const std::string kTurns =
+    "task.path.waypoint=[{t_s=0.0,x_m=0.0,y_m=0.0,z_m=0.0},{t_s=1.0,x_m=0.0,y_m=0.1,z_m=0.3,heading_rad=0.8},"
+    "{t_s=2.5,x_m=0.4,y_m=0.1,z_m=0.4,heading_rad=-2.0},{t_s=3.5,x_m=0.4,y_m=-0.2,z_m=0.4,heading_rad=-4.0}]";
+
 TEST(ControllerHeader, FollowsAPathThroughLosses) {
   const Seen seen =
       fly_beside(config_of("waypoints",
-                           {kEveryPart, "sensors.mocap.loss_probability=0.05", "sensors.mocap.loss_length=4.0",
+                           {kEveryPart, kTurns, "sensors.mocap.loss_probability=0.05", "sensors.mocap.loss_length=4.0",
                             "sensors.imu.rate_hz=1000.0", "sensors.imu.low_pass_hz=90.0", "sensors.mocap.rate_hz=240.0",
                             "sensors.mocap.latency_s=0.0231", "sensors.imu.position_m={x=0.01,y=-0.02,z=0.03}"}),
                  8, 2000);
