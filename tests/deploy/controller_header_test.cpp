@@ -10,6 +10,7 @@
 #include <memory>
 #include <random>
 
+#include "deploy/board.hpp"
 #include "deploy/controller_library.hpp"
 #include "flight/flight_block.hpp"
 #include "flight/recorder.hpp"
@@ -399,6 +400,23 @@ TEST(ControllerHeader, RefusesWhatItCannotExport) {
   EXPECT_EQ(refused({"flight.control_hz=300.0", "flight.step_s=3.3333333333333335e-5"}),
             "a control period of 0.0033333333333333335 s is no whole number of microseconds, in which headers count; "
             "accepted: one that is");
+}
+
+TEST(ControllerHeader, FliesOnAMicrocontroller) {
+  if (!board_missing().empty()) GTEST_SKIP() << board_missing();
+  const flight::Folder folder;
+  folder.write("flappy_controller.h", escape_header());
+  const std::string source =
+      folder.write("main.c",
+                   "#include \"flappy_controller.h\"\nint main(void) {\n"
+                   "  const float error = flappy_controller_selftest_error();\n"
+                   "  return 10 * flappy_controller_selftest() + (error == 0.0F ? 40 : 41);\n}\n");
+  write_board(folder / "");
+  for (const char* level : {"-O0", "-O2"}) {
+    const io::Finished made = io::run(board_build(folder / "", {source}, {"-std=c99", level}, folder / "main.elf"));
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    EXPECT_EQ(run_limited(board_run(folder / "main.elf", false)).exit_code, 40) << level;  // to the bit there too
+  }
 }
 
 /// A unit at rest, its clock about to wrap.
