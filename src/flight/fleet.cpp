@@ -401,10 +401,10 @@ auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
   std::vector<MocapRecord> list;
   s.template for_samples<MocapSample>(i, s.mocap_tap, s.mocap_tap_size, &Slice::mocap,
                                       [&](double time_s, const auto& x) {
-                                        if (x.valid <= 0) return;
                                         list.push_back({time_s + s.options.sensors.mocap.latency_s,
                                                         {x.position_m.x, x.position_m.y, x.position_m.z},
-                                                        {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z}});
+                                                        {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z},
+                                                        x.valid > 0});
                                       });
   return list;
 }
