@@ -1,5 +1,6 @@
 #include "deploy/controller_header.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <sstream>
@@ -118,6 +119,12 @@ void add_constants(const flight::FlyConfig& config, Constants& to) {
   for (int i = 0; i < flight::kActions; ++i)
     middle.push_back(static_cast<float>(0.5 * static_cast<double>(task.action_low[i] + task.action_high[i])));
   list.push_back({"start_added", middle});
+  const flight::StartRange& begin = config.fleet.task.start;
+  std::vector<float> place;
+  for (const flight::Spread& axis : begin.position_m) place.push_back(static_cast<float>(axis.centre));
+  place[0] = static_cast<float>(std::clamp(begin.position_m[0].centre, begin.x_low_m, begin.x_high_m));
+  list.push_back({"start_position_m", place});
+  one("start_heading_rad", begin.rotation_rad[2].centre);
   one("driver_amplitude_V", d.amplitude_limit_V);
   one("driver_difference_V", d.difference_limit_V);
   one("driver_bias_V", d.bias_limit_V);
