@@ -39,7 +39,8 @@ enum LoopFlag : std::uint32_t {
   kPolicyRefused = 512,
   kPolicyTooLong = 1024,
   kClamped = 2048,
-  kStopped = 4096
+  kNotFinite = 4096,
+  kStopped = 8192
 };
 
 /// Runs until its input ends, or this does.
@@ -110,11 +111,14 @@ class LoopProgram {
 /// A flight in control periods since its begin; kNever: does not happen.
 inline constexpr int kNever = std::numeric_limits<int>::max();
 struct Script {
-  int periods = 1300;
+  int periods = 1200;
   int manoeuvre = 600, stop = kNever;
-  int imu_silent = kNever, imu_back = kNever;    // no samples from one to the other
+  int imu_silent = kNever, imu_back = kNever;  // no samples arrive from one to before the other
   int mocap_silent = kNever, mocap_back = kNever;
-  int late = kNever, late_periods = 2;           // how long the loop stands still then
+  bool not_numbers = false;  // they do, but they are NaN
+  int late = kNever;         // the loop stands still then, for so many periods, and so much longer
+  int late_periods = 0;
+  std::uint32_t late_us = 0;
 };
 
 /// A flapper whose inputs come from a loop; it starts at rest where the task begins.
@@ -156,6 +160,7 @@ class LedFlight {
     for (int i = 0; i < held; ++i) fly(script);  // with the inputs of before
     const int wish = period_ == 0 ? kHover : period_ == script.stop ? kStop : period_ == script.manoeuvre ? kManoeuvre : 0;
     loop_input in = frame(period_, period_ + 1, wish);
+    if (period_ - held == script.late) in.now_us += script.late_us;
     if (period_ == 0) rest(in);
     const auto arrived = [&](const auto& s) { return s.arrived_us <= period_us_ * period_; };
     for (; !imu_.empty() && arrived(imu_.front()); imu_.pop_front()) {
@@ -238,18 +243,22 @@ class LedFlight {
       for (const double v : from) to.push_back(static_cast<float>(v));
     };
     for (const auto& s : fleet_.imu_samples(0)) {
-      if (period_ >= script.imu_silent && period_ < script.imu_back) continue;
-      Sample& to = imu_.emplace_back(whole_us(s.arrival_s - latency_.imu.latency_s), whole_us(s.arrival_s), true,
-                                     std::vector<float>{});
+      Sample to{whole_us(s.arrival_s - latency_.imu.latency_s), whole_us(s.arrival_s), true, {}};
       add(to.x, s.gyro_rad_s), add(to.x, s.accel_m_s2);
+      send(to, imu_, script.imu_silent, script.imu_back, script.not_numbers);
     }
     for (const auto& s : fleet_.mocap_samples(0)) {
       Sample to{whole_us(s.arrival_s - latency_.mocap.latency_s), whole_us(s.arrival_s), s.valid, {}};
-      const std::int64_t arrives = to.arrived_us / period_us_;
-      if (arrives >= script.mocap_silent && arrives < script.mocap_back) continue;
       add(to.x, s.position_m), add(to.x, s.attitude);
-      poses_.push_back(to);
+      send(to, poses_, script.mocap_silent, script.mocap_back, script.not_numbers);
     }
+  }
+  /// On its way, unless it would arrive in a silence.
+  void send(Sample s, std::deque<Sample>& to, int silent, int back, bool not_number) const {
+    const std::int64_t frame = (s.arrived_us + period_us_ - 1) / period_us_;
+    const bool bad = frame >= silent && frame < back;
+    if (bad) s.x[4] = std::nanf("");
+    if (!bad || not_number) to.push_back(s);
   }
 
   LoopProgram program_;

@@ -1,12 +1,12 @@
 /* What the simulator and the loop tell each other, in lock-step: the simulator sends a loop_input; the loop runs until
-   until_us on its clock, answers with a loop_output, and waits for the next one. All members have four bytes, lowest first,
-   so there is no padding. Input of no length ends the loop, and so does wish = -1. */
+   until_us on its clock, answers with a loop_output, and waits for the next one. Both are of one size, all members of four
+   bytes, lowest first, so there is no padding. The loop ends with the input, or upon wish = -1. */
 #ifndef HAL_SIMULATED
 #define HAL_SIMULATED 1
 
 #include <stdint.h>
 
-enum { LOOP_IMU = 8, LOOP_POSES = 4, LOOP_DRIVES = 8 };
+enum { LOOP_IMU = 4, LOOP_POSES = 2, LOOP_DRIVES = 4 };
 
 typedef struct {
   uint32_t now_us, until_us; /* now: later than the until before where the loop was late */

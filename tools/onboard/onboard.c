@@ -53,11 +53,11 @@ static void turn_off(onboard *o, uint32_t why) {
   o->state = ONBOARD_OFF;
 }
 
-/* The policy acts no more, now or later; feedback flies on. */
+/* The policy acts no more, now or later; feedback stays here, for the goal may be further away than it can leap. */
 static void drop_policy(onboard *o, uint32_t why) {
   o->flags |= why;
   if (o->state != ONBOARD_ACTING) return;
-  o->controller.handed_back = 1;
+  flappy_controller_stay(&o->controller);
   o->state = ONBOARD_RETURNED;
 }
 
@@ -67,6 +67,14 @@ static void watch_sensors(onboard *o, uint32_t now_us) {
   if (pose_age_us > ONBOARD_POSE_STALE_US) drop_policy(o, ONBOARD_POSE_STALE);
   if (imu_age_us > ONBOARD_IMU_LOST_US) turn_off(o, ONBOARD_IMU_LOST);
   if (pose_age_us > ONBOARD_POSE_LOST_US) turn_off(o, ONBOARD_POSE_LOST);
+}
+
+/* A NaN would be clipped to full voltage, so it has to be seen before. */
+static void watch_numbers(onboard *o) {
+  const flappy_controller *c = &o->controller;
+  if (!flappy_all_finite((const float *)&c->estimate, (uint32_t)sizeof c->estimate) ||
+      !flappy_all_finite((const float *)&c->input, (uint32_t)sizeof c->input))
+    turn_off(o, ONBOARD_NOT_FINITE);
 }
 
 /* Flying. */
@@ -126,6 +134,7 @@ void onboard_tick(onboard *o, uint32_t now_us) {
   if (!onboard_flies(o)) return;
   if (o->state == ONBOARD_ACTING) let_policy_act(o);
   flappy_controller_steer(&o->controller);
+  watch_numbers(o);
 }
 
 /* Motors. */

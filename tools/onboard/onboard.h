@@ -5,8 +5,9 @@
      WAITING           motors off; fresh samples and a wish to hover: HOVERING
      HOVERING          feedback alone, where the task begins; the trim is learnt; a wish for the manoeuvre: ACTING
      ACTING            the policy acts until the controller hands back, or something is wrong: RETURNED
-     RETURNED          feedback alone, at the goal; the policy never acts again
-     OFF               motors off for good: without the IMU, without motion capture for too long, or by wish */
+     RETURNED          feedback alone, at the goal or where it went wrong; the policy never acts again
+     OFF               motors off for good: without the IMU, without motion capture for too long, without an estimate, or
+                       by wish */
 #ifndef ONBOARD
 #define ONBOARD 1
 
@@ -37,7 +38,8 @@
 #ifndef ONBOARD_IMU_STALE_US
 #define ONBOARD_IMU_STALE_US 10000U
 #endif
-/* A flapper is unstable: in about this time attitude and rate have left what feedback could bring back. */
+/* A flapper is unstable: in the simulator it leans by 0.1 to 0.4 rad this long after the last sample, and has turned over
+   in twice the time. */
 #ifndef ONBOARD_IMU_LOST_US
 #define ONBOARD_IMU_LOST_US 50000U
 #endif
@@ -45,11 +47,11 @@
 #ifndef ONBOARD_POSE_STALE_US
 #define ONBOARD_POSE_STALE_US 50000U
 #endif
-/* Dead reckoning drifts by decimetres in this time; then the vehicle may be anywhere. */
+/* In the simulator dead reckoning drifts by a few centimetres in this time, and by a metre in four times as long. */
 #ifndef ONBOARD_POSE_LOST_US
 #define ONBOARD_POSE_LOST_US 1500000U
 #endif
-/* Of flappy_controller_tick(): half a period, for then its data are nearer to those of another tick. */
+/* Half a period: what the policy sees then belongs to the next tick rather than to this one. */
 #ifndef ONBOARD_LATE_US
 #define ONBOARD_LATE_US 1000U
 #endif
@@ -61,7 +63,7 @@
 #ifndef ONBOARD_HOVER_US
 #define ONBOARD_HOVER_US 1000000U
 #endif
-/* What the motors may ever get, whatever was computed. */
+/* What the motors may ever get, whatever was computed: theirs is 18 V. */
 #ifndef ONBOARD_LIMIT_V
 #define ONBOARD_LIMIT_V 18.0F
 #endif
@@ -88,7 +90,8 @@ typedef enum {
 #define ONBOARD_POLICY_REFUSED 512U   /* the observation had a NaN in it */
 #define ONBOARD_POLICY_TOO_LONG 1024U /* it acted longer than ONBOARD_ACTING_US */
 #define ONBOARD_CLAMPED 2048U         /* a voltage was above its limit, or NaN */
-#define ONBOARD_STOPPED 4096U         /* by wish */
+#define ONBOARD_NOT_FINITE 4096U      /* estimate or inputs: motors off */
+#define ONBOARD_STOPPED 8192U         /* by wish */
 #define ONBOARD_FAULTS (~15U)
 
 typedef struct {

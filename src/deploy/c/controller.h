@@ -37,6 +37,10 @@ typedef struct {
   float amplitude_V, difference_V, bias_V, split_cycle;
 } flappy_wing_beat;
 
+typedef struct {
+  float sin, cos;
+} flappy_sin_cos;
+
 /* What the IMU gathered in one control period. Times are those of what was measured: the samples', less their lag. */
 typedef struct {
   flappy_increment gained;
@@ -60,6 +64,8 @@ typedef struct {
   uint32_t tick, segment; /* control periods since the start; of the path */
   uint32_t now_us;        /* the last tick */
   int handed_back, hovering;
+  flappy_vector hover_m; /* where, and facing whereto */
+  flappy_sin_cos hover_heading;
   uint32_t horizon_us, present_us; /* of estimator.horizon and estimator.now */
   uint32_t last_imu_us, pushed_us; /* the last sample; the last one that is in the ring */
   flappy_increment newest;         /* in the ring, or already behind the horizon */
@@ -71,10 +77,6 @@ typedef struct {
 } flappy_controller;
 
 /* Mathematics: the error of each function is a few units in the last place. */
-
-typedef struct {
-  float sin, cos;
-} flappy_sin_cos;
 
 typedef struct {
   flappy_vector x, y, z; /* rows */
@@ -636,9 +638,9 @@ static inline int flappy_controller_timely(const flappy_controller *c, uint32_t 
 static inline flappy_setpoint flappy_controller_reference(const flappy_controller *c, uint32_t *segment) {
   flappy_setpoint s;
   if (!c->hovering) return flappy_controller_setpoint(c->tick, segment);
-  s.position_m = flappy_controller_k.start_position_m;
+  s.position_m = c->hover_m;
   s.velocity_m_s = s.acceleration_m_s2 = flappy_vector_of(0.0F, 0.0F, 0.0F);
-  s.heading = flappy_sin_cos_wide(flappy_controller_k.start_heading_rad);
+  s.heading = c->hover_heading;
   s.heading_rate_rad_s = 0.0F;
   return s;
 }
@@ -653,7 +655,19 @@ static inline void flappy_controller_begin(flappy_controller *c) {
 
 /* Feedback alone, to where the task begins and to stay there until flappy_controller_begin(): so the trim is learnt, to
    which a task that holds it adds no feedback until the hand-back. */
-static inline void flappy_controller_hover(flappy_controller *c) { c->handed_back = c->hovering = 1; }
+static inline void flappy_controller_hover(flappy_controller *c) {
+  c->handed_back = c->hovering = 1;
+  c->hover_m = flappy_controller_k.start_position_m;
+  c->hover_heading = flappy_sin_cos_wide(flappy_controller_k.start_heading_rad);
+}
+
+/* Feedback alone, to stay at the present estimate. */
+static inline void flappy_controller_stay(flappy_controller *c) {
+  const flappy_matrix R = flappy_rotation_matrix(c->estimate.attitude);
+  c->handed_back = c->hovering = 1;
+  c->hover_m = c->estimate.position_m;
+  c->hover_heading = flappy_heading(&R);
+}
 
 /* At rest at this pose of the torso, integrators at 0; the task begins. */
 static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us, flappy_vector position_m,
