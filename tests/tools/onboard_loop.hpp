@@ -158,7 +158,10 @@ class LedFlight {
   bool step(const Script& script) {
     const int held = period_ == script.late ? script.late_periods : 0;
     for (int i = 0; i < held; ++i) fly(script);  // with the inputs of before
-    const int wish = period_ == 0 ? kHover : period_ == script.stop ? kStop : period_ == script.manoeuvre ? kManoeuvre : 0;
+    const int wish = period_ == 0                  ? kHover
+                     : period_ == script.stop      ? kStop
+                     : period_ == script.manoeuvre ? kManoeuvre
+                                                   : 0;
     loop_input in = frame(period_, period_ + 1, wish);
     if (period_ - held == script.late) in.now_us += script.late_us;
     if (period_ == 0) rest(in);

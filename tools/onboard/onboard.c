@@ -90,8 +90,9 @@ static void take_off(onboard *o, uint32_t now_us) {
 }
 
 static void begin_manoeuvre(onboard *o, uint32_t now_us) {
+  const flappy_vector off = flappy_minus(o->controller.estimate.position_m, o->controller.hover_m);
   const int ready = o->state == ONBOARD_HOVERING && now_us - o->hover_us >= ONBOARD_HOVER_US &&
-                    (o->flags & ONBOARD_FAULTS) == 0;
+                    flappy_plausible(off, ONBOARD_PLACE_M) && (o->flags & ONBOARD_FAULTS) == 0;
   if (!ready) {
     o->flags |= ONBOARD_UNREADY;
     return;

@@ -63,6 +63,10 @@
 #ifndef ONBOARD_HOVER_US
 #define ONBOARD_HOVER_US 1000000U
 #endif
+/* Along each axis from where the task begins, for the policy to begin: twice what it was trained from. */
+#ifndef ONBOARD_PLACE_M
+#define ONBOARD_PLACE_M 0.1F
+#endif
 /* What the motors may ever get, whatever was computed: theirs is 18 V. */
 #ifndef ONBOARD_LIMIT_V
 #define ONBOARD_LIMIT_V 18.0F
@@ -127,8 +131,8 @@ void onboard_begin(onboard *o, uint32_t now_us);
 void onboard_imu(onboard *o, uint32_t now_us, const onboard_imu_sample *sample);
 void onboard_pose(onboard *o, uint32_t now_us, const onboard_pose_sample *sample);
 
-/* Wishes of whoever flies, looked at in the next tick. A manoeuvre begins only from a hover of ONBOARD_HOVER_US without a
-   fault; otherwise nothing changes. */
+/* Wishes of whoever flies, looked at in the next tick. A manoeuvre begins only from a hover of ONBOARD_HOVER_US, at its place
+   and without a fault; otherwise nothing changes. */
 void onboard_hover(onboard *o);
 void onboard_manoeuvre(onboard *o);
 void onboard_stop(onboard *o);
