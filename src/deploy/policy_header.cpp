@@ -62,7 +62,7 @@ class Numbers {
 /// What differs between numbers of 32 and of 8 bits.
 struct Kind {
   const char *title, *code, *hidden_tanh;
-  std::size_t activation_bytes;
+  std::size_t scratch_bytes;  ///< for each neuron of the widest layer
   Numbers numbers;
 };
 
@@ -75,14 +75,18 @@ void add_common(const Network& n, Numbers& to) {
 }
 
 Kind kind_of(const PolicyNetwork& n) {
-  Kind kind{"A trained policy", "policy.h", "flappy_tanh(x)", sizeof(float), {}};
+  Kind kind{"A trained policy", "policy.h", "flappy_tanh(x)", 2 * sizeof(float), {}};
   add_common(n, kind.numbers);
   kind.numbers.add("weights", "WEIGHTS", n.weights);
   return kind;
 }
 
 Kind kind_of(const QuantisedNetwork& n) {
-  Kind kind{"A trained policy in whole numbers of 8 bits", "policy_int8.h", "127.0F * flappy_tanh(x)", 1, {}};
+  Kind kind{"A trained policy in whole numbers of 8 bits",
+            "policy_int8.h",
+            "127.0F * flappy_tanh(x)",
+            1 + sizeof(std::int32_t),
+            {}};
   add_common(n, kind.numbers);
   kind.numbers.add("multiplier", "NEURONS", n.multiplier);
   kind.numbers.add("bias", "NEURONS", n.bias);
@@ -95,7 +99,6 @@ std::string header(const flight::FlyConfig& config, const RunInfo& run, const Ne
                    const PolicyVectors& vectors) {
   const Kind kind = kind_of(n);
   const auto inputs = static_cast<std::size_t>(n.inputs()), outputs = static_cast<std::size_t>(n.outputs());
-  const std::size_t rows = vectors.observation.size() / inputs;
   const int widest = *std::ranges::max_element(n.widths);
   int neurons = 0, multiply_adds = 0;
   std::string widths;
@@ -120,7 +123,7 @@ std::string header(const flight::FlyConfig& config, const RunInfo& run, const Ne
   define("WEIGHTS", n.weights.size());
   define("MULTIPLY_ADDS", multiply_adds);
   define("CONSTANT_BYTES", kind.numbers.bytes());
-  define("SCRATCH_BYTES", 2 * static_cast<std::size_t>(widest) * kind.activation_bytes);
+  define("SCRATCH_BYTES", static_cast<std::size_t>(widest) * kind.scratch_bytes);
   define("CRC32", std::to_string(kind.numbers.crc()) + "U");
   define("LAYERS", n.widths.size() - 1);
   define("NEURONS", neurons);
@@ -128,7 +131,7 @@ std::string header(const flight::FlyConfig& config, const RunInfo& run, const Ne
   define("WIDEST", widest);
   if constexpr (std::is_same_v<Network, PolicyNetwork>) define("CLIP", c_number(n.clip));
   define("HIDDEN(x)", n.relu ? "flappy_max(x, 0.0F)" : kind.hidden_tanh);
-  define("VECTORS", rows);
+  define("VECTORS", vectors.rows());
   text << kCodes << "\n"
        << kSignalType << "\n"
        << signals("flappy_policy_observation", "FLAPPY_POLICY_OBS", config.fleet.task.observation())
@@ -144,7 +147,7 @@ std::string header(const flight::FlyConfig& config, const RunInfo& run, const Ne
   text << c_array<float>("static const float flappy_policy_tolerance[FLAPPY_POLICY_ACT]", tolerance);
   const auto table = [&](const char* name, const char* width, const std::vector<float>& numbers, std::size_t columns) {
     text << "static const float flappy_policy_test_" << name << "[FLAPPY_POLICY_VECTORS][" << width << "] = {\n";
-    for (std::size_t row = 0; row < rows; ++row)
+    for (std::size_t row = 0; row < vectors.rows(); ++row)
       text << c_row<float>(std::span(numbers).subspan(row * columns, columns)) << ",\n";
     text << "};\n";
   };

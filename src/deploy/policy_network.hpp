@@ -19,9 +19,12 @@ struct PolicyNetwork {
   int outputs() const { return widths.back(); }
 };
 
-/// Observations and what was done upon them, a row for each: float[count][inputs], float[count][outputs].
+/// Observations and what is to be done upon them, a row for each: float[rows][inputs], float[rows][outputs].
 struct PolicyVectors {
+  int inputs = 0, outputs = 0;
   std::vector<float> observation, action;
+
+  std::size_t rows() const { return observation.size() / static_cast<std::size_t>(inputs); }
 };
 
 }  // namespace flappy::deploy

@@ -25,7 +25,7 @@ constexpr std::size_t kMostVectors = 30'000, kInferences = 1'000;
 /// One proof: the headers, the vectors and a folder to compile in.
 struct Bench {
   const fs::path& headers;
-  const Vectors& vectors;
+  const PolicyVectors& vectors;
   const TemporaryFolder& work;
   std::size_t count, rounds;  ///< vectors, and how often all of them are flown against the clock
 
@@ -36,9 +36,8 @@ struct Bench {
   }
   std::vector<std::string> options() const {
     std::vector<std::string> all = strict_options({headers, work.path()});
-    append(all,
-           {"-DPROVE_OBS=" + std::to_string(vectors.observations), "-DPROVE_ACT=" + std::to_string(vectors.actions),
-            "-DPROVE_VECTORS=" + std::to_string(count), "-DPROVE_ROUNDS=" + std::to_string(rounds)});
+    append(all, {"-DPROVE_OBS=" + std::to_string(vectors.inputs), "-DPROVE_ACT=" + std::to_string(vectors.outputs),
+                 "-DPROVE_VECTORS=" + std::to_string(count), "-DPROVE_ROUNDS=" + std::to_string(rounds)});
     if (fs::exists(headers / "flappy_controller.h")) all.emplace_back("-DPROVE_CONTROLLER");
     return all;
   }
@@ -164,10 +163,10 @@ bool Parity::failed() const {
   return available && (!why_not.empty() || policy_selftest != 0 || controller_selftest != 0 || differing != 0);
 }
 
-std::vector<Parity> prove(const fs::path& folder, const Vectors& vectors) {
-  const std::size_t count = vectors.action.size() / static_cast<std::size_t>(std::max(1, vectors.actions));
-  if (count < 1 || count > kMostVectors || vectors.action.size() != count * static_cast<std::size_t>(vectors.actions) ||
-      vectors.observation.size() != count * static_cast<std::size_t>(vectors.observations))
+std::vector<Parity> prove(const fs::path& folder, const PolicyVectors& vectors, Reach reach) {
+  const std::size_t count = vectors.action.size() / static_cast<std::size_t>(std::max(1, vectors.outputs));
+  if (count < 1 || count > kMostVectors || vectors.action.size() != count * static_cast<std::size_t>(vectors.outputs) ||
+      vectors.observation.size() != count * static_cast<std::size_t>(vectors.inputs))
     throw std::invalid_argument("prove: the vectors do not have the sizes that they say");
   io::read_text(folder / "flappy_policy.h");  // or a complaint that names it
   const fs::path headers = fs::absolute(folder);
@@ -176,6 +175,11 @@ std::vector<Parity> prove(const fs::path& folder, const Vectors& vectors) {
   for (const char* name : {"prove.c", "again.c"}) io::write_atomically(work / name, kEmbedded.at(name));
   const Bench bench{headers, vectors, work, count, (kInferences + count - 1) / count};
 
+  if (reach == Reach::here) {
+    const std::string compiler = in_path("cc") ? "cc" : "gcc";
+    return {in_path(compiler) ? on_this_machine(bench, compiler, "-std=gnu99 -O2")
+                              : missing(compiler, "not installed: gcc")};
+  }
   std::vector<Parity> rows;
   for (const std::string stem : {"gcc", "clang"}) {
     const std::vector<std::string> names = versions_in_path(stem);

@@ -7,14 +7,9 @@
 #include <string>
 #include <vector>
 
-namespace flappy::deploy {
+#include "deploy/policy_network.hpp"
 
-/// What is to come out, to the bit.
-struct Vectors {
-  int observations, actions;
-  std::vector<float> observation;  ///< [n][observations]
-  std::vector<float> action;       ///< [n][actions], as the lanes computed them
-};
+namespace flappy::deploy {
 
 /// One compiler with one set of options.
 struct Parity {
@@ -30,10 +25,15 @@ struct Parity {
   bool failed() const;
 };
 
-/// Compiles `folder`/flappy_policy.h, and flappy_controller.h where it is there, with every gcc and clang of PATH, with
-/// g++ and for a Cortex-M4F, and runs it: 1 to 30,000 vectors. A tool that is missing, a header that does not compile
-/// and a program that crashes are rows. io::InputError where there is no header.
-std::vector<Parity> prove(const std::filesystem::path& folder, const Vectors& vectors);
+enum class Reach {
+  here,       ///< the compiler that is called cc, or gcc where there is none
+  everywhere  ///< every gcc and clang of PATH, g++, and a Cortex-M4F
+};
+
+/// Compiles `folder`/flappy_policy.h, and flappy_controller.h where it is there, and runs it: 1 to 30,000 vectors, whose
+/// action has to come out to the bit. A tool that is missing, a header that does not compile and a program that crashes are
+/// rows. io::InputError where there is no header.
+std::vector<Parity> prove(const std::filesystem::path& folder, const PolicyVectors& vectors, Reach reach);
 
 /// What one function takes of one microcontroller.
 struct Footprint {

@@ -96,32 +96,30 @@ PolicyVectors roll_out(const flight::FlyConfig& config, std::size_t first, std::
     for (const std::size_t i : acting)
       for (const float x : fleet.adds(i)) each[i].action.push_back(x);
   }
-  PolicyVectors all;
-  for (const PolicyVectors& v : each) {
-    all.observation.insert(all.observation.end(), v.observation.begin(), v.observation.end());
-    all.action.insert(all.action.end(), v.action.begin(), v.action.end());
-  }
+  PolicyVectors all{static_cast<int>(inputs), kActions, {}, {}};
+  for (const PolicyVectors& v : each) append(all, v);
   return all;
 }
 
-PolicyVectors every_nth(const PolicyVectors& all, int inputs, int outputs, std::size_t count) {
-  const auto in = static_cast<std::size_t>(inputs), out = static_cast<std::size_t>(outputs);
-  const std::size_t rows = all.observation.size() / in;
-  PolicyVectors some;
-  for (std::size_t k = 0; k < std::min(count, rows); ++k) {
-    const std::size_t row = rows * k / std::min(count, rows);
-    const auto copy = [&](const std::vector<float>& from, std::size_t width, std::vector<float>& to) {
-      const auto begin = from.begin() + static_cast<std::ptrdiff_t>(row * width);
-      to.insert(to.end(), begin, begin + static_cast<std::ptrdiff_t>(width));
-    };
-    copy(all.observation, in, some.observation);
-    copy(all.action, out, some.action);
+PolicyVectors some_of(const PolicyVectors& all, std::size_t count) {
+  const auto in = static_cast<std::size_t>(all.inputs), out = static_cast<std::size_t>(all.outputs);
+  const std::size_t rows = std::min(count, all.rows());
+  PolicyVectors some{all.inputs, all.outputs, {}, {}};
+  for (std::size_t k = 0; k < rows; ++k) {
+    const std::size_t row = all.rows() * k / rows;
+    some.observation.insert(some.observation.end(), &all.observation[row * in], &all.observation[row * in] + in);
+    some.action.insert(some.action.end(), &all.action[row * out], &all.action[row * out] + out);
   }
   return some;
 }
 
+void append(PolicyVectors& to, const PolicyVectors& more) {
+  to.observation.insert(to.observation.end(), more.observation.begin(), more.observation.end());
+  to.action.insert(to.action.end(), more.action.begin(), more.action.end());
+}
+
 PolicyVectors corners(const PolicyNetwork& network, const std::vector<flight::Signal>& observation) {
-  PolicyVectors v;
+  PolicyVectors v{network.inputs(), network.outputs(), {}, {}};
   for (const float reach : {0.0F, 1.0F, 1000.0F, 1e30F})  // of half the range, about its middle
     for (unsigned pattern = 0; pattern < 4 && (reach > 0 || pattern == 0); ++pattern)
       for (std::size_t i = 0; i < observation.size(); ++i) {

@@ -19,8 +19,10 @@ inline constexpr std::uint32_t kRolloutFlappers = std::uint32_t{3} << 30;
 /// in the order of flights; those from `first` on.
 PolicyVectors roll_out(const flight::FlyConfig& config, std::size_t first, std::size_t flights);
 
-/// `count` rows, evenly chosen.
-PolicyVectors every_nth(const PolicyVectors& all, int inputs, int outputs, std::size_t count);
+/// At most `count` rows, evenly chosen.
+PolicyVectors some_of(const PolicyVectors& all, std::size_t count);
+/// More rows of the same widths.
+void append(PolicyVectors& to, const PolicyVectors& more);
 
 /// Observations at and beyond the ends of their ranges, where inputs are clipped and outputs saturate.
 PolicyVectors corners(const PolicyNetwork& network, const std::vector<flight::Signal>& observation);

@@ -1,5 +1,7 @@
 #include "flight/actor_file.hpp"
 
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "io/files.hpp"
@@ -10,7 +12,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& what, const std::string& accepted) {
-  throw io::InputError(path.string() + ": " + what + "; " + accepted);
+  throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
 }
 
 }  // namespace
@@ -57,7 +59,8 @@ Actor read_actor(const std::filesystem::path& path) {
   }
   const auto layers = static_cast<int>(a.widths.size()) - 1;
   if (layers < 1 || layers > kMaxLayers) refuse(path, "has " + std::to_string(layers) + " layers", "1 to 6");
-  if (!(a.clip > 0)) refuse(path, "clip is " + io::shortest_digits(a.clip), "a number above 0");
+  if (!(a.clip > 0 && a.clip <= 1e30))
+    refuse(path, "clip is " + io::shortest_digits(a.clip), "a number above 0, at most 1e30");
   const auto count = [&](const char* name, std::size_t have, std::size_t want) {
     if (have != want)
       refuse(path, std::string(name) + " has " + std::to_string(have) + " entries", std::to_string(want) + " of them");
@@ -69,6 +72,11 @@ Actor read_actor(const std::filesystem::path& path) {
   count("action", a.action.size(), kActions);
   count("widths", static_cast<std::size_t>(a.widths.back()), kActions);
   count("weights", a.weights.size(), weight_count(a.widths));
+  for (const auto* numbers : {&a.mean, &a.scale, &a.weights})
+    for (const double x : *numbers)
+      if (!(std::abs(x) <= static_cast<double>(std::numeric_limits<float>::max())))
+        refuse(path, "has " + io::shortest_digits(x) + " in it, which single precision does not hold",
+               "numbers up to 3.4e38");
   return a;
 }
 

@@ -101,8 +101,8 @@ struct Toy {
 };
 
 /// Observations and what the toy makes of them.
-Vectors vectors_of(const Toy& toy, std::size_t count, bool fused = true) {
-  Vectors vectors{kObs, kAct, {}, {}};
+PolicyVectors vectors_of(const Toy& toy, std::size_t count, bool fused = true) {
+  PolicyVectors vectors{kObs, kAct, {}, {}};
   std::mt19937 random(1);
   std::uniform_real_distribution<float> number(-2, 2);
   for (std::size_t i = 0; i < count; ++i) {
@@ -115,10 +115,10 @@ Vectors vectors_of(const Toy& toy, std::size_t count, bool fused = true) {
   return vectors;
 }
 
-std::vector<Parity> proof_of(const Toy& toy, const Vectors& vectors) {
+std::vector<Parity> proof_of(const Toy& toy, const PolicyVectors& vectors) {
   const TemporaryFolder folder;
   toy.write(folder.path());
-  return prove(folder.path(), vectors);
+  return prove(folder.path(), vectors, Reach::everywhere);
 }
 
 const Parity& board(const std::vector<Parity>& rows) { return rows.back(); }
@@ -171,7 +171,7 @@ TEST(Proof, AgreesToTheBit) {
 
   // a unit in the last place; minus zero for zero; a NaN
   const NarrowPath path({"gcc", "as", "ld", "timeout"});
-  Vectors vectors = vectors_of(toy, 2);
+  PolicyVectors vectors = vectors_of(toy, 2);
   vectors.action[1] = std::nextafter(vectors.action[1], 10.0F);
   Parity row = proof_of(toy, vectors)[0];
   EXPECT_EQ(row.differing, 1u);
@@ -263,16 +263,16 @@ TEST(Proof, WhatGoesWrongIsARow) {
 TEST(Proof, BadCallsAreRefused) {
   const Toy toy;
   const TemporaryFolder folder;
-  EXPECT_NE(test::refusal([&] { prove(folder.path(), vectors_of(toy, 2)); }).find("flappy_policy.h"),
+  EXPECT_NE(test::refusal([&] { prove(folder.path(), vectors_of(toy, 2), Reach::everywhere); }).find("flappy_policy.h"),
             std::string::npos);
   EXPECT_NE(test::refusal([&] { footprints(folder.path(), "flappy_policy.h"); }).find("flappy_policy.h"),
             std::string::npos);
-  Vectors vectors = vectors_of(toy, 2);
+  PolicyVectors vectors = vectors_of(toy, 2);
   vectors.observation.pop_back();
-  EXPECT_THROW(prove(folder.path(), vectors), std::invalid_argument);
+  EXPECT_THROW(prove(folder.path(), vectors, Reach::everywhere), std::invalid_argument);
 
   vectors = vectors_of(toy, 2);
-  vectors.actions = 1;
+  vectors.outputs = 1;
   vectors.observation.resize(std::size_t{4} * kObs);
   const NarrowPath path({"gcc", "as", "ld", "timeout"});
   const std::vector<Parity> rows = proof_of(toy, vectors);
@@ -286,7 +286,7 @@ TEST(Proof, ControllerIsTriedToo) {
   std::ofstream(folder / "flappy_controller.h")
       << "#ifndef CONTROLLER\n#define CONTROLLER\nstatic inline int flappy_controller_selftest(void) { return 3; }\n"
          "static inline float flappy_controller_selftest_error(void) { return 0.25F; }\n#endif\n";
-  for (const auto& row : prove(folder.path(), vectors_of(toy, 2))) {
+  for (const auto& row : prove(folder.path(), vectors_of(toy, 2), Reach::everywhere)) {
     EXPECT_EQ(row.why_not, "");
     EXPECT_EQ(row.policy_selftest, 0);
     EXPECT_EQ(row.controller_selftest, 3);

@@ -262,7 +262,7 @@ TEST(ActorFile, RefusesWhatIsNoActor) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
   EXPECT_EQ(with([](Actor&) {}), "accepted");
-  has(with([](Actor& a) { a.weights.pop_back(); }), "weights has 43 entries; 44 of them");
+  has(with([](Actor& a) { a.weights.pop_back(); }), "weights has 43 entries; accepted: 44 of them");
   has(with([](Actor& a) { a.observation.emplace_back("more"); }), "observation has 4");
   has(with([](Actor& a) { a.action.pop_back(); }), "action has 3");
   has(with([](Actor& a) { a.mean.clear(); }), "mean has 0");
@@ -275,8 +275,9 @@ TEST(ActorFile, RefusesWhatIsNoActor) {
   has(with([](Actor& a) { a.widths = {3, -5, 4}; }), "-5 wide");
   has(with([](Actor& a) { a.widths = {3, 5, 3}; }), "widths has 3");
   has(with([](Actor& a) { a.weights[7] = std::numeric_limits<double>::quiet_NaN(); }),
-      "weights has null in it; numbers");
-  has(with([](Actor& a) { a.mean[1] = std::numeric_limits<double>::infinity(); }), "mean has null in it; numbers");
+      "weights has null in it; accepted: numbers");
+  has(with([](Actor& a) { a.mean[1] = std::numeric_limits<double>::infinity(); }),
+      "mean has null in it; accepted: numbers");
   has(with([](Actor& a) { a.clip = -1; }), "clip is -1");
   has(with([](Actor& a) { a.clip = 0; }), "clip is 0");
 
@@ -299,6 +300,7 @@ TEST(ActorFile, RefusesWhatIsNoActor) {
   has(edited("\"widths\":[3,5,4]", "\"widths\":[3,4294967301,4]"), "4294967301 wide");
   has(edited("\"widths\":[3,5,4]", "\"widths\":[3,5.7,4]"), "5.7");
   has(edited("\"clip\":2.5", "\"clip\":1e999"), "no JSON");
+  has(with([](Actor& a) { a.weights[3] = -1e39; }), "has -1e+39 in it, which single precision does not hold");
   has(edited("\"weights\":[", "\"weights\":[[1],"), "weights has [1] in it");
   has(refused(""), "no JSON");
   has(refused("[1, 2]"), "actor file");

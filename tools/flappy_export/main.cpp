@@ -43,7 +43,7 @@ void add_header(Export& e, const std::string& name, const learn::FinishedRun& ru
   PolicyVectors own = tests;
   own.action = evaluate(network, own.observation);
   e.files[name] = policy_header(run.fly, run.info, network, own);
-  own = every_nth(e.flown, kProofVectors);
+  own = some_of(e.flown, kProofVectors);
   own.action = evaluate(network, own.observation);
   e.proofs[name] = own;
 }
@@ -90,13 +90,13 @@ void run(const Request& request, const io::Program& program) {
   const auto signals = run.fly.fleet.task.observation();
   Export e;
   e.flown = deploy::roll_out(run.fly, 0, kProofFlights);
-  PolicyVectors tests = every_nth(e.flown, kTestVectors);
+  PolicyVectors tests = some_of(e.flown, kTestVectors);
   append(tests, deploy::corners(network, signals));
   Json json = {{"run", request.run}, {"out", request.out}, {"config_sha256", run.info.config_sha256}};
 
   add_header(e, "flappy_policy.h", run, network, tests);
   if (request.int8) {
-    const PolicyVectors fit = every_nth(deploy::roll_out(run.fly, kProofFlights, kFitFlights), kFitVectors);
+    const PolicyVectors fit = some_of(deploy::roll_out(run.fly, kProofFlights, kFitFlights), kFitVectors);
     const deploy::QuantisedNetwork whole = deploy::quantise(network, fit.observation);
     add_header(e, "flappy_policy_int8.h", run, whole, tests);
     const OutputError error = output_error(evaluate(whole, e.flown.observation), e.flown.action, network.half);
@@ -123,8 +123,8 @@ void run(const Request& request, const io::Program& program) {
     const fs::path folder = work / name.substr(0, name.find('.'));
     fs::create_directory(folder);
     io::write_atomically(folder / "flappy_policy.h", e.files[name]);
-    const std::vector<deploy::Parity> rows = request.prove ? deploy::prove(folder, vectors)
-                                                           : deploy::prove_here(folder, vectors);
+    const std::vector<deploy::Parity> rows =
+        deploy::prove(folder, vectors, request.prove ? deploy::Reach::everywhere : deploy::Reach::here);
     std::printf("%s\n%s", name.c_str(), table_of(rows).c_str());
     json["parity"][name] = json_of(rows);
     if (std::ranges::any_of(rows, &deploy::Parity::failed))
@@ -151,7 +151,8 @@ int main(int argc, char** argv) {
   program.app().add_option("run", r.run, "run folder that flappy-train left")->required();
   program.app().add_option("--out", r.out, "folder for what is exported")->required();
   program.app().add_flag("--int8", r.int8, "the policy in whole numbers of 8 bits too: flappy_policy_int8.h");
-  program.app().add_flag("--prove", r.prove,
-                         "prove it on every compiler at hand and on a Cortex-M4F, and measure what microcontrollers need");
+  program.app().add_flag(
+      "--prove", r.prove,
+      "prove it on every compiler at hand and on a Cortex-M4F, and measure what microcontrollers need");
   return program.run(argc, argv, [&] { exports::run(r, program); });
 }

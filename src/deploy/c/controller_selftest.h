@@ -1,10 +1,6 @@
 static inline uint32_t flappy_controller_crc_words(uint32_t crc, const int32_t *words, uint32_t count) {
   uint32_t i;
-  for (i = 0; i < count; ++i) {
-    flappy_float f;
-    f.bits = (uint32_t)words[i];
-    crc = flappy_crc32(crc, &f.number, 1);
-  }
+  for (i = 0; i < count; ++i) crc = flappy_crc32_word(crc, (uint32_t)words[i]);
   return crc;
 }
 

@@ -4,32 +4,55 @@ static inline int8_t flappy_policy_rounded(float x) {
   return (int8_t)((flappy_clamp(x, -127.0F, 127.0F) + to_whole) - to_whole);
 }
 
+/* One layer: adds to the sum of every output its inputs, each times a weight. Four outputs at a time share what they read. */
+static inline const int8_t *flappy_policy_layer(const int8_t *weights, const int8_t *in, uint32_t inputs, int32_t *sum,
+                                                uint32_t outputs) {
+  uint32_t o, i;
+  for (o = 0; o + 4 <= outputs; o += 4, weights += 4 * inputs) {
+    const int8_t *w0 = weights, *w1 = w0 + inputs, *w2 = w1 + inputs, *w3 = w2 + inputs;
+    int32_t s0 = sum[o], s1 = sum[o + 1], s2 = sum[o + 2], s3 = sum[o + 3];
+    for (i = 0; i < inputs; ++i) {
+      const int32_t x = in[i];
+      s0 += *w0++ * x;
+      s1 += *w1++ * x;
+      s2 += *w2++ * x;
+      s3 += *w3++ * x;
+    }
+    sum[o] = s0;
+    sum[o + 1] = s1;
+    sum[o + 2] = s2;
+    sum[o + 3] = s3;
+  }
+  for (; o < outputs; ++o)
+    for (i = 0; i < inputs; ++i) sum[o] += *weights++ * (int32_t)in[i];
+  return weights;
+}
+
 /* Observation in, what is added to the feedback controller's output out, both in the units of the tables above. An
    observation with a NaN in it is refused: it returns 1 and adds nothing. Otherwise it returns 0. Weights and activations are
    whole numbers of 8 bits, sums of 32; each sum is scaled by its multiplier. */
 static inline int flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT]) {
   static const uint32_t widths[FLAPPY_POLICY_LAYERS + 1] = FLAPPY_POLICY_WIDTHS;
-  int8_t values[2][FLAPPY_POLICY_WIDEST];
-  const int8_t *weight = flappy_policy_weights;
+  int8_t values[FLAPPY_POLICY_WIDEST];
+  int32_t sum[FLAPPY_POLICY_WIDEST];
+  const int8_t *weights = flappy_policy_weights;
   const int32_t *bias = flappy_policy_bias;
   const float *multiplier = flappy_policy_multiplier;
-  uint32_t layer, o, i;
+  uint32_t layer, i;
   int refused = 0;
   for (i = 0; i < FLAPPY_POLICY_OBS; ++i) {
     const float x = (obs[i] - flappy_policy_mean[i]) * flappy_policy_scale[i];
     refused |= x != x;
-    values[0][i] = flappy_policy_rounded(x);
+    values[i] = flappy_policy_rounded(x);
   }
   for (layer = 0; layer < FLAPPY_POLICY_LAYERS; ++layer) {
-    const int8_t *in = values[layer % 2];
-    int8_t *out = values[(layer + 1) % 2];
-    for (o = 0; o < widths[layer + 1]; ++o) {
-      int32_t sum = *bias++;
-      float y;
-      for (i = 0; i < widths[layer]; ++i) sum += (int32_t)*weight++ * (int32_t)in[i];
-      y = (float)sum * *multiplier++;
-      if (layer + 1 < FLAPPY_POLICY_LAYERS) out[o] = flappy_policy_rounded(FLAPPY_POLICY_HIDDEN(y));
-      else action[o] = refused ? 0.0F : flappy_fma(flappy_policy_half[o], flappy_tanh(y), flappy_policy_middle[o]);
+    const uint32_t outputs = widths[layer + 1];
+    for (i = 0; i < outputs; ++i) sum[i] = *bias++;
+    weights = flappy_policy_layer(weights, values, widths[layer], sum, outputs);
+    for (i = 0; i < outputs; ++i) {
+      const float y = (float)sum[i] * *multiplier++;
+      if (layer + 1 < FLAPPY_POLICY_LAYERS) values[i] = flappy_policy_rounded(FLAPPY_POLICY_HIDDEN(y));
+      else action[i] = refused ? 0.0F : flappy_fma(flappy_policy_half[i], flappy_tanh(y), flappy_policy_middle[i]);
     }
   }
   return refused;
