@@ -65,9 +65,8 @@ inline const RunInfo kRun{std::string(64, 'a'), "0123456789ab", false, "escape"}
 
 inline std::string policy_text(const FlyConfig& config) {
   const PolicyNetwork network = network_of(config);
-  PolicyVectors v = every_nth(roll_out(config, 0, 4), network.inputs(), network.outputs(), 20);
-  const PolicyVectors wild = corners(network, config.fleet.task.observation());
-  v.observation.insert(v.observation.end(), wild.observation.begin(), wild.observation.end());
+  PolicyVectors v = some_of(roll_out(config, 0, 4), 20);
+  append(v, corners(network, config.fleet.task.observation()));
   v.action = evaluate(network, v.observation);
   return policy_header(config, kRun, network, v);
 }
