@@ -13,9 +13,9 @@ struct Outcome {
   double moved_m = 0, tilt_rad = 0;  // in the second after `fault`, from where it was
 };
 
-Outcome fly(const Words& program, const Script& script, int fault = kNever) {
+Outcome fly(const Words& program, const Script& script, int fault = kNever, const FlyConfig& config = escape()) {
   Outcome seen;
-  LedFlight led(of_nominal(escape()), 0, program);
+  LedFlight led(of_nominal(config), 0, program);
   flight::Motion there{};
   while (led.period() < script.periods) {
     seen.same_voltages &= led.step(script);
@@ -61,12 +61,14 @@ TEST(OnboardFaults, DropsThePolicyUponNaN) {
 }
 
 TEST(OnboardFaults, DropsAPolicyThatActsTooLong) {
-  Loop loop(escape_headers());
+  const FlyConfig config = escape({});  // whose goal is 0.21 m and half a turn away
+  Loop loop({policy_text(config), controller_text(config)});
   ASSERT_EQ(loop.build("gcc", {"-O1", "-DONBOARD_ACTING_US=100000U"}), "");
-  const Outcome seen = fly(loop.program(), {}, 651);
+  const Outcome seen = fly(loop.program(), {}, 651, config);
   EXPECT_EQ(seen.flags, kPolicyTooLong);
   EXPECT_EQ(seen.periods[kActing], 51);
   expect_flies_on(seen);
+  EXPECT_LT(seen.moved_m, 0.1);
 }
 
 TEST(OnboardFaults, TurnsOffWithoutAnImu) {

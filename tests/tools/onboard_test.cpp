@@ -121,7 +121,8 @@ TEST(Onboard, FliesAsTheLanesDo) {
 }
 
 TEST(Onboard, FliesAnyPolicyAsTheLanesDo) {
-  FlyConfig config = escape({});  // with its turn
+  // with its turn, and a tracker that does not always see
+  FlyConfig config = escape({"sensors.mocap.loss_probability=0.1", "sensors.mocap.loss_length=1.5"});
   flight::Actor a = *config.actor;
   a.widths = {static_cast<int>(a.observation.size()), 16, 16, flight::kActions};
   a.hidden = flight::Activation::relu;
