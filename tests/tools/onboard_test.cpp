@@ -121,8 +121,9 @@ TEST(Onboard, FliesAsTheLanesDo) {
 }
 
 TEST(Onboard, FliesAnyPolicyAsTheLanesDo) {
-  // with its turn, and a tracker that does not always see
-  FlyConfig config = escape({"sensors.mocap.loss_probability=0.1", "sensors.mocap.loss_length=1.5"});
+  // with its turn, several samples in a control period, and a tracker that does not always see
+  FlyConfig config = escape({"sensors.mocap.loss_probability=0.1", "sensors.mocap.loss_length=1.5",
+                             "sensors.imu.rate_hz=1000.0", "sensors.mocap.rate_hz=750.0"});
   flight::Actor a = *config.actor;
   a.widths = {static_cast<int>(a.observation.size()), 16, 16, flight::kActions};
   a.hidden = flight::Activation::relu;

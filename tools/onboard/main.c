@@ -12,10 +12,17 @@ static void take_samples(uint32_t now_us) {
 
 static void take_wish(void) {
   switch (hal_wish()) {
-    case ONBOARD_HOVER: onboard_hover(&vehicle); break;
-    case ONBOARD_MANOEUVRE: onboard_manoeuvre(&vehicle); break;
-    case ONBOARD_STOP: onboard_stop(&vehicle); break;
-    case ONBOARD_NOTHING: break;
+    case ONBOARD_HOVER:
+      onboard_hover(&vehicle);
+      break;
+    case ONBOARD_MANOEUVRE:
+      onboard_manoeuvre(&vehicle);
+      break;
+    case ONBOARD_STOP:
+      onboard_stop(&vehicle);
+      break;
+    case ONBOARD_NOTHING:
+      break;
   }
 }
 

@@ -22,7 +22,8 @@
 #error "flappy_policy.h or flappy_controller.h is of another format: export both with the flappy-export of this loop"
 #endif
 #if FLAPPY_POLICY_CONTRACT != FLAPPY_CONTROLLER_CONTRACT
-#error "flappy_policy.h and flappy_controller.h differ in task, periods, signals or their order: export both from one run"
+#error \
+    "flappy_policy.h and flappy_controller.h differ in task, periods, signals or their order: export both from one run"
 #endif
 #if FLAPPY_POLICY_CONTROL_US != ONBOARD_CONTROL_US || FLAPPY_CONTROLLER_CONTROL_US != ONBOARD_CONTROL_US
 #error "the control period is not this loop's: set ONBOARD_CONTROL_US and whatever calls it, or export a run of 500 Hz"
@@ -82,11 +83,11 @@ typedef enum {
 } onboard_state;
 
 /* What has happened since the start, as bits. */
-#define ONBOARD_BAD_POLICY 1U         /* its self-test fails */
-#define ONBOARD_BAD_CONTROLLER 2U     /* its self-test fails */
-#define ONBOARD_HANDED_BACK 4U        /* by the controller, as the task has it */
-#define ONBOARD_UNREADY 8U            /* a manoeuvre was wished for and not begun */
-#define ONBOARD_IMU_STALE 16U         /* from here on: faults, after which the policy does not act */
+#define ONBOARD_BAD_POLICY 1U     /* its self-test fails */
+#define ONBOARD_BAD_CONTROLLER 2U /* its self-test fails */
+#define ONBOARD_HANDED_BACK 4U    /* by the controller, as the task has it */
+#define ONBOARD_UNREADY 8U        /* a manoeuvre was wished for and not begun */
+#define ONBOARD_IMU_STALE 16U     /* from here on: faults, after which the policy does not act */
 #define ONBOARD_IMU_LOST 32U
 #define ONBOARD_POSE_STALE 64U
 #define ONBOARD_POSE_LOST 128U
@@ -117,34 +118,34 @@ typedef struct {
   onboard_state state;
   uint32_t flags;
   onboard_wish wish;
-  uint32_t tick_us, drive_us;  /* when onboard_tick() and onboard_drive() are due next */
-  uint32_t imu_us, pose_us;    /* when the last good sample arrived */
-  uint32_t hover_us, act_us;   /* when that began */
-  onboard_pose_sample pose;    /* the last good one */
+  uint32_t tick_us, drive_us; /* when onboard_tick() and onboard_drive() are due next */
+  uint32_t imu_us, pose_us;   /* when the last good sample arrived */
+  uint32_t hover_us, act_us;  /* when that began */
+  onboard_pose_sample pose;   /* the last good one */
   int has_imu, has_pose;
 } onboard;
 
 /* Tests both headers; `now_us`: when the first tick is due. */
-void onboard_begin(onboard *o, uint32_t now_us);
+void onboard_begin(onboard* o, uint32_t now_us);
 
 /* Samples as they arrive, oldest first, before the tick. What is no sample (NaN, too old, from the future) is dropped. */
-void onboard_imu(onboard *o, uint32_t now_us, const onboard_imu_sample *sample);
-void onboard_pose(onboard *o, uint32_t now_us, const onboard_pose_sample *sample);
+void onboard_imu(onboard* o, uint32_t now_us, const onboard_imu_sample* sample);
+void onboard_pose(onboard* o, uint32_t now_us, const onboard_pose_sample* sample);
 
 /* Wishes of whoever flies, looked at in the next tick. A manoeuvre begins only from a hover of ONBOARD_HOVER_US, at its place
    and without a fault; otherwise nothing changes. */
-void onboard_hover(onboard *o);
-void onboard_manoeuvre(onboard *o);
-void onboard_stop(onboard *o);
+void onboard_hover(onboard* o);
+void onboard_manoeuvre(onboard* o);
+void onboard_stop(onboard* o);
 
 /* Every control period. */
-void onboard_tick(onboard *o, uint32_t now_us);
+void onboard_tick(onboard* o, uint32_t now_us);
 
 /* Every FLAPPY_CONTROLLER_DRIVE_US: what the motors get until the next one. */
-void onboard_drive(onboard *o, uint32_t now_us, float *left_V, float *right_V);
+void onboard_drive(onboard* o, uint32_t now_us, float* left_V, float* right_V);
 
 /* Whether the motors may turn. */
-int onboard_flies(const onboard *o);
+int onboard_flies(const onboard* o);
 
 /* `due_us` has come. */
 int onboard_due(uint32_t due_us, uint32_t now_us);
