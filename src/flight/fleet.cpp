@@ -333,9 +333,7 @@ void Fleet<T>::observation(std::size_t i, T* row) const {
 template <class T>
 void Fleet<T>::true_observation(std::size_t i, T* row) const {
   const auto [f, lane] = storage_->at(i);
-  double exact[kMaxObservation];
-  storage_->observe_as(i, get<Truth<double>>(f.truth, lane), exact);
-  for (int k = 0; k < storage_->observed; ++k) row[k] = static_cast<T>(exact[k]);
+  storage_->observe_as(i, get<Truth<double>>(f.truth, lane), row);
 }
 template <class T>
 std::array<T, kActions> Fleet<T>::action(std::size_t i) const {

@@ -141,7 +141,7 @@ struct Fleet<T>::Storage {
   Snapshot<T> snapshot(std::size_t i, const Target& target);
   void start_lane(std::size_t i, std::uint32_t episode, const Truth<double>& truth);
   void show(std::size_t i);
-  void observe_as(std::size_t i, const Estimate<double>& x, double* row);
+  void observe_as(std::size_t i, const Estimate<double>& x, T* row);
   void start_fusion(std::size_t i, const Truth<double>& truth, sim::RandomKey key);
 };
 
@@ -174,22 +174,29 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
 template <class T>
 void Fleet<T>::Storage::show(std::size_t i) {
   const auto [f, lane] = at(i);
-  double row[kMaxObservation] = {};
+  T row[kMaxObservation] = {};
   observe_as(i, get<Estimate<double>>(f.estimate, lane), row);
-  for (int k = 0; k < kMaxObservation; ++k) f.observation[k][lane] = static_cast<T>(row[k]);
+  for (int k = 0; k < kMaxObservation; ++k) f.observation[k][lane] = row[k];
 }
 
+/// In the arithmetic of the lanes, to the bit.
 template <class T>
-void Fleet<T>::Storage::observe_as(std::size_t i, const Estimate<double>& x, double* row) {
+void Fleet<T>::Storage::observe_as(std::size_t i, const Estimate<double>& x, T* row) {
+  using L = model::Lanes<T, 1>;
   const auto [f, lane] = at(i);
-  const double phase = model::beat_fraction<double>(batch.storage().at(i).block.phase[lane]);
-  WingBeat<double> learnt{};
+  WingBeat<L> learnt{L(0), L(0), L(0), L(0)};
   if (options.controller.kind == Controller::Kind::pid)
-    learnt = trim(options.controller.pid, get<Pid<double>>(f.controller, lane));
+    learnt = trim(plan.pid, rounded<L>(get<Pid<double>>(f.controller, lane)));
   else if (options.controller.kind == Controller::Kind::arc)
-    learnt = trim(options.controller.arc, get<Arc<double>>(f.controller, lane));
-  observe(options.task.parts, x, setpoint(f, lane), get<Episode<double>>(f.episode, lane), phase,
-          f.tick[lane] * period_steps * options.batch.step_s, learnt, row);
+    learnt = trim(plan.arc, rounded<L>(get<Arc<double>>(f.controller, lane)));
+  std::uint32_t segment = f.segment[lane];
+  const auto ref = setpoint_at<L>(plan.path, &f.tick[lane], &segment);
+  const T fraction = model::beat_fraction<T>(batch.storage().at(i).block.phase[lane]);
+  const T time = static_cast<T>(f.tick[lane]) * plan.task.tick_s;
+  L seen[kMaxObservation];
+  const int rows = observe(options.task.parts, rounded<L>(x), ref, rounded<L>(get<Episode<double>>(f.episode, lane)),
+                           L::load(&fraction), L::load(&time), learnt, seen);
+  for (int k = 0; k < rows; ++k) row[k] = seen[k].raw[0];
 }
 
 template <class T>

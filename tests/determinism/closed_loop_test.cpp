@@ -17,7 +17,7 @@ struct Case {
 };
 constexpr Case kCases[] = {{"pid", 0x33df241690a612ec, 0xaf9c243788af9da3},
                            {"arc", 0xf1f40835b0faa803, 0xfd9d8172b951d602},
-                           {"actor", 0xdcc36b581210de40, 0x28ad00741193519a}};
+                           {"actor", 0x29a44a8fd1da59b8, 0x71aeb4f5ff867990}};
 
 constexpr std::size_t kFlappers = 272, kSmall = 17;
 constexpr int kPeriods = 10;

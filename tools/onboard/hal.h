@@ -14,8 +14,8 @@ uint32_t hal_now_us(void);
 int hal_wait_us(uint32_t until_us);
 
 /* The oldest sample that has arrived and not been taken; 0 if there is none. */
-int hal_imu(onboard_imu_sample* sample);
-int hal_pose(onboard_pose_sample* sample);
+int hal_imu(onboard_imu_sample *sample);
+int hal_pose(onboard_pose_sample *sample);
 
 /* What the pilot wishes, once. */
 onboard_wish hal_wish(void);
@@ -24,6 +24,6 @@ onboard_wish hal_wish(void);
 void hal_motors(float left_V, float right_V);
 
 /* After each tick. */
-void hal_telemetry(const onboard* o);
+void hal_telemetry(const onboard *o);
 
 #endif

@@ -29,9 +29,9 @@ int hal_wait_us(uint32_t until_us) {
   return goes_on;
 }
 
-static flappy_vector vector(const float* x) { return flappy_vector_of(x[0], x[1], x[2]); }
+static flappy_vector vector(const float *x) { return flappy_vector_of(x[0], x[1], x[2]); }
 
-int hal_imu(onboard_imu_sample* sample) {
+int hal_imu(onboard_imu_sample *sample) {
   if (imu_taken == in.imu_count || imu_taken == LOOP_IMU) return 0;
   sample->taken_us = in.imu[imu_taken].taken_us;
   sample->gyro_rad_s = vector(in.imu[imu_taken].gyro_rad_s);
@@ -40,8 +40,8 @@ int hal_imu(onboard_imu_sample* sample) {
   return 1;
 }
 
-int hal_pose(onboard_pose_sample* sample) {
-  const float* q = in.pose[pose_taken % LOOP_POSES].attitude;
+int hal_pose(onboard_pose_sample *sample) {
+  const float *q = in.pose[pose_taken % LOOP_POSES].attitude;
   if (pose_taken == in.pose_count || pose_taken == LOOP_POSES) return 0;
   sample->taken_us = in.pose[pose_taken].taken_us;
   sample->valid = in.pose[pose_taken].valid;
@@ -63,8 +63,8 @@ void hal_motors(float left_V, float right_V) {
   ++out.drive_count;
 }
 
-void hal_telemetry(const onboard* o) {
-  const flappy_wing_beat* u = &o->controller.input;
+void hal_telemetry(const onboard *o) {
+  const flappy_wing_beat *u = &o->controller.input;
   const int flies = onboard_flies(o);
   out.state = (uint32_t)o->state;
   out.flags = o->flags;

@@ -2,11 +2,11 @@
 
 int onboard_due(uint32_t due_us, uint32_t now_us) { return (int32_t)(now_us - due_us) >= 0; }
 
-int onboard_flies(const onboard* o) {
+int onboard_flies(const onboard *o) {
   return o->state == ONBOARD_HOVERING || o->state == ONBOARD_ACTING || o->state == ONBOARD_RETURNED;
 }
 
-void onboard_begin(onboard* o, uint32_t now_us) {
+void onboard_begin(onboard *o, uint32_t now_us) {
   static const onboard nothing;
   *o = nothing;
   if (flappy_policy_selftest() != 0) o->flags |= ONBOARD_BAD_POLICY;
@@ -19,7 +19,7 @@ void onboard_begin(onboard* o, uint32_t now_us) {
 
 static int is_number(flappy_vector v) { return flappy_plausible(v, 1e6F); }
 
-void onboard_imu(onboard* o, uint32_t now_us, const onboard_imu_sample* s) {
+void onboard_imu(onboard *o, uint32_t now_us, const onboard_imu_sample *s) {
   const int good = onboard_flies(o) ? flappy_controller_imu(&o->controller, s->taken_us, s->gyro_rad_s, s->accel_m_s2)
                                     : is_number(s->gyro_rad_s) && is_number(s->accel_m_s2);
   if (!good) return;
@@ -27,7 +27,7 @@ void onboard_imu(onboard* o, uint32_t now_us, const onboard_imu_sample* s) {
   o->imu_us = now_us;
 }
 
-void onboard_pose(onboard* o, uint32_t now_us, const onboard_pose_sample* s) {
+void onboard_pose(onboard *o, uint32_t now_us, const onboard_pose_sample *s) {
   const flappy_quaternion q = s->attitude;
   const int number = is_number(s->position_m) && flappy_abs(q.w) <= 2.0F && is_number(flappy_vector_of(q.x, q.y, q.z));
   const int taken = !onboard_flies(o) ||
@@ -40,26 +40,26 @@ void onboard_pose(onboard* o, uint32_t now_us, const onboard_pose_sample* s) {
 
 /* Wishes. */
 
-void onboard_hover(onboard* o) { o->wish = ONBOARD_HOVER; }
-void onboard_manoeuvre(onboard* o) { o->wish = ONBOARD_MANOEUVRE; }
-void onboard_stop(onboard* o) { o->wish = ONBOARD_STOP; }
+void onboard_hover(onboard *o) { o->wish = ONBOARD_HOVER; }
+void onboard_manoeuvre(onboard *o) { o->wish = ONBOARD_MANOEUVRE; }
+void onboard_stop(onboard *o) { o->wish = ONBOARD_STOP; }
 
 /* Watching. */
 
-static void turn_off(onboard* o, uint32_t why) {
+static void turn_off(onboard *o, uint32_t why) {
   o->flags |= why;
   o->state = ONBOARD_OFF;
 }
 
 /* The policy acts no more, now or later; feedback stays here, for the goal may be further away than it can leap. */
-static void drop_policy(onboard* o, uint32_t why) {
+static void drop_policy(onboard *o, uint32_t why) {
   o->flags |= why;
   if (o->state != ONBOARD_ACTING) return;
   flappy_controller_stay(&o->controller);
   o->state = ONBOARD_RETURNED;
 }
 
-static void watch_sensors(onboard* o, uint32_t now_us) {
+static void watch_sensors(onboard *o, uint32_t now_us) {
   const uint32_t imu_age_us = now_us - o->imu_us, pose_age_us = now_us - o->pose_us;
   if (imu_age_us > ONBOARD_IMU_STALE_US) drop_policy(o, ONBOARD_IMU_STALE);
   if (pose_age_us > ONBOARD_POSE_STALE_US) drop_policy(o, ONBOARD_POSE_STALE);
@@ -68,16 +68,16 @@ static void watch_sensors(onboard* o, uint32_t now_us) {
 }
 
 /* A NaN would be clipped to full voltage, so it has to be seen before. */
-static void watch_numbers(onboard* o) {
-  const flappy_controller* c = &o->controller;
-  if (!flappy_all_finite((const float*)&c->estimate, (uint32_t)sizeof c->estimate) ||
-      !flappy_all_finite((const float*)&c->input, (uint32_t)sizeof c->input))
+static void watch_numbers(onboard *o) {
+  const flappy_controller *c = &o->controller;
+  if (!flappy_all_finite((const float *)&c->estimate, (uint32_t)sizeof c->estimate) ||
+      !flappy_all_finite((const float *)&c->input, (uint32_t)sizeof c->input))
     turn_off(o, ONBOARD_NOT_FINITE);
 }
 
 /* Flying. */
 
-static void take_off(onboard* o, uint32_t now_us) {
+static void take_off(onboard *o, uint32_t now_us) {
   const int fresh = o->has_imu && now_us - o->imu_us <= ONBOARD_IMU_STALE_US && o->has_pose &&
                     now_us - o->pose_us <= ONBOARD_POSE_STALE_US;
   if (!fresh) return;
@@ -87,7 +87,7 @@ static void take_off(onboard* o, uint32_t now_us) {
   o->state = ONBOARD_HOVERING;
 }
 
-static void begin_manoeuvre(onboard* o, uint32_t now_us) {
+static void begin_manoeuvre(onboard *o, uint32_t now_us) {
   const flappy_vector off = flappy_minus(o->controller.estimate.position_m, o->controller.hover_m);
   const int ready = o->state == ONBOARD_HOVERING && now_us - o->hover_us >= ONBOARD_HOVER_US &&
                     flappy_plausible(off, ONBOARD_PLACE_M) && (o->flags & ONBOARD_FAULTS) == 0;
@@ -100,7 +100,7 @@ static void begin_manoeuvre(onboard* o, uint32_t now_us) {
   o->state = ONBOARD_ACTING;
 }
 
-static void let_policy_act(onboard* o) {
+static void let_policy_act(onboard *o) {
   float obs[FLAPPY_POLICY_OBS], action[FLAPPY_POLICY_ACT];
   if (!flappy_controller_policy_due(&o->controller)) return;
   flappy_controller_observe(&o->controller, obs);
@@ -111,7 +111,7 @@ static void let_policy_act(onboard* o) {
   flappy_controller_act(&o->controller, action);
 }
 
-void onboard_tick(onboard* o, uint32_t now_us) {
+void onboard_tick(onboard *o, uint32_t now_us) {
   const uint32_t late_us = now_us - o->tick_us;
   const onboard_wish wish = o->wish;
   o->tick_us += (late_us / ONBOARD_CONTROL_US + 1U) * ONBOARD_CONTROL_US; /* what was missed stays missed */
@@ -138,13 +138,13 @@ void onboard_tick(onboard* o, uint32_t now_us) {
 
 /* Motors. */
 
-static float clamped(onboard* o, float volts) {
+static float clamped(onboard *o, float volts) {
   if (flappy_abs(volts) <= ONBOARD_LIMIT_V) return volts;
   o->flags |= ONBOARD_CLAMPED;
   return volts > 0.0F ? ONBOARD_LIMIT_V : volts < 0.0F ? -ONBOARD_LIMIT_V : 0.0F; /* NaN is neither */
 }
 
-void onboard_drive(onboard* o, uint32_t now_us, float* left_V, float* right_V) {
+void onboard_drive(onboard *o, uint32_t now_us, float *left_V, float *right_V) {
   const uint32_t missed = (now_us - o->drive_us) / FLAPPY_CONTROLLER_DRIVE_US;
   o->drive_us += (missed + 1U) * FLAPPY_CONTROLLER_DRIVE_US;
   *left_V = *right_V = 0.0F;

@@ -126,26 +126,26 @@ typedef struct {
 } onboard;
 
 /* Tests both headers; `now_us`: when the first tick is due. */
-void onboard_begin(onboard* o, uint32_t now_us);
+void onboard_begin(onboard *o, uint32_t now_us);
 
 /* Samples as they arrive, oldest first, before the tick. What is no sample (NaN, too old, from the future) is dropped. */
-void onboard_imu(onboard* o, uint32_t now_us, const onboard_imu_sample* sample);
-void onboard_pose(onboard* o, uint32_t now_us, const onboard_pose_sample* sample);
+void onboard_imu(onboard *o, uint32_t now_us, const onboard_imu_sample *sample);
+void onboard_pose(onboard *o, uint32_t now_us, const onboard_pose_sample *sample);
 
 /* Wishes of whoever flies, looked at in the next tick. A manoeuvre begins only from a hover of ONBOARD_HOVER_US, at its place
    and without a fault; otherwise nothing changes. */
-void onboard_hover(onboard* o);
-void onboard_manoeuvre(onboard* o);
-void onboard_stop(onboard* o);
+void onboard_hover(onboard *o);
+void onboard_manoeuvre(onboard *o);
+void onboard_stop(onboard *o);
 
 /* Every control period. */
-void onboard_tick(onboard* o, uint32_t now_us);
+void onboard_tick(onboard *o, uint32_t now_us);
 
 /* Every FLAPPY_CONTROLLER_DRIVE_US: what the motors get until the next one. */
-void onboard_drive(onboard* o, uint32_t now_us, float* left_V, float* right_V);
+void onboard_drive(onboard *o, uint32_t now_us, float *left_V, float *right_V);
 
 /* Whether the motors may turn. */
-int onboard_flies(const onboard* o);
+int onboard_flies(const onboard *o);
 
 /* `due_us` has come. */
 int onboard_due(uint32_t due_us, uint32_t now_us);
