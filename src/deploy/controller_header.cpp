@@ -1,5 +1,6 @@
 #include "deploy/controller_header.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <sstream>
@@ -118,6 +119,12 @@ void add_constants(const flight::FlyConfig& config, Constants& to) {
   for (int i = 0; i < flight::kActions; ++i)
     middle.push_back(static_cast<float>(0.5 * static_cast<double>(task.action_low[i] + task.action_high[i])));
   list.push_back({"start_added", middle});
+  const flight::StartRange& begin = config.fleet.task.start;
+  std::vector<float> place;
+  for (const flight::Spread& axis : begin.position_m) place.push_back(static_cast<float>(axis.centre));
+  place[0] = static_cast<float>(std::clamp(begin.position_m[0].centre, begin.x_low_m, begin.x_high_m));
+  list.push_back({"start_position_m", place});
+  one("start_heading_rad", begin.rotation_rad[2].centre);
   one("driver_amplitude_V", d.amplitude_limit_V);
   one("driver_difference_V", d.difference_limit_V);
   one("driver_bias_V", d.bias_limit_V);
@@ -197,7 +204,8 @@ std::string about(const flight::FlyConfig& config, const RunInfo& run, long driv
        << "  3. flappy_controller_imu() and flappy_controller_pose() with what has arrived, oldest first\n"
        << "  4. flappy_controller_tick() at its end\n"
        << "Times are microseconds of one clock that may wrap; no more than 2^31 of them may pass between two ticks.\n"
-       << "flappy_controller_start() comes first. What a sample holds is at the function that takes it.\n\n"
+       << "flappy_controller_start() comes first, then flappy_controller_hover() until the trim is learnt, then\n"
+       << "flappy_controller_begin(). What a sample holds is at the function that takes it.\n\n"
        << "The gains were chosen for an IMU of " << io::shortest_digits(s.imu.rate_hz) << " Hz, "
        << milliseconds(s.imu.latency_s) << " late, at (" << io::shortest_digits(at.x) << ", "
        << io::shortest_digits(at.y) << ", " << io::shortest_digits(at.z) << ") m in B,\n"

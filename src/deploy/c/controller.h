@@ -32,16 +32,42 @@ static inline int flappy_controller_timely(const flappy_controller *c, uint32_t 
   return flappy_after(taken_us, b) && !flappy_after(taken_us, c->now_us + 100000U);
 }
 
+/* The set point now. */
+static inline flappy_setpoint flappy_controller_reference(const flappy_controller *c, uint32_t *segment) {
+  flappy_setpoint s;
+  if (!c->hovering) return flappy_controller_setpoint(c->tick, segment);
+  s.position_m = c->hover_m;
+  s.velocity_m_s = s.acceleration_m_s2 = flappy_vector_of(0.0F, 0.0F, 0.0F);
+  s.heading = c->hover_heading;
+  s.heading_rate_rad_s = 0.0F;
+  return s;
+}
+
 /* A new task: its clock is at 0 and the policy acts; what estimator and controller have learnt stays. */
 static inline void flappy_controller_begin(flappy_controller *c) {
   uint32_t i;
   c->tick = c->segment = 0;
-  c->handed_back = 0;
+  c->handed_back = c->hovering = 0;
   for (i = 0; i < 4; ++i) c->added[i] = flappy_controller_k.start_added[i];
 }
 
-/* At rest at this pose of the torso, integrators at 0. A task that holds the trim adds no feedback until the hand-back: to
-   hover first, set handed_back, and call flappy_controller_begin() later. */
+/* Feedback alone, to where the task begins and to stay there until flappy_controller_begin(): so the trim is learnt, to
+   which a task that holds it adds no feedback until the hand-back. */
+static inline void flappy_controller_hover(flappy_controller *c) {
+  c->handed_back = c->hovering = 1;
+  c->hover_m = flappy_controller_k.start_position_m;
+  c->hover_heading = flappy_sin_cos_wide(flappy_controller_k.start_heading_rad);
+}
+
+/* Feedback alone, to stay at the present estimate. */
+static inline void flappy_controller_stay(flappy_controller *c) {
+  const flappy_matrix R = flappy_rotation_matrix(c->estimate.attitude);
+  c->handed_back = c->hovering = 1;
+  c->hover_m = c->estimate.position_m;
+  c->hover_heading = flappy_heading(&R);
+}
+
+/* At rest at this pose of the torso, integrators at 0; the task begins. */
 static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us, flappy_vector position_m,
                                            flappy_quaternion attitude) {
   const flappy_controller_constants *k = &flappy_controller_k;
@@ -126,7 +152,7 @@ static inline int flappy_controller_tick(flappy_controller *c, uint32_t now_us) 
   c->now_us = now_us;
   flappy_controller_estimate(c);
   ++c->tick;
-  ref = flappy_controller_setpoint(c->tick, &c->segment);
+  ref = flappy_controller_reference(c, &c->segment);
   if (flappy_controller_arrived(c, &ref, (float)c->tick * flappy_controller_k.period_s)) c->handed_back = 1;
   return c->handed_back;
 }
@@ -152,7 +178,7 @@ static inline void flappy_controller_observe(const flappy_controller *c, float o
   const flappy_matrix R = flappy_rotation_matrix(x->attitude);
   const flappy_wing_beat trim = flappy_pid_trim(&c->pid);
   uint32_t segment = c->segment;
-  const flappy_setpoint ref = flappy_controller_setpoint(c->tick, &segment);
+  const flappy_setpoint ref = flappy_controller_reference(c, &segment);
   const float cos = ref.heading.cos, sin = ref.heading.sin;
   float *row = obs;
   if (parts & 1U) row = flappy_put(flappy_put(flappy_put(row, R.x), R.y), R.z); /* rotation matrix */
@@ -195,7 +221,7 @@ static inline void flappy_controller_act(flappy_controller *c, const float added
 
 /* Start of a control period: sets the inputs of the wing beat. */
 static inline void flappy_controller_steer(flappy_controller *c) {
-  const flappy_setpoint ref = flappy_controller_setpoint(c->tick, &c->segment);
+  const flappy_setpoint ref = flappy_controller_reference(c, &c->segment);
   const flappy_pid before = c->pid;
   flappy_wing_beat u = flappy_pid_control(&c->pid, &c->estimate, &ref);
   if (FLAPPY_CONTROLLER_HOLDS_TRIM && !c->handed_back) {

@@ -1,10 +1,6 @@
 /* Mathematics: the error of each function is a few units in the last place. */
 
 typedef struct {
-  float sin, cos;
-} flappy_sin_cos;
-
-typedef struct {
   flappy_vector x, y, z; /* rows */
 } flappy_matrix;
 

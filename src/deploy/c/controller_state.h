@@ -37,6 +37,10 @@ typedef struct {
   float amplitude_V, difference_V, bias_V, split_cycle;
 } flappy_wing_beat;
 
+typedef struct {
+  float sin, cos;
+} flappy_sin_cos;
+
 /* What the IMU gathered in one control period. Times are those of what was measured: the samples', less their lag. */
 typedef struct {
   flappy_increment gained;
@@ -59,7 +63,9 @@ typedef struct {
   uint32_t phase;         /* of the wing beat, 2^32 each */
   uint32_t tick, segment; /* control periods since the start; of the path */
   uint32_t now_us;        /* the last tick */
-  int handed_back;
+  int handed_back, hovering;
+  flappy_vector hover_m; /* where, and facing whereto */
+  flappy_sin_cos hover_heading;
   uint32_t horizon_us, present_us; /* of estimator.horizon and estimator.now */
   uint32_t last_imu_us, pushed_us; /* the last sample; the last one that is in the ring */
   flappy_increment newest;         /* in the ring, or already behind the horizon */

@@ -33,6 +33,8 @@ typedef struct {
   float hand_back_x_m, hand_back_distance_m, hand_back_speed_x_m_s, hand_back_speed_m_s, hand_back_heading_cos;
   float hand_back_tilt_cos, hand_back_body_rate_rad_s, hand_back_at_s;
   float start_added[4]; /* V, V, V, split cycle: the middle of what a policy may add */
+  flappy_vector start_position_m; /* where the task begins, in W, and with what heading */
+  float start_heading_rad;
   /* driver */
   float driver_amplitude_V, driver_difference_V, driver_bias_V, driver_split_cycle, left_limit_V, right_limit_V;
 } flappy_controller_constants;
