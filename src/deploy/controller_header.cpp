@@ -1,7 +1,6 @@
 #include "deploy/controller_header.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <sstream>
 #include <utility>
@@ -29,7 +28,7 @@ class Constants {
     text_ << c_array<float>("static const float flappy_controller_" + name + "[" + count + "]", numbers);
   }
   void add(const std::string& name, const std::string& count, const std::vector<std::int32_t>& words) {
-    for (const std::int32_t word : words) crc_ = crc32(crc_, std::vector{std::bit_cast<float>(word)});
+    crc_ = crc32(crc_, words);
     text_ << c_array<std::int32_t>("static const int32_t flappy_controller_" + name + "[" + count + "]", words);
   }
   /// A flat list of numbers as a struct: `widths` of its members, in braces where there are several.

@@ -94,10 +94,11 @@ void write_all(const fs::path& folder, const std::map<std::string, std::string>&
 
 void run(const Request& request, const io::Program& program) {
   const learn::FinishedRun run = learn::read_finished_run(request.run);
-  make_folder(request.out);
   const deploy::PolicyNetwork network = deploy::network_of(run.fly);
   const auto signals = run.fly.fleet.task.observation();
   Export e;
+  e.files["flappy_controller.h"] = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
+  make_folder(request.out);
   e.flown = deploy::roll_out(run.fly, 0, kProofFlights);
   PolicyVectors tests = some_of(e.flown, kTestVectors);
   append(tests, deploy::corners(network, signals));
@@ -112,8 +113,6 @@ void run(const Request& request, const io::Program& program) {
     print("8 bits differ by at most", error, run.fly.fleet.task.action());
     json["int8_error"] = json_of(error);
   }
-  e.files["flappy_controller.h"] = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
-
   const deploy::TemporaryFolder work;
   if (deploy::reads_torch_script()) {
     e.files["policy.pt"] = deploy::torch_script(network, deploy::contract_text(run.fly, run.info));

@@ -99,6 +99,7 @@ static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us
   c->horizon_us = c->present_us = now_us - FLAPPY_CONTROLLER_IMU_LAG_US;
   c->newest.turn_rad = c->newest.velocity_m_s = none;
   c->newest_us = c->oldest = c->in_ring = c->in_frames = 0;
+  flappy_controller_hover(c);
   flappy_controller_begin(c);
 }
 
