@@ -315,7 +315,7 @@ auto Track::filter(const std::vector<Pose>& poses, const Noise& noise) -> std::v
     nodes_[i].state = x;
     list.push_back(p);
   }
-  for (double& s : surprise_) s /= std::max(corrections, 1.0);
+  for (int k = 0; k < 2; ++k) surprise_[k] /= std::max(corrections, 1.0);
   return list;
 }
 
@@ -336,6 +336,9 @@ void Track::smooth(std::vector<Covariance> p, const Noise& noise) {
     displace(x, gain * off);
     p[i] += gain * (p[i + 1] - ahead) * gain.transpose();
   }
+  const State& first = nodes_.front().state;
+  surprise_[2] = std::max((first.gyro_bias.array().square() / noise.gyro_bias_rad2_s2.array()).mean(),
+                          first.accel_bias.squaredNorm() / (3 * kAccelBiasSd_m_s2 * kAccelBiasSd_m_s2));
   for (const std::size_t node : pose_node_) covariance_.push_back(p[node]);
 }
 
@@ -344,6 +347,11 @@ std::size_t Track::node_before(double t_s) const {
     throw std::out_of_range("no motion at " + std::to_string(t_s) + " s");
   const auto after = std::ranges::upper_bound(nodes_, t_s, {}, &Node::t_s);
   return after == nodes_.begin() ? 0 : static_cast<std::size_t>(after - nodes_.begin()) - 1;
+}
+
+double Track::imu_bound_s(double t_s) const {
+  const std::size_t k = index_before(bounds_s_, t_s);
+  return k + 1 < bounds_s_.size() && bounds_s_[k + 1] - t_s < t_s - bounds_s_[k] ? bounds_s_[k + 1] : bounds_s_[k];
 }
 
 TorsoMotion Track::at(double t_s) const {

@@ -58,6 +58,10 @@ class Track {
   /// Instants at which motion capture saw the torso; a pose that repeats the one before is a lost one.
   const std::vector<double>& pose_s() const { return pose_s_; }
 
+  /// Where an interval of the IMU ends, nearest to a time: what is known best, for the mean of an interval says nothing of
+  /// the motion within it.
+  double imu_bound_s(double t_s) const;
+
   /// At any time from begin_s() to end_s(); std::out_of_range elsewhere.
   TorsoMotion at(double t_s) const;
   Eigen::Vector3d gyro_bias_rad_s(double t_s) const { return nodes_[node_before(t_s)].state.gyro_bias; }
@@ -71,6 +75,8 @@ class Track {
   /// where the declaration is right, large where the two streams do not describe one motion.
   double angle_surprise() const { return surprise_[0]; }
   double position_surprise() const { return surprise_[1]; }
+  /// The same of the biases found, gyro or accelerometer, whichever is larger.
+  double bias_surprise() const { return surprise_[2]; }
 
  private:
   struct State {
@@ -110,7 +116,7 @@ class Track {
   std::vector<double> pose_s_;
   std::vector<std::size_t> pose_node_;
   std::vector<Covariance> covariance_;  // at poses
-  double surprise_[2] = {0, 0};
+  double surprise_[3] = {0, 0, 0};
 };
 
 /// What drove the motors: the commands, scaled by the battery's voltage where power.csv has it (between its samples on

@@ -12,8 +12,6 @@ namespace flappy::identify {
 namespace {
 
 constexpr double kStep_s = 1e-4;
-/// Torso back onto its record every so often while the wings come into phase.
-constexpr int kCarrySteps = 10;
 /// Beats until wings at rest have come into phase.
 constexpr double kSpinUpBeats = 3;
 constexpr double kLeastChords = 5;
@@ -47,6 +45,15 @@ StateVector difference(const StateVector& a, const StateVector& b) {
     if (k >= 3 && k < 6) d[k] = std::remainder(d[k], 2 * std::numbers::pi);
   }
   return d;
+}
+
+/// A state whose body rate is the mean since another.
+sim::FlapperState with_mean_rate(const sim::FlapperState& before, sim::FlapperState x, double interval_s) {
+  const auto of = [](const double* q) { return Eigen::Quaterniond(q[0], q[1], q[2], q[3]); };
+  const Eigen::Quaterniond turn = of(before.attitude).conjugate() * of(x.attitude);
+  // of a turn of 0.1 rad, exact to 4e-4
+  for (int k = 0; k < 3; ++k) x.body_rate_rad_s[k] = std::copysign(2 / interval_s, turn.w()) * turn.vec()[k];
+  return x;
 }
 
 double quantile_of(std::vector<double> values, double share) {
@@ -108,7 +115,7 @@ struct Transitions::Flight {
   model::Vehicle vehicle;
   sim::World world;
   StateVector noise;
-  double beat_s;
+  double beat_s, imu_interval_s;
   sim::VoltageScript voltages;
   flight::Track track;
   std::unique_ptr<Truth> truth;
@@ -120,23 +127,21 @@ struct Transitions::Flight {
         world(world_of(log.header)),
         noise(noise_of(log.header)),
         beat_s(1 / log.header.flapping_Hz),
+        imu_interval_s(1 / log.header.imu.rate_hz),
         voltages(flight::motor_voltages(log)),
         track(log, folder),
         truth(source == Source::truth ? std::make_unique<Truth>(folder) : nullptr) {
     vehicle.air_density_kg_m3 = log.header.ambient.air_density_kg_m3;
   }
 
-  int spin_up_steps() const { return truth ? 0 : static_cast<int>(std::lround(kSpinUpBeats * beat_s / kStep_s)); }
-
-  /// Steps to the ends of one and two beats, where states are known.
-  std::vector<int> checkpoints() const {
-    double grid_s = kStep_s;
-    if (truth) grid_s = truth->t_s()[1] - truth->t_s()[0];
-    const auto steps = [&](double time_s) {
-      return static_cast<int>(std::lround(std::round(time_s / grid_s) * grid_s / kStep_s));
-    };
-    return {steps(beat_s), steps(2 * beat_s)};
+  /// Where states are known best: the ends of the IMU's intervals, or the rows of truth.csv.
+  double grid_s() const { return truth ? truth->t_s()[1] - truth->t_s()[0] : imu_interval_s; }
+  int grid_steps() const { return std::max(1, static_cast<int>(std::lround(grid_s() / kStep_s))); }
+  /// Steps of so many beats, on the grid.
+  int beat_steps(double beats) const {
+    return std::max(1, static_cast<int>(std::lround(beats * beat_s / grid_s()))) * grid_steps();
   }
+  int spin_up_steps() const { return truth ? 0 : beat_steps(kSpinUpBeats); }
 
   sim::FlapperState at(double t_s) const {
     if (truth) return truth->state(truth->row_near(t_s));
@@ -165,13 +170,13 @@ struct Transitions::Flight {
         if (t[i] - t[i - 1] > longest_s) return false;
       return true;
     };
-    const double before_s = kSpinUpBeats * beat_s + kStep_s, after_s = 2 * beat_s + 2 * kStep_s;
+    const double before_s = kSpinUpBeats * beat_s + grid_s(), after_s = 2 * beat_s + grid_s();
     const double least_z_m =
         world.ground_z_m +
         kLeastChords * (vehicle.left.planform.mean_chord_m + vehicle.right.planform.mean_chord_m) / 2;
     for (const double pose_s : track.pose_s()) {
       ++recorded;
-      const double t_s = truth ? truth->t_s()[truth->row_near(pose_s)] : pose_s;
+      const double t_s = truth ? truth->t_s()[truth->row_near(pose_s)] : track.imu_bound_s(pose_s);
       if (!track.covers(t_s - before_s, t_s + after_s) || !commanded(t_s - before_s, t_s + after_s)) ++not_covered;
       else if (track.at(t_s).position_m.z() <= least_z_m) ++low;
       else starts_s.push_back(t_s);
@@ -202,9 +207,10 @@ void Transitions::add(const std::filesystem::path& folder, const flight::FlightL
                       const model::Vehicle& vehicle) {
   const auto refuse = [&](const std::string& what) { throw io::InputError(folder.string() + ": " + what); };
   auto flight = std::make_unique<Flight>(folder, log, vehicle, options_.source);
-  const double surprise = std::sqrt(std::max(flight->track.angle_surprise(), flight->track.position_surprise()));
+  const flight::Track& t = flight->track;
+  const double surprise = std::sqrt(std::max({t.angle_surprise(), t.position_surprise(), t.bias_surprise()}));
   if (!(surprise <= kLargestSurprise))
-    refuse("motion capture and IMU disagree by " + io::shortest_digits(std::round(10 * surprise) / 10) +
+    refuse("motion capture and IMU disagree, or are biased, by " + io::shortest_digits(std::round(10 * surprise) / 10) +
            " times their declared noise; accepted: at most " + io::shortest_digits(kLargestSurprise) +
            "; flappy-gap check says more");
   flight->choose_starts();
@@ -238,13 +244,15 @@ TransitionReport Transitions::run() const {
       windows.push_back({f->starts_s[index - before], &f->vehicle, &f->voltages});
     }
     before += f->starts_s.size();
-    const std::vector<int> checkpoints = f->checkpoints();
+    // the body rate is compared as a gyro sees it: its mean over one interval
+    const int ends[2] = {f->beat_steps(1), f->beat_steps(2)}, interval = f->grid_steps();
+    const std::vector<int> checkpoints = {ends[0] - interval, ends[0], ends[1] - interval, ends[1]};
     sim::ReplayOptions o;
     o.step_s = kStep_s;
     o.threads = options_.threads;
     o.world = f->world;
     o.spin_up_steps = f->spin_up_steps();
-    o.carry_steps = kCarrySteps;
+    o.carry_steps = interval;
     const auto results = sim::replay(
         windows, checkpoints, [&](std::size_t, double t_s) { return f->at(t_s); }, o);
     for (std::size_t i = 0; i < windows.size(); ++i) {
@@ -254,9 +262,11 @@ TransitionReport Transitions::run() const {
         continue;
       }
       for (std::size_t b = 0; b < 2; ++b) {
-        report.beats_s[b] = checkpoints[b] * kStep_s;
-        StateVector error =
-            difference(state_vector(results[i].states[b]), state_vector(f->at(windows[i].start_s + report.beats_s[b])));
+        report.beats_s[b] = ends[b] * kStep_s;
+        const double end_s = windows[i].start_s + report.beats_s[b], interval_s = interval * kStep_s;
+        const auto simulated = with_mean_rate(results[i].states[2 * b], results[i].states[2 * b + 1], interval_s);
+        const auto recorded = with_mean_rate(f->at(end_s - interval_s), f->at(end_s), interval_s);
+        StateVector error = difference(state_vector(simulated), state_vector(recorded));
         for (double& e : error) e = std::abs(e);
         report.errors[b].push_back(error);
       }

@@ -14,7 +14,8 @@
 
 namespace flappy::identify {
 
-/// Torso origin in W, roll, pitch and yaw of R = Rz Ry Rx, velocity in W, body rate in B.
+/// Torso origin in W, roll, pitch and yaw of R = Rz Ry Rx, velocity in W, body rate in B as a gyro sees it: the mean over
+/// the last interval of the IMU.
 inline constexpr std::array<const char*, 12> kStateNames = {"x_m",       "y_m",      "z_m",      "roll_rad",
                                                             "pitch_rad", "yaw_rad",  "vx_m_s",   "vy_m_s",
                                                             "vz_m_s",    "wx_rad_s", "wy_rad_s", "wz_rad_s"};
@@ -35,7 +36,7 @@ struct TransitionOptions {
 
 struct TransitionReport {
   std::size_t samples = 0, recorded = 0, low = 0, not_covered = 0, diverged = 0;
-  double beats_s[2] = {0, 0};  ///< length of the replays
+  double beats_s[2] = {0, 0};  ///< length of the replays: one and two beats in whole intervals of the IMU
   StateVector range{};         ///< within a beat, median over samples, never below the sensors' noise
   /// |simulated - recorded| of each sample that did not diverge, after one and two beats.
   std::array<std::vector<StateVector>, 2> errors;

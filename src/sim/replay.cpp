@@ -50,6 +50,16 @@ class StepVoltages {
   std::size_t next_;
 };
 
+/// Takes back what a body turned too much or too little within `carried_s`, as a rate in B; small angles.
+void correct_rate(const FlapperState& flown, double carried_s, FlapperState& x) {
+  const double *a = flown.attitude, *b = x.attitude;
+  const double turn[4] = {
+      a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3], a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2],
+      a[0] * b[2] - a[2] * b[0] - a[3] * b[1] + a[1] * b[3], a[0] * b[3] - a[3] * b[0] - a[1] * b[2] + a[2] * b[1]};
+  const double scale = std::copysign(2 / carried_s, turn[0]);
+  for (int k = 0; k < 3; ++k) x.body_rate_rad_s[k] = flown.body_rate_rad_s[k] + scale * turn[k + 1];
+}
+
 /// One block of lanes, used again and again.
 class ReplayBlock {
  public:
@@ -101,27 +111,31 @@ class ReplayBlock {
       put_back(recorded, 0, Wings::at_rest, Start::welded);
       step(before);
     }
-    for (int k = carry == 0 ? 0 : -before; k < 0; k += carry) {
-      put_back(recorded, k, k == -before ? Wings::at_rest : Wings::kept, Start::flying);
-      step(std::min(carry, -k));
+    int carried = 0;
+    for (int k = carry == 0 ? 0 : -before; k < 0; k += carried) {
+      put_back(recorded, k, k == -before ? Wings::at_rest : Wings::kept, Start::flying, carried);
+      carried = std::min(carry, -k);
+      step(carried);
     }
-    put_back(recorded, 0, Wings::kept, Start::flying);
+    put_back(recorded, 0, Wings::kept, Start::flying, carried);
   }
 
   enum class Wings { recorded, at_rest, kept };
 
-  /// Puts every torso where it was `step` steps after its window's start.
-  void put_back(const RecordedState& recorded, int step, Wings kind, Start start) {
+  /// Puts every torso where it was `step` steps after its window's start, having carried it for some steps.
+  void put_back(const RecordedState& recorded, int step, Wings kind, Start start, int carried = 0) {
     for (std::size_t i = 0; i < kWindows; ++i) {
       FlapperState x = recorded(index_[i], start_s_[i] + step * options_.step_s);
       if (kind != Wings::recorded) {
-        const FlapperState wings = kind == Wings::kept ? batch_.state(i) : FlapperState{};
+        const FlapperState flown = batch_.state(i), rest;
+        const FlapperState& wings = kind == Wings::kept ? flown : rest;
         for (int side = 0; side < 2; ++side) {
           x.stroke_rad[side] = wings.stroke_rad[side];
           x.rotation_rad[side] = wings.rotation_rad[side];
           x.stroke_rate_rad_s[side] = wings.stroke_rate_rad_s[side];
           x.rotation_rate_rad_s[side] = wings.rotation_rate_rad_s[side];
         }
+        if (carried > 0) correct_rate(flown, carried * options_.step_s, x);
       }
       batch_.reset(i, x, start);
     }

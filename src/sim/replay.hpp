@@ -30,7 +30,9 @@ struct ReplayOptions {
   World world;
   std::string instruction_set;  ///< as in BatchOptions
   /// How the wings come into phase: they start at rest this many steps before a window does, and fly the voltages of
-  /// that time while the torso is put back onto its recorded motion every `carry_steps`. 0: the recorded wings.
+  /// that time while the torso is carried along its recorded motion: every `carry_steps` it is put back onto it, but for
+  /// its body rate, from which only the turn that it made too much is taken back: no gyro resolves how the rate jumps
+  /// where wings meet their stops, so within that time the flapper's own motion stays. 0: the recorded wings.
   int spin_up_steps = 0;
   int carry_steps = 10;  ///< 0: the torso stays welded as it is when the window starts, which leaves the wings wrong
 };
