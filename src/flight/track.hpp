@@ -14,6 +14,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <filesystem>
 #include <vector>
 
@@ -122,5 +123,8 @@ class Track {
 /// What drove the motors: the commands, scaled by the battery's voltage where power.csv has it (between its samples on
 /// a line, as it was when each command was applied).
 sim::VoltageScript motor_voltages(const FlightLog& log);
+
+/// Strokes, left and right, by a cubic through the four samples around a time; not a number where these have a gap.
+std::array<double, 2> strokes_at(const WingsStream& wings, double rate_hz, double t_s);
 
 }  // namespace flappy::flight

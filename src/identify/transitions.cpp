@@ -14,6 +14,8 @@ namespace {
 constexpr double kStep_s = 1e-4;
 /// Beats until wings at rest have come into phase.
 constexpr double kSpinUpBeats = 3;
+/// Of what a logged stroke is off, taken back once in each interval of the IMU: a quarter of its noise remains.
+constexpr double kStrokeShare = 0.1;
 constexpr double kLeastChords = 5;
 /// Innovations of the smoother, over what the declared noise predicts, in standard deviations.
 constexpr double kLargestSurprise = 5;
@@ -117,6 +119,8 @@ struct Transitions::Flight {
   StateVector noise;
   double beat_s, imu_interval_s;
   sim::VoltageScript voltages;
+  std::optional<flight::WingsStream> wings;
+  double wings_hz;
   flight::Track track;
   std::unique_ptr<Truth> truth;
   std::vector<double> starts_s;
@@ -129,6 +133,8 @@ struct Transitions::Flight {
         beat_s(1 / log.header.flapping_Hz),
         imu_interval_s(1 / log.header.imu.rate_hz),
         voltages(flight::motor_voltages(log)),
+        wings(log.wings),
+        wings_hz(log.header.wings ? log.header.wings->rate_hz : 0),
         track(log, folder),
         truth(source == Source::truth ? std::make_unique<Truth>(folder) : nullptr) {
     vehicle.air_density_kg_m3 = log.header.ambient.air_density_kg_m3;
@@ -152,6 +158,7 @@ struct Transitions::Flight {
       x.velocity_m_s[i] = m.velocity_m_s[i];
       x.body_rate_rad_s[i] = m.body_rate_rad_s[i];
     }
+    if (wings) std::ranges::copy(flight::strokes_at(*wings, wings_hz, t_s), x.stroke_rad);
     const Eigen::Quaterniond& q = m.attitude;
     x.attitude[0] = q.w(), x.attitude[1] = q.x(), x.attitude[2] = q.y(), x.attitude[3] = q.z();
     return x;
@@ -253,6 +260,7 @@ TransitionReport Transitions::run() const {
     o.world = f->world;
     o.spin_up_steps = f->spin_up_steps();
     o.carry_steps = interval;
+    if (f->wings) o.stroke_share = kStrokeShare;
     const auto results = sim::replay(
         windows, checkpoints, [&](std::size_t, double t_s) { return f->at(t_s); }, o);
     for (std::size_t i = 0; i < windows.size(); ++i) {

@@ -60,6 +60,25 @@ void correct_rate(const FlapperState& flown, double carried_s, FlapperState& x) 
   for (int k = 0; k < 3; ++k) x.body_rate_rad_s[k] = flown.body_rate_rad_s[k] + scale * turn[k + 1];
 }
 
+void keep_wings(const FlapperState& from, FlapperState& x) {
+  for (int side = 0; side < 2; ++side) {
+    x.stroke_rad[side] = from.stroke_rad[side];
+    x.rotation_rad[side] = from.rotation_rad[side];
+    x.stroke_rate_rad_s[side] = from.stroke_rate_rad_s[side];
+    x.rotation_rate_rad_s[side] = from.rotation_rate_rad_s[side];
+  }
+}
+
+/// Brings strokes nearer to where they were seen.
+void correct_strokes(const FlapperState& seen, double carried_s, double share, FlapperState& x) {
+  for (int side = 0; side < 2; ++side) {
+    const double off = seen.stroke_rad[side] - x.stroke_rad[side];
+    if (!(std::abs(off) > 0)) continue;  // also where it was not seen
+    x.stroke_rad[side] += share * off;
+    x.stroke_rate_rad_s[side] += share * share / (2 - share) / carried_s * off;
+  }
+}
+
 /// One block of lanes, used again and again.
 class ReplayBlock {
  public:
@@ -127,15 +146,12 @@ class ReplayBlock {
     for (std::size_t i = 0; i < kWindows; ++i) {
       FlapperState x = recorded(index_[i], start_s_[i] + step * options_.step_s);
       if (kind != Wings::recorded) {
-        const FlapperState flown = batch_.state(i), rest;
-        const FlapperState& wings = kind == Wings::kept ? flown : rest;
-        for (int side = 0; side < 2; ++side) {
-          x.stroke_rad[side] = wings.stroke_rad[side];
-          x.rotation_rad[side] = wings.rotation_rad[side];
-          x.stroke_rate_rad_s[side] = wings.stroke_rate_rad_s[side];
-          x.rotation_rate_rad_s[side] = wings.rotation_rate_rad_s[side];
+        const FlapperState flown = batch_.state(i), seen = x;
+        keep_wings(kind == Wings::kept ? flown : FlapperState{}, x);
+        if (carried > 0) {
+          correct_rate(flown, carried * options_.step_s, x);
+          correct_strokes(seen, carried * options_.step_s, options_.stroke_share, x);
         }
-        if (carried > 0) correct_rate(flown, carried * options_.step_s, x);
       }
       batch_.reset(i, x, start);
     }

@@ -35,6 +35,9 @@ struct ReplayOptions {
   /// where wings meet their stops, so within that time the flapper's own motion stays. 0: the recorded wings.
   int spin_up_steps = 0;
   int carry_steps = 10;  ///< 0: the torso stays welded as it is when the window starts, which leaves the wings wrong
+  /// Of what a stroke is off its record where the record has one (not a number elsewhere), the share that is taken back
+  /// whenever the torso is; its rate is corrected as in an alpha-beta filter (Kalata 1984). Rotations follow by themselves.
+  double stroke_share = 0;
 };
 
 /// What became of a window.

@@ -346,6 +346,23 @@ TEST(Track, OfSimulatedFlightsHasHonestCovariances) {
   EXPECT_LT(part(0.9), 0.4);
 }
 
+TEST(Strokes, AreCubicBetweenSamples) {
+  WingsStream w;
+  const auto cubic = [](double t) { return 1 + t * (2 + t * (-30 + 400 * t)); };
+  for (int i = 0; i < 50; ++i) {
+    if (i == 20) continue;
+    const double t = 0.002 * i + 1e-4 * (i % 3);
+    w.t_s.push_back(t);
+    w.left_stroke_rad.push_back(cubic(t));
+    w.right_stroke_rad.push_back(-cubic(t));
+  }
+  for (const double t : {0.0031, 0.01, 0.0333, 0.0499, 0.093}) {
+    EXPECT_NEAR(strokes_at(w, 500, t)[0], cubic(t), 1e-12) << t;
+    EXPECT_NEAR(strokes_at(w, 500, t)[1], -cubic(t), 1e-12) << t;
+  }
+  for (const double t : {-1.0, 0.001, 0.041, 0.097, 1.0}) EXPECT_TRUE(std::isnan(strokes_at(w, 500, t)[0])) << t;
+}
+
 TEST(MotorVoltages, FollowTheBattery) {
   FlightLog log;
   log.command = {{0, 0.1, 0.2}, {1, 2, -3}, {4, 5, 6}, {}, {}};

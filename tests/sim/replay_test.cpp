@@ -171,6 +171,35 @@ TEST(Replay, CarriedWingsComeIntoPhaseWeldedOnesDoNot) {
   EXPECT_GT(wings_off(3, 0), 5 * wings_off(3, 10));
 }
 
+TEST(Replay, StrokesFollowTheirRecord) {
+  // flown by motors that pull less, but recorded from those that pull more: a tenth of the difference at every millisecond
+  model::Vehicle weak = test::identified();
+  weak.left.motor.resistance_ohm *= 1.1;
+  const Recorded r = fly(test::identified(), 250);
+  std::vector<ReplayWindow> windows;
+  for (int ms = 100; ms < 160; ++ms) windows.push_back({ms * 1e-3, &weak, &r.voltages});
+  const auto stroke_off = [&](double share, bool seen, int side) {
+    ReplayOptions o = options();
+    o.spin_up_steps = 870;
+    o.stroke_share = share;
+    const auto results = replay(
+        windows, {0},
+        [&](std::size_t, double t_s) {
+          FlapperState x = r.at(t_s);
+          if (!seen) x.stroke_rad[0] = x.stroke_rad[1] = std::numeric_limits<double>::quiet_NaN();
+          return x;
+        },
+        o);
+    double sum = 0;
+    for (std::size_t i = 0; i < windows.size(); ++i)
+      sum += std::abs(results[i].states[0].stroke_rad[side] - r.at(windows[i].start_s).stroke_rad[side]);
+    return sum / static_cast<double>(windows.size());
+  };
+  EXPECT_LT(stroke_off(0.4, true, 0), 0.5 * stroke_off(0, true, 0));
+  EXPECT_LT(stroke_off(0.4, true, 1), 2e-3);
+  EXPECT_EQ(stroke_off(0.4, false, 0), stroke_off(0, true, 0));
+}
+
 TEST(Replay, RefusesWhatMakesNoSense) {
   const model::Vehicle vehicle = test::nominal();
   const VoltageScript script{{0}, {1}, {1}}, none;

@@ -1,11 +1,14 @@
-// flappy-identify: fits a vehicle to measurements, and validates it.
+// flappy-identify: fits a vehicle to what was measured of it, and says how far measurement and model agree.
+#include "command.hpp"
 #include "io/program.hpp"
-#include "transitions.hpp"
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  io::Program program("flappy-identify", "Fits a vehicle to measurements, and validates it.", {});
-  const auto transitions = identify::add_transitions(program.app());
+  io::Program program("flappy-identify", "Fits a vehicle to measurements, and compares it with them.", {});
+  const std::vector<identify::Command> commands = {identify::add_transitions(program.app())};
   program.app().require_subcommand(1);
-  return program.run(argc, argv, [&] { program.write_json(transitions()); });
+  return program.run(argc, argv, [&] {
+    for (const identify::Command& command : commands)
+      if (command.app->parsed()) program.write_json(command.run());
+  });
 }

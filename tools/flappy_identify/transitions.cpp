@@ -1,19 +1,19 @@
-#include "transitions.hpp"
+// flappy-identify transitions: the open-loop test of recorded flights.
+#include "identify/transitions.hpp"
 
 #include <chrono>
 #include <cstdio>
 #include <memory>
 #include <numbers>
 
+#include "command.hpp"
 #include "flappy/vehicle_file.hpp"
-#include "identify/transitions.hpp"
-#include "io/csv.hpp"
+#include "io/sha256.hpp"
 
 namespace flappy::identify {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 struct Request {
   std::vector<std::string> flights;
@@ -23,12 +23,17 @@ struct Request {
 };
 
 /// Given, or of the name that the log has, in the log's folder or beside it.
-fs::path vehicle_path(const Request& request, const fs::path& folder, const std::string& declared) {
+fs::path vehicle_path(const Request& request, const fs::path& folder, const flight::FlightHeader& header) {
   if (!request.vehicle.empty()) return request.vehicle;
-  for (const fs::path& place : {folder / declared, folder / ".." / declared})
-    if (fs::exists(place)) return place;
-  throw io::InputError(folder.string() + ": its vehicle " + declared +
-                       " is neither in it nor beside it; give --vehicle");
+  for (const fs::path& place : {folder / header.vehicle, folder / ".." / header.vehicle}) {
+    if (!fs::exists(place)) continue;
+    if (!header.vehicle_sha256.empty() && io::sha256(io::read_text(place)) != header.vehicle_sha256)
+      throw io::InputError(place.string() + ": is not the file that " + folder.string() +
+                           " was flown with (SHA-256); accepted: that file, or any by --vehicle");
+    return place;
+  }
+  throw io::InputError(folder.string() + ": its vehicle " + header.vehicle +
+                       " is neither in it nor beside it; accepted: one of these, or --vehicle");
 }
 
 /// As people read it: millimetres, degrees.
@@ -77,7 +82,7 @@ Json run(const Request& request) {
   Transitions transitions(request.options);
   for (const fs::path folder : request.flights) {
     const flight::FlightLog log = flight::read_flight_log(folder);
-    transitions.add(folder, log, model::read_vehicle(vehicle_path(request, folder, log.header.vehicle)));
+    transitions.add(folder, log, model::read_vehicle(vehicle_path(request, folder, log.header)));
   }
   const TransitionReport r = transitions.run();
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -104,9 +109,9 @@ Json run(const Request& request) {
 
 }  // namespace
 
-std::function<Json()> add_transitions(CLI::App& app) {
+Command add_transitions(CLI::App& program) {
   CLI::App* sub =
-      app.add_subcommand("transitions", "replays recorded voltages from recorded states, one and two beats");
+      program.add_subcommand("transitions", "replays recorded voltages from recorded states, one and two beats");
   const auto request = std::make_shared<Request>();
   sub->add_option("flight", request->flights, "folders of flight logs")->required();
   sub->add_option("--vehicle", request->vehicle, "vehicle file; otherwise that of the log, in its folder or beside it");
@@ -119,10 +124,10 @@ std::function<Json()> add_transitions(CLI::App& app) {
   sub->add_option("--csv", request->csv, "write the distributions of all errors to this file");
   sub->add_flag("--truth", request->truth,
                 "states and wings from truth.csv of simulated flights: the floor without sensors");
-  return [request] {
-    request->options.source = request->truth ? Source::truth : Source::sensors;
-    return run(*request);
-  };
+  return {sub, [request] {
+            request->options.source = request->truth ? Source::truth : Source::sensors;
+            return run(*request);
+          }};
 }
 
 }  // namespace flappy::identify
