@@ -162,7 +162,7 @@ void Track::read_imu(const FlightLog& log) {
     bounds_s_.push_back(from_s);
     gyro.push_back(rate);
     accel.push_back(force);
-    gap_.push_back(gap);
+    gap_.push_back(gap ? 1 : 0);
   };
   Vector3d rate_before, force_before;
   for (std::size_t i = 0; i < n; ++i) {
@@ -319,7 +319,8 @@ auto Track::filter(const std::vector<Pose>& poses, const Noise& noise) -> std::v
   return list;
 }
 
-void Track::smooth(std::vector<Covariance> p, const Noise& noise) {
+void Track::smooth(std::vector<Covariance> covariance, const Noise& noise) {
+  std::vector<Covariance>& p = covariance;
   for (std::size_t i = nodes_.size() - 1; i-- > 0;) {
     const Reading r = reading(nodes_[i].interval, nodes_[i].t_s, nodes_[i + 1].t_s);
     State& x = nodes_[i].state;
