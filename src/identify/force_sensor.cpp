@@ -8,7 +8,7 @@ namespace flappy::identify {
 
 std::vector<sim::Input> default_inputs() {
   std::vector<sim::Input> inputs;
-  for (int volt = 4; volt <= 16; ++volt) inputs.push_back({static_cast<double>(volt), 0, 0, 0});
+  for (int k = 0; k <= 12; ++k) inputs.push_back({5 + 0.75 * k, 0, 0, 0});
   for (const double side : {-1.0, 1.0})
     for (int k = 1; k <= 4; ++k) {
       inputs.push_back({10, side * 0.5 * k, 0, 0});

@@ -12,9 +12,10 @@ struct ForceSensor {
   double noise_steps = 1;  ///< standard deviation of a sample's noise, in steps; 0: neither noise nor quantisation
 };
 
-/// The paper says 37 inputs and gives no list. This one: amplitude alone from 4 to 16 V (above, the stroke meets its
-/// stops), and about 10 V, which hovers the nominal vehicle, difference, bias and split cycle in eight steps each, to two
-/// thirds or more of the driver's limits.
+/// The paper says 37 inputs and gives no list. This one: amplitude alone from 5 to 14 V in thirteen steps; and about 10 V,
+/// which hovers the nominal vehicle, difference, bias and split cycle in eight steps each, to two thirds or more of the
+/// driver's limits. The map jumps below about 3 V, where wings hardly flip, and from about 16 V on, where the stroke meets
+/// its stops: by up to 150 standard deviations of this sensor, which no slope can follow.
 std::vector<sim::Input> default_inputs();
 
 /// The map of `vehicle` as `sensor` sees it, with the standard deviation of each value; none without noise.
