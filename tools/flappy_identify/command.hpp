@@ -15,6 +15,11 @@ struct Command {
   std::function<Json()> run;
 };
 
+Command add_forces(CLI::App& program);
+Command add_simulate_forces(CLI::App& program);
+Command add_calibrate(CLI::App& program);
+Command add_compare_map(CLI::App& program);
+Command add_kinematics(CLI::App& program);
 Command add_transitions(CLI::App& program);
 
 }  // namespace flappy::identify

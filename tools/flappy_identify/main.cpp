@@ -5,7 +5,10 @@
 int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-identify", "Fits a vehicle to measurements, and compares it with them.", {});
-  const std::vector<identify::Command> commands = {identify::add_transitions(program.app())};
+  const std::vector<identify::Command> commands = {
+      identify::add_forces(program.app()),     identify::add_simulate_forces(program.app()),
+      identify::add_calibrate(program.app()),  identify::add_compare_map(program.app()),
+      identify::add_kinematics(program.app()), identify::add_transitions(program.app())};
   program.app().require_subcommand(1);
   return program.run(argc, argv, [&] {
     for (const identify::Command& command : commands)
