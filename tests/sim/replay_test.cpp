@@ -99,8 +99,8 @@ TEST(Replay, WindowsDoNotSeeEachOtherOrTheThreads) {
   std::vector<ReplayWindow> windows;
   for (int i = 0; i < 21; ++i)
     windows.push_back({0.05 + 0.003 * i,
-                       i % 4 == 1   ? &heavy
-                       : i % 8 == 2 ? &dragged
+                       i % 3 == 1   ? &heavy
+                       : i % 5 == 2 ? &dragged
                                     : &one,
                        i == 3 ? &wild : &r.voltages});
   const auto together = replay(windows, {100, 300}, recorded, o);
@@ -168,7 +168,7 @@ TEST(Replay, CarriedWingsComeIntoPhaseWeldedOnesDoNot) {
   };
   EXPECT_LT(wings_off(3, 10), 2e-3);  // what rest was is forgotten by a factor of about 15 in each beat
   EXPECT_GT(wings_off(1, 10), 10 * wings_off(3, 10));
-  EXPECT_GT(wings_off(3, 0), 5 * wings_off(3, 10));
+  EXPECT_NEAR(wings_off(3, 0), 0.037, 0.004);  // 3 % of the stroke; let loose it would be 0.045
 }
 
 TEST(Replay, StrokesFollowTheirRecord) {
@@ -195,7 +195,7 @@ TEST(Replay, StrokesFollowTheirRecord) {
       sum += std::abs(results[i].states[0].stroke_rad[side] - r.at(windows[i].start_s).stroke_rad[side]);
     return sum / static_cast<double>(windows.size());
   };
-  EXPECT_LT(stroke_off(0.4, true, 0), 0.5 * stroke_off(0, true, 0));
+  EXPECT_LT(stroke_off(0.4, true, 0), 0.2 * stroke_off(0, true, 0));  // the rate alone gives 0.4
   EXPECT_LT(stroke_off(0.4, true, 1), 2e-3);
   EXPECT_EQ(stroke_off(0.4, false, 0), stroke_off(0, true, 0));
 }

@@ -51,8 +51,9 @@ void print(const Request& request, const TransitionReport& r, double wall_s) {
   std::printf(
       "%zu flights, %zu samples replayed of %zu (%zu too low, %zu where streams are missing), %zu diverged; %.2f s\n",
       request.flights.size(), r.samples, r.recorded, r.low, r.not_covered, r.diverged, wall_s);
-  if (request.options.source == Source::truth)
-    std::printf("from truth.csv: what is left is the vehicle's error alone\n");
+  std::printf(request.options.source == Source::truth ? "from truth.csv: what is left is the vehicle's error alone\n"
+                                                      : "with what the sensors leave unknown of a start and an end: of "
+                                                        "a simulated flight, --truth leaves it out\n");
   std::printf("  %-6s %11s  %25s  %33s\n", "", "range", "after one beat", "after two beats");
   std::printf("  %-6s %11s", "state", "in a beat");
   for (int beats = 1; beats <= 2; ++beats) std::printf(" %9s %7s %7s %7s", "median", "90 %", "median", "90 %");
