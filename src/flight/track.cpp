@@ -96,11 +96,19 @@ Vector3d MeanSpline::value(std::size_t k, double u) const {
   return knots_[k] * ((1 - u) * (1 - 3 * u)) + means_[k] * (6 * u * (1 - u)) + knots_[k + 1] * (u * (3 * u - 2));
 }
 
-Vector3d MeanSpline::mean(std::size_t k, double u, double v) const {
-  const auto integral = [&](double s) -> Vector3d {
+Vector3d MeanSpline::integral(std::size_t k, double u, double v) const {
+  const auto from_0 = [&](double s) -> Vector3d {
     return knots_[k] * (s * (1 - s) * (1 - s)) + means_[k] * (s * s * (3 - 2 * s)) + knots_[k + 1] * (s * s * (s - 1));
   };
-  return integral(v) - integral(u);
+  return from_0(v) - from_0(u);
+}
+
+Vector3d MeanSpline::second_integral(std::size_t k, double u, double v) const {
+  const auto from_0 = [&](double s) -> Vector3d {
+    return knots_[k] * (s * s * (0.5 + s * (s / 4 - 2.0 / 3))) + means_[k] * (s * s * s * (1 - s / 2)) +
+           knots_[k + 1] * (s * s * s * (s / 4 - 1.0 / 3));
+  };
+  return from_0(v) - from_0(u) - (v - u) * integral(k, 0, u);
 }
 
 /// Spectral densities and variances.
@@ -123,10 +131,11 @@ struct Track::Noise {
   }
 };
 
-/// What the IMU says of a piece of one of its intervals.
+/// What the IMU says of a piece of one of its intervals. Velocity is gained in B as it is in the middle of the whole
+/// interval: a mean knows no other frame.
 struct Track::Reading {
-  double duration_s;
-  Vector3d turn_rad, gained_m_s;
+  double duration_s, to_middle_s;
+  Vector3d turn_rad, turn_to_middle_rad, gained_m_s, moved_m;
   bool gap;
 };
 
@@ -215,17 +224,28 @@ void Track::lay_nodes(const std::vector<Pose>& poses) {
 auto Track::reading(std::size_t interval, double from_s, double to_s) const -> Reading {
   const double length = bounds_s_[interval + 1] - bounds_s_[interval];
   const double u = (from_s - bounds_s_[interval]) / length, v = (to_s - bounds_s_[interval]) / length;
-  return {to_s - from_s, length * gyro_.mean(interval, u, v), length * accel_.mean(interval, u, v),
+  return {to_s - from_s,
+          (0.5 - u) * length,
+          length * gyro_.integral(interval, u, v),
+          length * (gyro_.integral(interval, 0, 1) / 2 - gyro_.integral(interval, 0, u)),
+          length * accel_.integral(interval, u, v),
+          length * length * accel_.second_integral(interval, u, v),
           gap_[interval] != 0};
+}
+
+Quaterniond Track::to_middle(const State& x, const Reading& r) {
+  return x.attitude * exponential(r.turn_to_middle_rad - r.to_middle_s * x.gyro_bias);
 }
 
 auto Track::moved(const State& x, const Reading& r) const -> State {
   const Vector3d turn = r.turn_rad - r.duration_s * x.gyro_bias;
+  const double dt = r.duration_s;
+  const Quaterniond middle = to_middle(x, r);
+  const Vector3d down(0, 0, -gravity_m_s2_);
   State y = x;
-  Vector3d gained = (x.attitude * exponential(turn / 2)) * (r.gained_m_s - r.duration_s * x.accel_bias);
-  gained.z() -= r.duration_s * gravity_m_s2_;
-  y.position_m += r.duration_s * (x.velocity_m_s + gained / 2);
-  y.velocity_m_s += gained;
+  // not half of what was gained: the beat's acceleration A would leave A dt^2/12 in the position, some 0.01 mm
+  y.position_m += dt * x.velocity_m_s + middle * (r.moved_m - dt * dt / 2 * x.accel_bias) + dt * dt / 2 * down;
+  y.velocity_m_s += middle * (r.gained_m_s - dt * x.accel_bias) + dt * down;
   y.attitude = (x.attitude * exponential(turn)).normalized();
   return y;
 }
@@ -233,7 +253,7 @@ auto Track::moved(const State& x, const Reading& r) const -> State {
 auto Track::transition(const State& x, const Reading& r) const -> Covariance {
   const double dt = r.duration_s;
   const Vector3d turn = r.turn_rad - dt * x.gyro_bias;
-  const Matrix3d half = (x.attitude * exponential(turn / 2)).toRotationMatrix();
+  const Matrix3d half = to_middle(x, r).toRotationMatrix();
   const Matrix3d leans = -half * cross_matrix(r.gained_m_s - dt * x.accel_bias);  // velocity for an angle
   Covariance f = Covariance::Identity();
   f.block<3, 3>(0, 0) = exponential(-turn).toRotationMatrix();

@@ -40,8 +40,10 @@ class MeanSpline {
   MeanSpline(const std::vector<double>& bounds_s, std::vector<Eigen::Vector3d> means);
   /// At share `u` of interval `k`.
   Eigen::Vector3d value(std::size_t k, double u) const;
-  /// Over [u, v] of interval `k`, divided by its length.
-  Eigen::Vector3d mean(std::size_t k, double u, double v) const;
+  /// Integral over [u, v] of interval `k`, divided by its length.
+  Eigen::Vector3d integral(std::size_t k, double u, double v) const;
+  /// Of the integral from u on, over [u, v], divided by the square of the length.
+  Eigen::Vector3d second_integral(std::size_t k, double u, double v) const;
 
  private:
   std::vector<Eigen::Vector3d> means_, knots_;
@@ -103,6 +105,7 @@ class Track {
 
   std::size_t node_before(double t_s) const;
   Reading reading(std::size_t interval, double from_s, double to_s) const;
+  static Eigen::Quaterniond to_middle(const State& x, const Reading& r);
   State moved(const State& x, const Reading& r) const;
   Covariance transition(const State& x, const Reading& r) const;
   void add_noise(Covariance& p, const Reading& r, const Noise& noise) const;
