@@ -24,8 +24,7 @@ FitConfig read_fit_config(const std::filesystem::path& path, const model::Vehicl
              "paths of the vehicle's file" + io::did_you_mean(name, names));
     if (std::ranges::count(offered, name) > 0) t.fail("name", "\"" + name + "\" comes twice", "each parameter once");
     offered.push_back(name);
-    const FitParameter p{name, t.number("low", {found->low, found->high}),
-                         t.number("high", {found->low, found->high})};
+    const FitParameter p{name, t.number("low", {found->low, found->high}), t.number("high", {found->low, found->high})};
     if (!(p.low < p.high)) t.fail("high", "is not above low", "a number above " + io::shortest_digits(p.low));
     if (!chosen.empty() && std::ranges::count(chosen, name) == 0) continue;
     if (*found->value < p.low || *found->value > p.high)

@@ -20,8 +20,7 @@ std::vector<sim::Input> default_inputs() {
 
 MeasuredMap simulate_forces(const model::Vehicle& vehicle, const std::vector<sim::Input>& inputs,
                             const ForceSensor& sensor, std::uint64_t seed, const MapOptions& options) {
-  if (!(sensor.noise_steps > 0))
-    return {"", inputs, force_map<double>(std::span(&vehicle, 1), inputs, options), {}};
+  if (!(sensor.noise_steps > 0)) return {"", inputs, force_map<double>(std::span(&vehicle, 1), inputs, options), {}};
   const int each = static_cast<int>(std::lround(1 / (sensor.rate_hz * kStep_s)));
   const int samples = whole_beats(vehicle.driver).steps / each;
   auto batch = welded_batch<double>(std::span(&vehicle, 1), inputs, options);

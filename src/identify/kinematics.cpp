@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdio>
 #include <numbers>
 
 #include "io/csv.hpp"
@@ -88,6 +89,12 @@ double rms(const std::vector<double>& a, const std::vector<double>& b) {
   return std::sqrt(sum / static_cast<double>(a.size()));
 }
 
+std::string milliseconds(double seconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f ms", 1e3 * seconds);
+  return text;
+}
+
 std::vector<double> beat_phases() {
   std::vector<double> phases(kBeatPoints);
   for (std::size_t i = 0; i < kBeatPoints; ++i) phases[i] = kTurn * static_cast<double>(i) / kBeatPoints;
@@ -149,8 +156,8 @@ WingComparison compare_wings(const model::Vehicle& vehicle, const sim::Input& in
   const double beat_s = 1 / vehicle.driver.flapping_Hz;
   const double lasts_s = samples.t_s.empty() ? 0 : samples.t_s.back() - samples.t_s.front();
   if (lasts_s < 0.95 * beat_s)
-    throw io::InputError(samples.name + ": lasts " + io::shortest_digits(lasts_s) +
-                         " s; accepted: at least one beat, " + io::shortest_digits(beat_s) + " s");
+    throw io::InputError(samples.name + ": lasts " + milliseconds(lasts_s) + "; accepted: at least one beat, " +
+                         milliseconds(beat_s));
   std::vector<double> phases;
   for (const double t : samples.t_s) phases.push_back(kTurn * (t / beat_s - std::floor(t / beat_s)));
   std::optional<Beat> measured = beat_of(phases, samples.angles_rad);
@@ -204,8 +211,8 @@ void write_beat_svg(const std::filesystem::path& path, const WingComparison& c) 
   }
   script += "end_of_rows\nset multiplot layout 2,1\n";
   for (const int angle : {0, 1}) {
-    script += "set ylabel '" + std::string(angle == 0 ? "stroke" : "rotation") +
-              " in degrees'\nset xlabel '" + (angle == 0 ? "" : "fraction of the beat") + "'\nplot ";
+    script += "set ylabel '" + std::string(angle == 0 ? "stroke" : "rotation") + " in degrees'\nset xlabel '" +
+              (angle == 0 ? "" : "fraction of the beat") + "'\nplot ";
     for (const int side : {0, 1}) {
       const std::string colour = side == 0 ? "#08519c" : "#a63603", name = side == 0 ? "left" : "right";
       const int column = 2 + 2 * side + angle;

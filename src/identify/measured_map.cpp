@@ -75,7 +75,8 @@ MeasuredMap map_of(const io::CsvTable& table, const model::Driver& driver) {
   check_columns(table, required, optional);
   MeasuredMap map{table.name, inputs_of(table, driver), {}, {}};
   map.wrenches.resize(map.size());
-  const bool declared = std::ranges::any_of(optional, [&](const auto& n) { return std::ranges::count(table.names, n); });
+  const bool declared =
+      std::ranges::any_of(optional, [&](const auto& n) { return std::ranges::count(table.names, n); });
   if (declared) {
     check_columns(table, optional, required);
     map.sd.resize(map.size());

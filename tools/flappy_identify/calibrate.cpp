@@ -46,8 +46,9 @@ Json run(const Settings& s) {
     after = std::max(after, fit.after.total);
     if (!held.empty()) {
       const MeasuredMap other = simulate_forces(truth, held, {}, seed + 1000000, options.map);
-      held_error = std::max(held_error, map_error(other.wrenches, force_map<double>(std::span(&fit.vehicle, 1), held,
-                                                                                     options.map)).total);
+      held_error =
+          std::max(held_error,
+                   map_error(other.wrenches, force_map<double>(std::span(&fit.vehicle, 1), held, options.map)).total);
     }
     for (std::size_t i = 0; i < counts.size(); ++i) {
       const FittedParameter& p = fit.parameters[i];
@@ -68,8 +69,8 @@ Json run(const Settings& s) {
                 counts[i].seen, done, counts[i].inside);
   }
   const double coverage = seen > 0 ? 100.0 * inside / seen : 0;
-  std::printf("%u noise seeds: %u of %u inside their 95 %% intervals, %.1f %%; total error at most %.3f %%", done, inside,
-              seen, coverage, after);
+  std::printf("%u noise seeds: %u of %u inside their 95 %% intervals, %.1f %%; total error at most %.3f %%", done,
+              inside, seen, coverage, after);
   if (!held.empty()) std::printf(", held-out inputs at most %.3f %%", held_error);
   std::printf("\n");
   return {{"seeds", done},
@@ -89,7 +90,9 @@ Command add_calibrate(CLI::App& program) {
   CLI::App* app = program.add_subcommand("calibrate", "counts how often a fit's 95 % intervals hold the truth");
   s->source.add(*app, "vehicle to start each fit from");
   app->add_option("--truth", s->truth, "vehicle whose noisy maps are fitted")->required();
-  app->add_option("--seeds", s->seeds, "fits, each of noise of its own")->check(CLI::Range(1, 100000))->capture_default_str();
+  app->add_option("--seeds", s->seeds, "fits, each of noise of its own")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   app->add_option("--held-out-inputs", s->held_out, "table of inputs to judge each fit on");
   s->fit.starts = 1;
   s->fit.add(*app);

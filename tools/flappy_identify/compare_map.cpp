@@ -15,7 +15,8 @@ Command add_compare_map(CLI::App& program) {
   };
   const auto s = std::make_shared<Settings>();
   s->source.moment_point = "com";
-  CLI::App* app = program.add_subcommand("compare-map", "a vehicle's force map beside that published for the real robot");
+  CLI::App* app =
+      program.add_subcommand("compare-map", "a vehicle's force map beside that published for the real robot");
   s->source.add(*app, "vehicle to simulate");
   app->add_option("--published", s->published, "slopes and offsets of the real robot")->capture_default_str();
   return {app, [s] {

@@ -1,11 +1,12 @@
 // flappy-identify kinematics: measured wings beside simulated ones, on one beat.
+#include "identify/kinematics.hpp"
+
 #include <cstdio>
 #include <limits>
 #include <memory>
 #include <numbers>
 
 #include "command.hpp"
-#include "identify/kinematics.hpp"
 #include "io/files.hpp"
 #include "shared_options.hpp"
 
@@ -37,7 +38,8 @@ Json run(const Settings& s) {
   if (!s.svg.empty()) write_beat_svg(s.svg, c);
   std::printf("%s at %g V, %zu samples; t_s = 0 is at %.1f deg of the beat; all figures in degrees\n",
               vehicle.name.c_str(), input.amplitude_V, samples.t_s.size(), c.shift_rad / kDegree);
-  std::printf("%-18s %20s %20s %8s %8s %9s\n", "", "amplitude meas. sim.", "bias meas. sim.", "phase", "rms", "scatter");
+  std::printf("%-18s %20s %20s %8s %8s %9s\n", "", "amplitude meas. sim.", "bias meas. sim.", "phase", "rms",
+              "scatter");
   Json angles = Json::object();
   for (std::size_t i = 0; i < kAngleNames.size(); ++i) {
     const AngleComparison& a = c.angles[i];

@@ -15,7 +15,8 @@ Command add_simulate_forces(CLI::App& program) {
     std::uint64_t seed = 1;
   };
   const auto s = std::make_shared<Settings>();
-  CLI::App* app = program.add_subcommand("simulate-forces", "writes the force map a laboratory would measure of a vehicle");
+  CLI::App* app =
+      program.add_subcommand("simulate-forces", "writes the force map a laboratory would measure of a vehicle");
   s->source.add(*app, "vehicle to measure");
   app->add_option("--out", s->out, "table to write")->required();
   app->add_option("--inputs", s->inputs, "table of inputs; without it, 37 about hover");
