@@ -63,7 +63,9 @@ std::optional<Beat> beat_of(const std::vector<double>& phases, const std::array<
 }
 
 Beat simulated_beat(const model::Vehicle& vehicle, const sim::Input& input, const MapOptions& options) {
-  auto batch = welded_batch<double>(std::span(&vehicle, 1), std::span(&input, 1), options);
+  MapOptions alone = options;
+  alone.threads = 1;
+  auto batch = welded_batch<double>(std::span(&vehicle, 1), std::span(&input, 1), alone);
   const int settled = settle_steps(vehicle.driver, options.settle_s), steps = whole_beats(vehicle.driver).steps;
   batch.step(settled);
   std::vector<double> phases;

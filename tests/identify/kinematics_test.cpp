@@ -16,7 +16,7 @@ const sim::Input kInput{10, 0, 0, 0};
 /// Wings of the identified vehicle at 5,000 frames/s, on a camera whose clock started `late_s` after the beat did.
 WingSamples filmed(double late_s, int frames) {
   const model::Vehicle v = test::identified();
-  auto batch = welded_batch<double>(std::span(&v, 1), std::span(&kInput, 1), {});
+  auto batch = welded_batch<double>(std::span(&v, 1), std::span(&kInput, 1), {.threads = 1});
   batch.step(5000);
   WingSamples s{"wings", {}, {}, {}};
   for (int i = 1; i <= frames; ++i) {
