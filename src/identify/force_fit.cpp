@@ -15,6 +15,7 @@ using Eigen::MatrixXd, Eigen::VectorXd;
 
 constexpr double kUniformPrecision = 12;  // of a uniform distribution over [0, 1]
 constexpr double kNormal95 = 1.959964;
+constexpr double kJump = 1;           // second difference, in standard deviations
 constexpr double kImpossible = 1e30;  // cost of a vehicle that comes apart
 
 double square(double x) { return x * x; }
@@ -28,14 +29,13 @@ std::array<double, 2> group_rms(const std::vector<Wrench>& wrenches) {
   return sum;
 }
 
-/// Vehicles as points of the unit cube, judged against a measured map.
+/// Vehicles as points of the unit cube, judged against a measured map with its sd.
 class Problem {
  public:
   Problem(const model::Vehicle& vehicle, const FitConfig& config, const MeasuredMap& measured, const MapOptions& map)
       : vehicle_(vehicle), config_(config), measured_(measured), map_(map) {}
 
   std::size_t size() const { return config_.parameters.size(); }
-  std::vector<Wrench>& sd() { return sd_; }
 
   model::Vehicle vehicle(const VectorXd& point) const {
     model::Vehicle v = vehicle_;
@@ -73,7 +73,7 @@ class Problem {
       for (std::size_t i = 0; i < measured_.size(); ++i)
         for (std::size_t k = 0; k < kChannels; ++k)
           all[p][static_cast<Eigen::Index>(i * kChannels + k)] =
-              (simulated[p * measured_.size() + i][k] - measured_.wrenches[i][k]) / sd_[i][k];
+              (simulated[p * measured_.size() + i][k] - measured_.wrenches[i][k]) / measured_.sd[i][k];
     return all;
   }
   std::vector<VectorXd> operator()(const std::vector<VectorXd>& points) const { return residuals<double>(points); }
@@ -85,7 +85,6 @@ class Problem {
   const FitConfig& config_;
   const MeasuredMap& measured_;
   MapOptions map_;
-  std::vector<Wrench> sd_;
 };
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -94,7 +93,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 class Fit {
  public:
-  Fit(Problem& problem, const FitOptions& options, ForceFit& result)
+  Fit(const Problem& problem, const FitOptions& options, ForceFit& result)
       : problem_(problem), options_(options), result_(result) {}
 
   /// Downhill from `start`, as a stage of its own.
@@ -163,7 +162,7 @@ class Fit {
     return best;
   }
 
-  Problem& problem_;
+  const Problem& problem_;
   const FitOptions& options_;
   ForceFit& result_;
   double cost_ = 0;
@@ -186,10 +185,42 @@ std::vector<Wrench> estimated_sd(const MeasuredMap& measured, const std::vector<
   return std::vector<Wrench>(measured.size(), sd);
 }
 
+/// Inputs whose second differences about `point` are no curvature: smooth ones stay below 0.2 standard deviations.
+std::vector<std::size_t> jumping_inputs(const Problem& problem, const VectorXd& point) {
+  std::vector<VectorXd> points = {point};
+  for (Eigen::Index i = 0; i < point.size(); ++i) {
+    if (point[i] < kDifference || point[i] > 1 - kDifference) continue;
+    for (const double way : {-kDifference, kDifference}) {
+      points.push_back(point);
+      points.back()[i] += way;
+    }
+  }
+  const std::vector<VectorXd> r = problem(points);
+  std::vector<std::size_t> jumping;
+  for (Eigen::Index input = 0; input < r[0].size() / kChannels; ++input) {
+    double worst = 0;
+    for (std::size_t i = 1; i < r.size(); i += 2)
+      worst = std::max(worst, (r[i] + r[i + 1] - 2 * r[0]).segment<kChannels>(input * kChannels).cwiseAbs().maxCoeff());
+    if (!(worst <= kJump)) jumping.push_back(static_cast<std::size_t>(input));
+  }
+  return jumping;
+}
+
+MeasuredMap without(const MeasuredMap& map, const std::vector<std::size_t>& inputs) {
+  MeasuredMap kept{map.name, {}, {}, {}};
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (std::ranges::count(inputs, i) > 0) continue;
+    kept.inputs.push_back(map.inputs[i]);
+    kept.wrenches.push_back(map.wrenches[i]);
+    kept.sd.push_back(map.sd[i]);
+  }
+  return kept;
+}
+
 void describe(ForceFit& result, const FitConfig& config, const Problem& problem, const VectorXd& point,
-              const VectorXd& nominal, std::size_t values) {
+              const VectorXd& nominal) {
   const VectorXd left = problem({point}).front();
-  const double freedom = std::max(1.0, static_cast<double>(values) - static_cast<double>(point.size()));
+  const double freedom = std::max(1.0, static_cast<double>(left.size() - point.size()));
   result.misfit = left.squaredNorm() / freedom;
   const double widened = result.misfit > 1 + 3 * std::sqrt(2 / freedom) ? result.misfit : 1;
   const MatrixXd j = jacobian(problem, point) / std::sqrt(widened);
@@ -267,19 +298,30 @@ ForceFit fit_forces(const model::Vehicle& nominal, const MeasuredMap& measured, 
   ForceFit result;
   result.before = map_error(measured.wrenches, before);
   result.sd_declared = !measured.sd.empty();
-  Problem problem(nominal, config, measured, options.map);
+  MeasuredMap fitted = measured;  // with the sd that the fit assumes
   const auto scale = group_rms(measured.wrenches);
-  problem.sd() = result.sd_declared ? measured.sd
-                                    : std::vector<Wrench>(measured.size(),
-                                                          {scale[0], scale[0], scale[0], scale[1], scale[1], scale[1]});
-  const VectorXd start = problem.point(nominal);
+  if (!result.sd_declared)
+    fitted.sd.assign(measured.size(), {scale[0], scale[0], scale[0], scale[1], scale[1], scale[1]});
+  const Problem problem(nominal, config, fitted, options.map);
   Fit fit(problem, options, result);
+  const VectorXd start = problem.point(nominal);
   VectorXd point = fit.optimum(start);
-  if (!result.sd_declared) {
-    problem.sd() = estimated_sd(measured, problem.maps<double>({point}), count);
+  const auto estimate_noise = [&] {
+    if (result.sd_declared) return;
+    fitted.sd = estimated_sd(fitted, problem.maps<double>({point}), count);
     point = fit.polish("Gauss-Newton, noise estimated", point);
+  };
+  estimate_noise();
+  // a fit that jumps have led astray sees others once it is back
+  for (int round = 0; round < 3; ++round) {
+    const std::vector<std::size_t> jumping = jumping_inputs(problem, point);
+    if (jumping.empty() || fitted.size() - jumping.size() < count) break;
+    for (const std::size_t i : jumping) result.left_out.push_back(fitted.inputs[i]);
+    fitted = without(fitted, jumping);
+    point = fit.polish("Gauss-Newton, jumps left out", point);
+    estimate_noise();
   }
-  describe(result, config, problem, point, start, measured.size() * kChannels);
+  describe(result, config, problem, point, start);
 
   std::vector<bool> seen;
   for (const FittedParameter& p : result.parameters) seen.push_back(p.seen);
@@ -290,12 +332,11 @@ ForceFit fit_forces(const model::Vehicle& nominal, const MeasuredMap& measured, 
       else point[static_cast<Eigen::Index>(i)] = start[static_cast<Eigen::Index>(i)];
     if (!rest.parameters.empty()) {
       const model::Vehicle from = problem.vehicle(point);
-      Problem smaller(from, rest, measured, options.map);
-      smaller.sd() = problem.sd();
+      const Problem smaller(from, rest, fitted, options.map);
       Fit again(smaller, options, result);
       point = problem.point(smaller.vehicle(again.polish("Gauss-Newton, unseen at nominal", smaller.point(from))));
     }
-    describe(result, config, problem, point, start, measured.size() * kChannels);
+    describe(result, config, problem, point, start);
     for (std::size_t i = 0; i < count; ++i) result.parameters[i].seen = seen[i];
   }
   result.vehicle = problem.vehicle(point);

@@ -7,6 +7,8 @@
 // Intervals are those of the linearised map at the optimum: in units of the bounds, with Jacobian J of the cost's terms,
 // covariance C = (J'J + 12 I)^-1. The 12 is the precision of a uniform distribution over the bounds: what is known before
 // anything is measured. A misfit far above the noise (a map no parameters reach) widens C by its ratio.
+// Inputs at which the simulated map jumps about the optimum (wings that hardly flip, strokes that meet their stops) can
+// neither steer a fit nor tell how well it is known: they are left out of it, but not of the errors.
 // A parameter whose interval is wider than a share of its bounds is unseen: it goes back to its nominal value, the
 // rest are fitted once more, and their intervals still count what the unseen ones could be.
 #pragma once
@@ -67,7 +69,8 @@ struct ForceFit {
   MapError before, after;
   std::vector<Stage> stages;
   bool sd_declared = false;
-  double misfit = 0;  ///< cost per degree of freedom; about 1 where only noise is left
+  std::vector<sim::Input> left_out;  ///< inputs at which the map jumps
+  double misfit = 0;                 ///< cost per degree of freedom; about 1 where only noise is left
   int starts_agreed = 0, starts = 0;
 };
 

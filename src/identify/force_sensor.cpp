@@ -23,7 +23,9 @@ MeasuredMap simulate_forces(const model::Vehicle& vehicle, const std::vector<sim
   if (!(sensor.noise_steps > 0)) return {"", inputs, force_map<double>(std::span(&vehicle, 1), inputs, options), {}};
   const int each = static_cast<int>(std::lround(1 / (sensor.rate_hz * kStep_s)));
   const int samples = whole_beats(vehicle.driver).steps / each;
-  auto batch = welded_batch<double>(std::span(&vehicle, 1), inputs, options);
+  MapOptions alone = options;  // threads that meet after every sample would wait more than work
+  alone.threads = 1;
+  auto batch = welded_batch<double>(std::span(&vehicle, 1), inputs, alone);
   batch.step(settle_steps(vehicle.driver, options.settle_s));
   MeasuredMap map{"", inputs, std::vector<Wrench>(inputs.size()), std::vector<Wrench>(inputs.size())};
   std::vector<sim::HeldImpulse> before(inputs.size());

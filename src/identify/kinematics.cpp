@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdio>
 #include <numbers>
 
 #include "io/csv.hpp"
@@ -62,7 +63,9 @@ std::optional<Beat> beat_of(const std::vector<double>& phases, const std::array<
 }
 
 Beat simulated_beat(const model::Vehicle& vehicle, const sim::Input& input, const MapOptions& options) {
-  auto batch = welded_batch<double>(std::span(&vehicle, 1), std::span(&input, 1), options);
+  MapOptions alone = options;
+  alone.threads = 1;
+  auto batch = welded_batch<double>(std::span(&vehicle, 1), std::span(&input, 1), alone);
   const int settled = settle_steps(vehicle.driver, options.settle_s), steps = whole_beats(vehicle.driver).steps;
   batch.step(settled);
   std::vector<double> phases;
@@ -86,6 +89,12 @@ double rms(const std::vector<double>& a, const std::vector<double>& b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
   return std::sqrt(sum / static_cast<double>(a.size()));
+}
+
+std::string milliseconds(double seconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f ms", 1e3 * seconds);
+  return text;
 }
 
 std::vector<double> beat_phases() {
@@ -149,8 +158,8 @@ WingComparison compare_wings(const model::Vehicle& vehicle, const sim::Input& in
   const double beat_s = 1 / vehicle.driver.flapping_Hz;
   const double lasts_s = samples.t_s.empty() ? 0 : samples.t_s.back() - samples.t_s.front();
   if (lasts_s < 0.95 * beat_s)
-    throw io::InputError(samples.name + ": lasts " + io::shortest_digits(lasts_s) +
-                         " s; accepted: at least one beat, " + io::shortest_digits(beat_s) + " s");
+    throw io::InputError(samples.name + ": lasts " + milliseconds(lasts_s) + "; accepted: at least one beat, " +
+                         milliseconds(beat_s));
   std::vector<double> phases;
   for (const double t : samples.t_s) phases.push_back(kTurn * (t / beat_s - std::floor(t / beat_s)));
   std::optional<Beat> measured = beat_of(phases, samples.angles_rad);

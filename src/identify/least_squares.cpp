@@ -8,7 +8,8 @@ namespace flappy::identify {
 namespace {
 
 constexpr int kMostIterations = 50;
-constexpr double kLeastGain = 1e-7;  // of the cost, by an iteration
+constexpr double kLeastGain = 1e-7;   // of the cost, by an iteration
+constexpr double kLeastCost = 1e-16;  // of where it started: residuals of the eighth digit
 
 double cost_of(const Eigen::VectorXd& residuals) {
   const double cost = residuals.squaredNorm();
@@ -53,9 +54,10 @@ LeastSquares minimise(const Residuals& residuals, const Eigen::VectorXd& start,
                       const std::function<bool(const LeastSquares&)>& more) {
   Eigen::VectorXd r = residuals({start}).front();
   LeastSquares best{start, cost_of(r), 0, 1};
+  const double enough = kLeastCost * best.cost;
   double damping = 1e-3;
   int without_gain = 0;
-  while (best.iterations < kMostIterations && without_gain < 2 && (!more || more(best))) {
+  while (best.cost > enough && best.iterations < kMostIterations && without_gain < 2 && (!more || more(best))) {
     ++best.iterations;
     const Eigen::MatrixXd j = jacobian(residuals, best.point);
     best.evaluations += 2 * static_cast<std::size_t>(start.size());

@@ -23,7 +23,6 @@ struct Settings {
   std::size_t hold_out = 0;
 };
 
-/// Misfits of less than a millionth are those of the sixth digit.
 void print(const ForceFit& f, const MeasuredMap& measured, const std::optional<double>& held_out, std::size_t held) {
   for (const Stage& s : f.stages)
     std::printf("%-28s %6zu maps %8.2f s   error %.3f %%\n", s.name.c_str(), s.evaluations, s.wall_s, s.error);
@@ -32,6 +31,12 @@ void print(const ForceFit& f, const MeasuredMap& measured, const std::optional<d
   if (held_out) std::printf(", %.3f %% on %zu held-out inputs", *held_out, held);
   std::printf("\nmisfit %.3g of the %s noise%s\n", std::sqrt(f.misfit), f.sd_declared ? "declared" : "estimated",
               f.misfit > 2 ? ": the model lacks something, intervals are widened" : "");
+  if (!f.left_out.empty()) {
+    std::printf("left out of the fit, for the simulated map jumps there:");
+    for (const sim::Input& u : f.left_out)
+      std::printf(" (%g V, %g V, %g V, %g)", u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle);
+    std::printf("\n");
+  }
   std::printf("rms error    ");
   for (const std::string& name : channel_names()) std::printf("%13s", name.c_str());
   for (const auto& [what, error] : {std::pair{"before", &f.before}, {"after", &f.after}}) {
@@ -79,6 +84,7 @@ Json json_of(const ForceFit& f, const std::optional<double>& held_out, const std
           {"confounded", confounded},
           {"singular_values", f.singular_values},
           {"stages", stages},
+          {"left_out", f.left_out.size()},
           {"starts", f.starts},
           {"starts_agreed", f.starts_agreed}};
 }
