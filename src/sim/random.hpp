@@ -25,6 +25,7 @@ enum class Stream : std::uint32_t {
   replay = 11,
   target_noise = 12,
   snapshot = 13,
+  force_sensor = 14,
 };
 
 struct RandomKey {

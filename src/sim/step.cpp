@@ -38,6 +38,14 @@ FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>
           wing_beat_voltage<-1>(u, L::load(fraction), right.voltage_limit_V)};
 }
 
+/// Voltages that were recorded.
+template <class T, class L>
+FLAPPY_INLINE Voltages<L> next_recorded(const T*& voltages_V, int first) {
+  const Voltages<L> v{L::load(voltages_V + first), L::load(voltages_V + kLanes<T> + first)};
+  voltages_V += 2 * kLanes<T>;
+  return v;
+}
+
 /// Marks flappers that have come apart or touched something, and stands those that never took off back up.
 template <class T, class L>
 FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const StepPlan& plan, Block<T>& block, int first) {
@@ -148,10 +156,12 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     }
 
     Vec3<L> com_m = x.position_m + rotation_matrix(x.attitude) * centre_of_mass(p, x);
+    const T* recorded_V = in_force.voltages_V;
     std::int64_t until_update = (plan.steps_per_update - first_step % plan.steps_per_update) % plan.steps_per_update;
     for (int i = 0; i < steps; ++i, --until_update) {
       if (until_update == 0) {
-        voltages = update_driver(block, p.left, p.right, first);
+        voltages = recorded_V != nullptr ? next_recorded<T, L>(recorded_V, first)
+                                         : update_driver(block, p.left, p.right, first);
         until_update = plan.steps_per_update;
       }
       prefetch.step();

@@ -20,6 +20,8 @@ template <class T>
 struct BlockEffects {
   std::uint64_t set = 0;  // bit i: entry i of the registry
   const T* rows = nullptr;
+  /// Voltages in place of the driver's, where there are any: two rows, left and right, for every update from the first on.
+  const T* voltages_V = nullptr;
 };
 
 /// Advances all lanes of a block by `steps` physics steps, of which the first is number `first` of the batch.

@@ -1,0 +1,89 @@
+#include "identify/least_squares.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace flappy::identify {
+namespace {
+
+constexpr int kMostIterations = 50;
+constexpr double kLeastGain = 1e-7;   // of the cost, by an iteration
+constexpr double kLeastCost = 1e-16;  // of where it started: residuals of the eighth digit
+
+double cost_of(const Eigen::VectorXd& residuals) {
+  const double cost = residuals.squaredNorm();
+  return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
+}
+
+/// The damped step among parameters that are free to move, cut off at the bounds.
+Eigen::VectorXd stepped(const Eigen::MatrixXd& normal, const Eigen::VectorXd& gradient, const Eigen::VectorXd& point,
+                        double damping) {
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < point.size(); ++i)
+    if (!(point[i] <= 0 && gradient[i] > 0) && !(point[i] >= 1 && gradient[i] < 0)) free.push_back(i);
+  Eigen::MatrixXd a = normal(free, free);
+  // a diagonal of its own for parameters without any slope
+  a.diagonal() += damping * a.diagonal() + Eigen::VectorXd::Constant(a.rows(), 1e-12 * normal.trace() + 1e-300);
+  const Eigen::VectorXd step = a.ldlt().solve(gradient(free));
+  Eigen::VectorXd next = point;
+  for (std::size_t i = 0; i < free.size(); ++i)
+    next[free[i]] = std::clamp(point[free[i]] - step[static_cast<Eigen::Index>(i)], 0.0, 1.0);
+  return next;
+}
+
+}  // namespace
+
+Eigen::MatrixXd jacobian(const Residuals& residuals, const Eigen::VectorXd& point, double difference) {
+  std::vector<Eigen::VectorXd> points;
+  for (Eigen::Index i = 0; i < point.size(); ++i)
+    for (const double way : {-difference, difference}) {
+      points.push_back(point);
+      points.back()[i] = std::clamp(point[i] + way, 0.0, 1.0);
+    }
+  const std::vector<Eigen::VectorXd> r = residuals(points);
+  Eigen::MatrixXd slopes(r.front().size(), point.size());
+  for (Eigen::Index i = 0; i < point.size(); ++i) {
+    const auto low = static_cast<std::size_t>(2 * i);
+    slopes.col(i) = (r[low + 1] - r[low]) / (points[low + 1][i] - points[low][i]);
+  }
+  return slopes;
+}
+
+LeastSquares minimise(const Residuals& residuals, const Eigen::VectorXd& start,
+                      const std::function<bool(const LeastSquares&)>& more) {
+  Eigen::VectorXd r = residuals({start}).front();
+  LeastSquares best{start, cost_of(r), 0, 1};
+  const double enough = kLeastCost * best.cost;
+  double damping = 1e-3;
+  int without_gain = 0;
+  while (best.cost > enough && best.iterations < kMostIterations && without_gain < 2 && (!more || more(best))) {
+    ++best.iterations;
+    const Eigen::MatrixXd j = jacobian(residuals, best.point);
+    best.evaluations += 2 * static_cast<std::size_t>(start.size());
+    if (!j.allFinite()) break;
+    const Eigen::MatrixXd normal = j.transpose() * j;
+    const Eigen::VectorXd gradient = j.transpose() * r;
+    const std::vector<double> factors = {0, 1e-2, 1, 1e1, 1e2, 1e4};
+    std::vector<Eigen::VectorXd> points;
+    for (const double factor : factors) points.push_back(stepped(normal, gradient, best.point, factor * damping));
+    const std::vector<Eigen::VectorXd> tried = residuals(points);
+    best.evaluations += points.size();
+    std::size_t lowest = 0;
+    for (std::size_t i = 1; i < tried.size(); ++i)
+      if (cost_of(tried[i]) < cost_of(tried[lowest])) lowest = i;
+    const double cost = cost_of(tried[lowest]);
+    without_gain = cost < best.cost * (1 - kLeastGain) ? 0 : without_gain + 1;
+    damping = std::clamp(damping * (lowest == 0 ? 0.1 : factors[lowest]), 1e-9, 1e6);
+    if (!(cost < best.cost)) {
+      damping = std::min(damping * 100, 1e6);
+      continue;
+    }
+    best.cost = cost;
+    best.point = points[lowest];
+    r = tried[lowest];
+  }
+  return best;
+}
+
+}  // namespace flappy::identify

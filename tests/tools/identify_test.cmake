@@ -1,0 +1,105 @@
+# flappy-identify as a person meets it: what it prints, writes and refuses, and its exit codes.
+#   cmake -DPROGRAM=flappy-identify -DSOURCE=the project -DWORK=a folder to use -P identify_test.cmake
+cmake_minimum_required(VERSION 3.25)
+include(${CMAKE_CURRENT_LIST_DIR}/program.cmake)
+set(nominal ${SOURCE}/configs/vehicles/hummingbird_nominal.toml)
+set(identified ${SOURCE}/configs/vehicles/hummingbird_identified.toml)
+
+# ---- forces: measure one vehicle, fit another to it, and fly what comes out
+
+run(simulate-forces --vehicle ${identified} --out ${WORK}/map.csv --seed 3)
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "^hummingbird_identified: 37 inputs, mean over 17 beats \\(0.5 s\\), sensor nano17\n$")
+file(STRINGS ${WORK}/map.csv rows)
+list(LENGTH rows count)
+expect_equal("rows of the map" "${count}" 38)
+run(simulate-forces --vehicle ${identified} --out ${WORK}/held.csv --inputs ${SOURCE}/configs/identify/held_out_inputs.csv --seed 4)
+expect_equal("exit code" "${code}" 0)
+
+foreach(i IN ITEMS 1 2)
+  run(forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/fitted${i}.toml --held-out ${WORK}/held.csv --starts 1
+    --threads ${i} --json ${WORK}/fit${i}.json)
+  expect_equal("exit code" "${code}" 0)
+  file(READ ${WORK}/fitted${i}.toml fitted${i})
+endforeach()
+expect_equal("a second run, on other threads" "${fitted2}" "${fitted1}")
+expect_match("stdout" "${out}" "\n37 inputs, total error 33\\.[0-9]+ % before, 0\\.[0-9]+ % after, 0\\.[0-9]+ % on 16 held-out inputs\n")
+string(REGEX MATCHALL "\n" lines "${out}")
+list(LENGTH lines lines)
+if(lines GREATER 40)
+  message(SEND_ERROR "the report has ${lines} lines")
+endif()
+file(SHA256 ${WORK}/map.csv sha256)
+expect_match("the fitted vehicle" "${fitted1}" "^# Fitted to a measured force map by flappy-identify, commit [0-9a-z-]+, method gn\n# from vehicle hummingbird_nominal\n# measured file's sha256 ${sha256}\n# total error 33")
+expect_keys(${WORK}/fit1.json total_error_before=NUMBER total_error_after=NUMBER heldout_error=NUMBER parameters=ARRAY
+  parameters.0.name=STRING parameters.0.value=NUMBER parameters.0.low=NUMBER parameters.0.high=NUMBER
+  parameters.0.seen=BOOLEAN parameters.11.name=STRING wall_s=NUMBER)
+run(simulate-forces --vehicle ${WORK}/fitted1.toml --out ${WORK}/again.csv --noise none)
+expect_equal("measuring the fitted vehicle" "${code}" 0)
+
+# without declared noise, with rows of its own held out, by another method, for few parameters
+file(STRINGS ${WORK}/map.csv rows)
+set(plain "")
+foreach(row IN LISTS rows)
+  string(REPLACE "," ";" cells "${row}")
+  list(SUBLIST cells 0 10 cells)
+  string(REPLACE ";" "," row "${cells}")
+  string(APPEND plain "${row}\n")
+endforeach()
+file(WRITE ${WORK}/plain.csv "${plain}")
+run(forces ${WORK}/plain.csv --vehicle ${identified} --out ${WORK}/few.toml --hold-out 5 --method cmaes --population 8
+  --generations 3 --parameters left.motor.resistance_ohm,right.motor.resistance_ohm)
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "CMA-ES +32 maps.*\n32 inputs, total error 0\\.[0-9]+ % before, 0\\.[0-9]+ % after, 0\\.[0-9]+ % on 5 held-out inputs\nmisfit [0-9.]+ of the estimated noise\n")
+
+run(calibrate --vehicle ${nominal} --truth ${identified} --seeds 1 --json ${WORK}/calibration.json)
+expect_match("calibration" "${out}" "\n1 noise seeds: [0-9]+ of 12 inside their 95 % intervals, ")
+expect_keys(${WORK}/calibration.json coverage_percent=NUMBER parameters=ARRAY)
+
+# ---- compare-map
+
+run(compare-map --vehicle ${identified} --json ${WORK}/compare.json)
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "\nyaw +0\\.00335[0-9]* +0\\.00184 +1\\.82[0-9] ")
+expect_keys(${WORK}/compare.json lines.thrust.slope=NUMBER lines.yaw.slope_ratio=NUMBER)
+
+# ---- kinematics: what one run draws is measured by the next
+
+file(WRITE ${WORK}/still.csv "t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad\n")
+foreach(i RANGE 0 99)
+  file(APPEND ${WORK}/still.csv "${i}e-3,0.1,0.2,0.3,0.4\n")
+endforeach()
+run(kinematics ${WORK}/still.csv --vehicle ${identified} --amplitude 10 --csv ${WORK}/beat.csv --json ${WORK}/wings.json)
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "\nleft_stroke +0\\.00 +61\\.[0-9]+ +5\\.73 +3\\.[0-9]+ ")
+expect_keys(${WORK}/wings.json shift_rad=NUMBER angles.left_stroke_rad.rms_rad=NUMBER
+  angles.right_rotation_rad.simulated.amplitude_rad=NUMBER)
+file(STRINGS ${WORK}/beat.csv rows)
+list(LENGTH rows count)
+expect_equal("points of the beat" "${count}" 201)
+
+# ---- refusals
+
+expect_refused("${WORK}/gone.csv: cannot be read: No such file or directory"
+  forces ${WORK}/gone.csv --vehicle ${nominal} --out ${WORK}/out.toml)
+file(READ ${WORK}/map.csv map)
+string(REPLACE "torque_y_Nm" "torque_y_mNm" wrong "${map}")
+file(WRITE ${WORK}/wrong.csv "${wrong}")
+expect_refused("${WORK}/wrong.csv:1: torque_y_mNm: wrong unit; accepted: torque_y_Nm"
+  forces ${WORK}/wrong.csv --vehicle ${nominal} --out ${WORK}/out.toml)
+file(STRINGS ${WORK}/plain.csv rows LIMIT_COUNT 11)
+string(REPLACE ";" "\n" few "${rows}")
+file(WRITE ${WORK}/few.csv "${few}\n")
+expect_refused("${WORK}/few.csv: has 10 inputs for 12 parameters; accepted: at least as many inputs as parameters"
+  forces ${WORK}/few.csv --vehicle ${nominal} --out ${WORK}/out.toml)
+expect_refused("--moment-point: \"1,2\" is no point; accepted: x,y,z, three numbers of metres from -1 to 1, or com"
+  forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/out.toml --moment-point 1,2)
+expect_refused("--parameters: left.motor.resistance: not among those of ${SOURCE}/configs/identify/forces.toml; did you mean \"left.motor.resistance_ohm\"?"
+  forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/out.toml --parameters left.motor.resistance)
+expect_refused("${WORK}/still.csv: amplitude_V: column is missing; accepted: this column, or --amplitude"
+  kinematics ${WORK}/still.csv --vehicle ${nominal})
+if(EXISTS ${WORK}/out.toml)
+  message(SEND_ERROR "a refused run left a vehicle")
+endif()
+
+# ---- transitions

@@ -1,0 +1,102 @@
+// flappy-identify calibrate: are the intervals of a fit as wide as they should be? Fits noisy maps of a vehicle that is
+// known, and counts how often its parameters lie in their intervals.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+
+#include "command.hpp"
+#include "fit_options.hpp"
+#include "flappy/vehicle_file.hpp"
+#include "identify/force_sensor.hpp"
+#include "io/progress.hpp"
+#include "shared_options.hpp"
+
+namespace flappy::identify {
+namespace {
+
+struct Settings {
+  MapSource source;
+  FitSettings fit;
+  std::string truth, held_out;
+  unsigned seeds = 20;
+};
+
+Json run(const Settings& s) {
+  const auto began = std::chrono::steady_clock::now();
+  const model::Vehicle vehicle = s.source.read_vehicle();
+  model::Vehicle truth = model::read_vehicle(s.truth);
+  const FitConfig config = s.fit.read_config(vehicle);
+  const FitOptions options = s.fit.options(s.source.options(vehicle));
+  const std::vector<double*> true_values = fitted_values(config, truth);
+  const std::vector<sim::Input> held =
+      s.held_out.empty() ? std::vector<sim::Input>{} : read_inputs(s.held_out, vehicle.driver);
+  struct Count {
+    unsigned seen = 0, inside = 0;
+  };
+  std::vector<Count> counts(config.parameters.size());
+  double after = 0, held_error = 0;
+  io::stop_on_interrupt();
+  io::ProgressLine line("fitted");
+  unsigned done = 0;
+  for (unsigned seed = 1; seed <= s.seeds && !io::interrupted(); ++seed) {
+    line.show(static_cast<double>(seed - 1) / s.seeds);
+    const MeasuredMap measured = simulate_forces(truth, default_inputs(), {}, seed, options.map);
+    const ForceFit fit = fit_forces(vehicle, measured, config, options);
+    after = std::max(after, fit.after.total);
+    if (!held.empty()) {
+      const MeasuredMap other = simulate_forces(truth, held, {}, seed + 1000000, options.map);
+      held_error =
+          std::max(held_error,
+                   map_error(other.wrenches, force_map<double>(std::span(&fit.vehicle, 1), held, options.map)).total);
+    }
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      const FittedParameter& p = fit.parameters[i];
+      if (!p.seen) continue;
+      ++counts[i].seen;
+      if (p.low <= *true_values[i] && *true_values[i] <= p.high) ++counts[i].inside;
+    }
+    ++done;
+  }
+  line.clear();
+  unsigned seen = 0, inside = 0;
+  Json parameters = Json::array();
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    seen += counts[i].seen;
+    inside += counts[i].inside;
+    parameters.push_back({{"name", config.parameters[i].path}, {"seen", counts[i].seen}, {"inside", counts[i].inside}});
+    std::printf("%-42s seen in %3u of %u, inside its interval in %3u\n", config.parameters[i].path.c_str(),
+                counts[i].seen, done, counts[i].inside);
+  }
+  const double coverage = seen > 0 ? 100.0 * inside / seen : 0;
+  std::printf("%u noise seeds: %u of %u inside their 95 %% intervals, %.1f %%; total error at most %.3f %%", done,
+              inside, seen, coverage, after);
+  if (!held.empty()) std::printf(", held-out inputs at most %.3f %%", held_error);
+  std::printf("\n");
+  return {{"seeds", done},
+          {"seen", seen},
+          {"inside", inside},
+          {"coverage_percent", coverage},
+          {"total_error_after_worst", after},
+          {"heldout_error_worst", held.empty() ? Json(nullptr) : Json(held_error)},
+          {"parameters", parameters},
+          {"wall_s", std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count()}};
+}
+
+}  // namespace
+
+Command add_calibrate(CLI::App& program) {
+  const auto s = std::make_shared<Settings>();
+  CLI::App* app = program.add_subcommand("calibrate", "counts how often a fit's 95 % intervals hold the truth");
+  s->source.add(*app, "vehicle to start each fit from");
+  app->add_option("--truth", s->truth, "vehicle whose noisy maps are fitted")->required();
+  app->add_option("--seeds", s->seeds, "fits, each of noise of its own")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  app->add_option("--held-out-inputs", s->held_out, "table of inputs to judge each fit on");
+  s->fit.starts = 1;
+  s->fit.add(*app);
+  return {app, [s] { return run(*s); }};
+}
+
+}  // namespace flappy::identify

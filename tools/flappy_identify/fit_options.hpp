@@ -1,0 +1,24 @@
+// Options of a fit, for the subcommands that make one.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "identify/force_fit.hpp"
+
+namespace flappy::identify {
+
+struct FitSettings {
+  std::string method = "gn", config;
+  std::vector<std::string> parameters;
+  unsigned population = 200, generations = 200;
+  int starts = 3;
+  std::uint64_t seed = 1;
+
+  void add(CLI::App& app);
+  FitConfig read_config(const model::Vehicle& vehicle) const;
+  FitOptions options(const MapOptions& map) const;
+};
+
+}  // namespace flappy::identify

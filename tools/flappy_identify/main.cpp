@@ -1,0 +1,17 @@
+// flappy-identify: fits a vehicle to what was measured of it, and says how far measurement and model agree.
+#include "command.hpp"
+#include "io/program.hpp"
+
+int main(int argc, char** argv) {
+  using namespace flappy;
+  io::Program program("flappy-identify", "Fits a vehicle to measurements, and compares it with them.", {});
+  const std::vector<identify::Command> commands = {
+      identify::add_forces(program.app()),     identify::add_simulate_forces(program.app()),
+      identify::add_calibrate(program.app()),  identify::add_compare_map(program.app()),
+      identify::add_kinematics(program.app()), identify::add_transitions(program.app())};
+  program.app().require_subcommand(1);
+  return program.run(argc, argv, [&] {
+    for (const identify::Command& command : commands)
+      if (command.app->parsed()) program.write_json(command.run());
+  });
+}

@@ -1,0 +1,134 @@
+// flappy-identify transitions: the open-loop test of recorded flights.
+#include "identify/transitions.hpp"
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <numbers>
+
+#include "command.hpp"
+#include "flappy/vehicle_file.hpp"
+#include "io/sha256.hpp"
+
+namespace flappy::identify {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Request {
+  std::vector<std::string> flights;
+  std::string vehicle, csv;
+  bool truth = false;
+  TransitionOptions options;
+};
+
+/// Given, or of the name that the log has, in the log's folder or beside it.
+fs::path vehicle_path(const Request& request, const fs::path& folder, const flight::FlightHeader& header) {
+  if (!request.vehicle.empty()) return request.vehicle;
+  for (const fs::path& place : {folder / header.vehicle, folder / ".." / header.vehicle}) {
+    if (!fs::exists(place)) continue;
+    if (!header.vehicle_sha256.empty() && io::sha256(io::read_text(place)) != header.vehicle_sha256)
+      throw io::InputError(place.string() + ": is not the file that " + folder.string() +
+                           " was flown with (SHA-256); accepted: that file, or any by --vehicle");
+    return place;
+  }
+  throw io::InputError(folder.string() + ": its vehicle " + header.vehicle +
+                       " is neither in it nor beside it; accepted: one of these, or --vehicle");
+}
+
+/// As people read it: millimetres, degrees.
+struct Shown {
+  double scale;
+  const char* unit;
+};
+Shown shown(std::size_t state) {
+  if (state < 3) return {1e3, "mm"};
+  if (state < 6) return {180 / std::numbers::pi, "deg"};
+  return state < 9 ? Shown{1e3, "mm/s"} : Shown{1, "rad/s"};
+}
+
+void print(const Request& request, const TransitionReport& r, double wall_s) {
+  std::printf(
+      "%zu flights, %zu samples replayed of %zu (%zu too low, %zu where streams are missing), %zu diverged; %.2f s\n",
+      request.flights.size(), r.samples, r.recorded, r.low, r.not_covered, r.diverged, wall_s);
+  std::printf(request.options.source == Source::truth ? "from truth.csv: what is left is the vehicle's error alone\n"
+                                                      : "with what the sensors leave unknown of a start and an end: of "
+                                                        "a simulated flight, --truth leaves it out\n");
+  std::printf("  %-6s %11s  %25s  %33s\n", "", "range", "after one beat", "after two beats");
+  std::printf("  %-6s %11s", "state", "in a beat");
+  for (int beats = 1; beats <= 2; ++beats) std::printf(" %9s %7s %7s %7s", "median", "90 %", "median", "90 %");
+  std::printf("\n");
+  for (std::size_t k = 0; k < kStateNames.size(); ++k) {
+    const Shown s = shown(k);
+    const std::string name = kStateNames[k];
+    std::printf("  %-6s %6.2f %-5s", name.substr(0, name.find('_')).c_str(), s.scale * r.range[k], s.unit);
+    for (int beats = 1; beats <= 2; ++beats)
+      std::printf("  %8.3f %7.3f %5.1f %% %5.1f %%", s.scale * r.quantile(beats, 0.5, false)[k],
+                  s.scale * r.quantile(beats, 0.9, false)[k], 100 * r.quantile(beats, 0.5, true)[k],
+                  100 * r.quantile(beats, 0.9, true)[k]);
+    std::printf("\n");
+  }
+  std::printf(
+      "  paper  after one beat under 5 %%, angles under 1 deg, position about 1 mm; more in pitch and vx after two\n");
+}
+
+Json by_state(const StateVector& values) {
+  Json json;
+  for (std::size_t k = 0; k < values.size(); ++k) json[kStateNames[k]] = values[k];
+  return json;
+}
+
+Json run(const Request& request) {
+  const auto begin = std::chrono::steady_clock::now();
+  Transitions transitions(request.options);
+  for (const fs::path folder : request.flights) {
+    const flight::FlightLog log = flight::read_flight_log(folder);
+    transitions.add(folder, log, model::read_vehicle(vehicle_path(request, folder, log.header)));
+  }
+  const TransitionReport r = transitions.run();
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  print(request, r, wall_s);
+  if (!request.csv.empty()) io::write_atomically(request.csv, distribution_csv(r));
+  return {{"flights", request.flights.size()},
+          {"samples", r.samples},
+          {"recorded", r.recorded},
+          {"low", r.low},
+          {"not_covered", r.not_covered},
+          {"diverged", r.diverged},
+          {"from_truth", request.options.source == Source::truth},
+          {"range", by_state(r.range)},
+          {"error_1beat", by_state(r.quantile(1, 0.5, true))},
+          {"error_2beats", by_state(r.quantile(2, 0.5, true))},
+          {"error_1beat_p90", by_state(r.quantile(1, 0.9, true))},
+          {"error_2beats_p90", by_state(r.quantile(2, 0.9, true))},
+          {"absolute_1beat", by_state(r.quantile(1, 0.5, false))},
+          {"absolute_2beats", by_state(r.quantile(2, 0.5, false))},
+          {"absolute_1beat_p90", by_state(r.quantile(1, 0.9, false))},
+          {"absolute_2beats_p90", by_state(r.quantile(2, 0.9, false))},
+          {"wall_s", wall_s}};
+}
+
+}  // namespace
+
+Command add_transitions(CLI::App& program) {
+  CLI::App* sub =
+      program.add_subcommand("transitions", "replays recorded voltages from recorded states, one and two beats");
+  const auto request = std::make_shared<Request>();
+  sub->add_option("flight", request->flights, "folders of flight logs")->required();
+  sub->add_option("--vehicle", request->vehicle, "vehicle file; otherwise that of the log, in its folder or beside it");
+  CLI::Option* samples = sub->add_option("--samples", request->options.samples, "samples to start from, evenly chosen")
+                             ->check(CLI::Range(1, 10'000'000))
+                             ->capture_default_str();
+  sub->add_option("--every", request->options.every, "start from every so many samples instead")
+      ->check(CLI::Range(1, 10'000'000))
+      ->excludes(samples);
+  sub->add_option("--csv", request->csv, "write the distributions of all errors to this file");
+  sub->add_flag("--truth", request->truth,
+                "states and wings from truth.csv of simulated flights: the floor without sensors");
+  return {sub, [request] {
+            request->options.source = request->truth ? Source::truth : Source::sensors;
+            return run(*request);
+          }};
+}
+
+}  // namespace flappy::identify
