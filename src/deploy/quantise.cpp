@@ -78,11 +78,11 @@ QuantisedNetwork quantise(const PolicyNetwork& n, const std::vector<float>& obse
       const float* w = weights + o * (in + 1);
       double most = 0;
       for (std::size_t i = 0; i < in; ++i) most = std::max(most, std::abs(w[1 + i] * step[i]));
-      const double unit = most > 0 ? most / static_cast<double>(kLargest) : 1;  // of the sum
+      // of the sum: the weights fill 8 bits, and the bias stays what single precision holds
+      const double least = std::max(most / static_cast<double>(kLargest), std::abs(w[0]) * 0x1p-22);
+      const double unit = least > 0 ? least : 1;
       for (std::size_t i = 0; i < in; ++i) q.weights.push_back(rounded(static_cast<float>(w[1 + i] * step[i] / unit)));
-      const double bias = std::nearbyint(w[0] / unit);
-      if (!(std::abs(bias) < 0x1p23)) throw std::invalid_argument("a bias is too large for the weights beside it");
-      q.bias.push_back(static_cast<std::int32_t>(bias));
+      q.bias.push_back(static_cast<std::int32_t>(std::nearbyint(w[0] / unit)));
       q.multiplier.push_back(static_cast<float>(last || !n.relu ? unit : unit / next_step));
     }
     weights += out * (in + 1);

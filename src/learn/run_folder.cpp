@@ -1,8 +1,11 @@
 #include "learn/run_folder.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <nlohmann/json.hpp>
 
 #include "io/files.hpp"
+#include "io/sha256.hpp"
 #include "learn/train_config.hpp"
 
 namespace flappy::learn {
@@ -38,6 +41,10 @@ FinishedRun read_finished_run(const fs::path& folder) {
     run.info.task = json.at("task").get<std::string>();
     run.info.config_sha256 = json.at("config_sha256").get<std::string>();
     run.info.commit = json.at("commit").get<std::string>();
+    // both are written into C
+    if (!std::ranges::all_of(run.info.config_sha256 + run.info.commit,
+                             [](char c) { return std::isalnum(c) || c == '-'; }))
+      refuse(start, "has letters in its hashes that no hash has", "the file as flappy-train left it");
   });
   constexpr std::string_view kDirty = "-dirty";
   run.info.dirty = run.info.commit.ends_with(kDirty);
@@ -48,17 +55,21 @@ FinishedRun read_finished_run(const fs::path& folder) {
   read_json(end, [&](const Json& json) {
     if (json.at("stopped").get<bool>())
       refuse(folder, "is not finished: stopped at update " + json.at("updates").dump(), go_on);
+    const std::string sha256 = json.at("policy_sha256").get<std::string>();
+    if (io::sha256(io::read_text(actor)) != sha256)
+      refuse(actor, "is not the policy of the run",
+             "the one with SHA-256 " + sha256 + ", as " + end.string() + " says");
   });
 
-  const std::string task = flight::read_actor(actor).task;
+  const auto policy = std::make_shared<const flight::Actor>(flight::read_actor(actor));
   const TrainConfig config = read_train_config(folder / "config" / "train.toml");
   if (config.sha256 != run.info.config_sha256)
     refuse(folder / "config", "is not the configuration of the run: SHA-256 " + config.sha256,
            "the one with " + run.info.config_sha256 + ", as " + start.string() + " says");
   run.fly = flight::read_fly_config(folder / "config" / "fly.toml");
-  if (!run.fly.actor) refuse(folder / "config" / "fly.toml", "names no actor", "the run's best.json");
-  if (task != run.info.task || run.fly.fleet.task.name != run.info.task)
-    refuse(actor, "is of task " + task, "a policy of the run's task " + run.info.task);
+  run.fly.actor = policy;
+  if (policy->task != run.info.task || run.fly.fleet.task.name != run.info.task)
+    refuse(actor, "is of task " + policy->task, "a policy of the run's task " + run.info.task);
   return run;
 }
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "io/sha256.hpp"
 #include "learn/collector.hpp"
 #include "learn/evaluation.hpp"
 #include "learn/metrics.hpp"
@@ -365,7 +366,8 @@ nlohmann::ordered_json json_of(const TrainSummary& s) {
           {"best_success_rate", or_null(s.best_success)},
           {"best_update", s.best_update},
           {"stopped", s.stopped},
-          {"payload_sha256", s.payload_sha256}};
+          {"payload_sha256", s.payload_sha256},
+          {"policy_sha256", s.policy_sha256}};
 }
 
 TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
@@ -383,6 +385,7 @@ TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
                          options.folder.string());
   Trainer trainer(config, options);
   TrainSummary summary = trainer.run();
+  summary.policy_sha256 = io::sha256(io::read_text(options.folder / "best.json"));
   io::write_atomically(options.folder / "summary.json", json_of(summary).dump(2) + "\n");
   return summary;
 }

@@ -51,6 +51,7 @@ struct TrainSummary {
   /// vehicles succeeded. Nothing: not reached.
   std::optional<double> time_to_s[4];
   std::string payload_sha256;  ///< of the last checkpoint
+  std::string policy_sha256;   ///< of best.json
 };
 inline constexpr double kSuccessLevels[4] = {0.5, 0.8, 0.9, 0.95};
 

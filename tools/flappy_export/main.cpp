@@ -87,8 +87,16 @@ void make_folder(const fs::path& folder) {
   if (error) throw io::InputError(folder.string() + ": cannot be written: " + error.message());
 }
 
+/// All or nothing, but for a power failure between two renames; nothing of an earlier export stays beside it.
 void write_all(const fs::path& folder, const std::map<std::string, std::string>& files) {
-  for (const auto& [name, text] : files) io::write_atomically(folder / name, text);
+  std::vector<std::unique_ptr<io::AtomicFile>> written;
+  for (const auto& [name, text] : files) {
+    written.push_back(std::make_unique<io::AtomicFile>(folder / name));
+    written.back()->write(text);
+  }
+  for (const auto& file : written) file->commit();
+  for (const char* name : {"flappy_policy.h", "flappy_policy_int8.h", "flappy_controller.h", "policy.pt"})
+    if (!files.contains(name)) fs::remove(folder / name);
   io::sync_folder(folder);
 }
 
@@ -100,6 +108,9 @@ void run(const Request& request, const io::Program& program) {
   e.files["flappy_controller.h"] = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
   make_folder(request.out);
   e.flown = deploy::roll_out(run.fly, 0, kProofFlights);
+  if (!std::ranges::all_of(e.flown.action, [](float x) { return std::isfinite(x); }))
+    throw io::InputError((fs::path(request.run) / "best.json").string() +
+                         ": adds what is not finite in flight; accepted: a policy that flies");
   PolicyVectors tests = some_of(e.flown, kTestVectors);
   append(tests, deploy::corners(network, signals));
   Json json = {{"run", request.run}, {"out", request.out}, {"config_sha256", run.info.config_sha256}};
@@ -144,6 +155,8 @@ void run(const Request& request, const io::Program& program) {
         deploy::prove(folder, vectors, request.prove ? deploy::Reach::everywhere : deploy::Reach::here);
     std::printf("%s\n%s", name.c_str(), table_of(rows).c_str());
     json["parity"][name] = json_of(rows);
+    if (std::ranges::none_of(rows, &deploy::Parity::available))
+      throw io::InputError("cc: is not in PATH, and nothing is written that is not proven; accepted: a C compiler");
     if (std::ranges::any_of(rows, &deploy::Parity::failed))
       throw std::runtime_error(name + " does not compute what was trained; nothing is written");
     measure(name, folder, "flappy_policy.h");

@@ -1,6 +1,7 @@
 /* Every number here is an IEEE 754 single, every operation is rounded by itself, and flappy_fma() is rounded once: so the
    same bits come out everywhere. What would change them is switched off, or refused where it can be told. Under clang
-   keep -ffp-contract=fast away: no pragma overrides it and nothing tells it. */
+   keep -ffp-contract=fast away, and on other processors than x86 -funsafe-math-optimizations and its parts: no pragma
+   overrides them and nothing tells them. */
 #if !defined __GNUC__
 #error "gcc (from 9) or clang (from 11) is needed: the arithmetic of other compilers was not tried"
 #elif defined __FAST_MATH__ || defined __ASSOCIATIVE_MATH__ || defined __RECIPROCAL_MATH__
@@ -8,11 +9,14 @@
 #elif __FINITE_MATH_ONLY__
 #error "-ffinite-math-only lets NaN pass: leave it away"
 #elif __FLT_RADIX__ != 2 || __FLT_MANT_DIG__ != 24 || __FLT_MAX_EXP__ != 128 || __DBL_MANT_DIG__ != 53
-#error "float and double have to be IEEE 754 single and double: not -fshort-double, -fsingle-precision-constant"
+#error "float and double have to be IEEE 754 single and double"
 #elif __FLT_EVAL_METHOD__ != 0 && __FLT_EVAL_METHOD__ != 16
 #error "float is evaluated in a wider type: on 32-bit x86 use -msse2 -mfpmath=sse"
 #endif
 #if defined __clang__
+#if defined __x86_64__ || defined __i386__
+#pragma float_control(precise, on, push)
+#endif
 #pragma STDC FP_CONTRACT OFF
 #else
 #pragma GCC push_options
