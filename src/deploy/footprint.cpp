@@ -134,7 +134,8 @@ std::vector<Footprint> footprints(const fs::path& folder, const std::string& hea
   for (const std::string name : {"footprint.c", "memory.c"}) io::write_atomically(work / name, kEmbedded.at(name));
   const std::string stem = header.substr(0, header.rfind('.'));
   std::vector<std::pair<std::string, std::string>> functions;  // and the macro that makes footprint.c call it
-  if (stem == "flappy_policy") functions.emplace_back(stem + "_step", "FOOTPRINT_STEP=" + stem + "_step");
+  const std::string work_of = stem + (stem == "flappy_policy" ? "_step" : "_period");
+  functions.emplace_back(work_of, "FOOTPRINT_STEP=" + work_of);
   functions.emplace_back(stem + "_selftest", "FOOTPRINT_SELFTEST=" + stem + "_selftest");
 
   std::vector<Footprint> rows;

@@ -47,8 +47,8 @@ struct Footprint {
   bool failed() const { return available && !why_not.empty(); }
 };
 
-/// Of `folder`/`header`: the self-test, and the step where it is flappy_policy.h. The observation and the action are the
-/// caller's and not counted; padding between sections of RISC-V is.
+/// Of `folder`/`header`, flappy_policy.h or flappy_controller.h: its step, or all that it does in a control period, and its
+/// self-test. The observation and the action are the caller's and not counted; padding between sections of RISC-V is.
 std::vector<Footprint> footprints(const std::filesystem::path& folder, const std::string& header);
 
 /// For a terminal of 100 columns.

@@ -333,9 +333,7 @@ void Fleet<T>::observation(std::size_t i, T* row) const {
 template <class T>
 void Fleet<T>::true_observation(std::size_t i, T* row) const {
   const auto [f, lane] = storage_->at(i);
-  double exact[kMaxObservation];
-  storage_->observe_as(i, get<Truth<double>>(f.truth, lane), exact);
-  for (int k = 0; k < storage_->observed; ++k) row[k] = static_cast<T>(exact[k]);
+  storage_->observe_as(i, get<Truth<double>>(f.truth, lane), row);
 }
 template <class T>
 std::array<T, kActions> Fleet<T>::action(std::size_t i) const {
@@ -401,10 +399,10 @@ auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
   std::vector<MocapRecord> list;
   s.template for_samples<MocapSample>(i, s.mocap_tap, s.mocap_tap_size, &Slice::mocap,
                                       [&](double time_s, const auto& x) {
-                                        if (x.valid <= 0) return;
                                         list.push_back({time_s + s.options.sensors.mocap.latency_s,
                                                         {x.position_m.x, x.position_m.y, x.position_m.z},
-                                                        {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z}});
+                                                        {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z},
+                                                        x.valid > 0});
                                       });
   return list;
 }

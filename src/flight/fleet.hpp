@@ -131,10 +131,11 @@ class Fleet {
   };
   struct MocapRecord {
     double arrival_s, position_m[3], attitude[4];
+    bool valid;  // the tracker saw the flapper
   };
   void record(bool on);
   std::vector<ImuRecord> imu_samples(std::size_t i) const;
-  std::vector<MocapRecord> mocap_samples(std::size_t i) const;  ///< without the lost ones
+  std::vector<MocapRecord> mocap_samples(std::size_t i) const;
 
   /// All that changes in flight, for who keeps and restores it: then restored() must follow, with the control periods
   /// flown. Vehicles with effects keep some of it elsewhere.

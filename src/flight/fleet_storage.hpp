@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "flight/fleet.hpp"
+#include "flight/constants.hpp"
 #include "flight/flight_block.hpp"
 #include "sim/storage.hpp"
 
@@ -25,16 +25,6 @@ inline constexpr int kFlightRows = offsetof(FlightBlock<T>, flapper) / sizeof(T[
 template <class T, class B>
 auto rows_of(B& block) {
   return reinterpret_cast<std::conditional_t<std::is_const_v<B>, const T, T>(*)[kLanes<T>]>(&block);
-}
-
-/// The same numbers in another precision.
-template <class T, template <class> class S>
-S<T> rounded(const S<double>& from) {
-  static_assert(sizeof(S<T>) / sizeof(T) == sizeof(from) / sizeof(double));
-  S<T> to;
-  for (std::size_t i = 0; i < sizeof to / sizeof(T); ++i)
-    reinterpret_cast<T*>(&to)[i] = static_cast<T>(reinterpret_cast<const double*>(&from)[i]);
-  return to;
 }
 
 inline double square(double x) { return x * x; }
@@ -83,57 +73,24 @@ struct Fleet<T>::Storage {
   }
 
   void fill_plan() {
-    const Sensors& s = options.sensors;
-    const double gravity = options.batch.world.gravity_m_s2, period_s = period_steps * options.batch.step_s;
+    const FlightConstants k = flight_constants(options);
     plan.step = batch.storage().kernel;
     plan.seed = options.seed;
     plan.first_flapper = options.first_flapper;
-    plan.losses = s.mocap.loss_probability > 0;
-    const auto& at = s.imu.position_m;
-    plan.imu = rounded<T>(ImuConstants<double>{{at.x, at.y, at.z},
-                                               s.imu.gyro_noise_rad_s,
-                                               s.imu.accel_noise_m_s2,
-                                               low_pass_share(s.imu.low_pass_hz, 1 / s.imu.rate_hz),
-                                               gravity});
-    plan.mocap = rounded<T>(MocapConstants<double>{s.mocap.position_noise_m, s.mocap.attitude_noise_rad,
-                                                   s.mocap.loss_probability, 1 / s.mocap.loss_length});
-    const FusionNoise& f = s.fusion;
-    plan.fusion = rounded<T>(
-        FusionConstants<double>{square(s.imu.gyro_noise_rad_s) / s.imu.rate_hz + square(f.angle_drift_rad_sqrt_s),
-                                square(f.gyro_bias_drift_rad_s_sqrt_s),
-                                square(s.imu.accel_noise_m_s2) / s.imu.rate_hz + square(f.velocity_drift_m_s_sqrt_s),
-                                square(f.accel_bias_drift_m_s2_sqrt_s),
-                                square(s.mocap.attitude_noise_rad),
-                                square(s.mocap.position_noise_m),
-                                gravity,
-                                {at.x, at.y, at.z}});
-    Controller& c = options.controller;
-    const auto fill = [&](auto constants) {
-      constants.velocity_share = low_pass_share(c.velocity_low_pass_hz, period_s);
-      constants.rate_share = low_pass_share(c.body_rate_low_pass_hz, period_s);
-      constants.period_s = period_s;
-      constants.gravity_m_s2 = gravity;
-      return constants;
-    };
-    c.pid = fill(c.pid);
-    c.pid.per_period_Hz = 1 / period_s;
-    c.arc = fill(c.arc);
-    plan.controller = static_cast<int>(c.kind);
-    plan.pid = rounded<T>(c.pid);
-    plan.arc = rounded<T>(c.arc);
-    TaskConstants<double> task = options.task.constants;
-    task.tick_s = period_s;
-    // half-way between ticks, so that rounding cannot move an end by one
-    for (double* from : {&task.limits.time_s, &task.hand_back.at_s, &task.success.keep_from_s, &task.reward.until_s})
-      *from = (std::ceil(*from / period_s - 1e-6) - 0.5) * period_s;
-    for (double* after :
-         {&task.limits.faced_by_s, &task.limits.arrived_by_s, &task.success.by_s, &task.success.keep_until_s})
-      *after = (std::floor(*after / period_s + 1e-6) + 0.5) * period_s;
-    plan.task = rounded<T>(task);
+    plan.losses = k.mocap.loss_begins > 0;
+    plan.imu = rounded<T>(k.imu);
+    plan.mocap = rounded<T>(k.mocap);
+    plan.fusion = rounded<T>(k.fusion);
+    options.controller.pid = k.pid;
+    options.controller.arc = k.arc;
+    plan.controller = static_cast<int>(options.controller.kind);
+    plan.pid = rounded<T>(k.pid);
+    plan.arc = rounded<T>(k.arc);
+    plan.task = rounded<T>(k.task);
     plan.parts = options.task.parts;
     plan.hold = options.task.hold;
     observed = static_cast<int>(options.task.observation().size());
-    plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(period_s)};
+    plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(k.period_s)};
   }
 
   struct Place {
@@ -184,7 +141,7 @@ struct Fleet<T>::Storage {
   Snapshot<T> snapshot(std::size_t i, const Target& target);
   void start_lane(std::size_t i, std::uint32_t episode, const Truth<double>& truth);
   void show(std::size_t i);
-  void observe_as(std::size_t i, const Estimate<double>& x, double* row);
+  void observe_as(std::size_t i, const Estimate<double>& x, T* row);
   void start_fusion(std::size_t i, const Truth<double>& truth, sim::RandomKey key);
 };
 
@@ -217,22 +174,29 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
 template <class T>
 void Fleet<T>::Storage::show(std::size_t i) {
   const auto [f, lane] = at(i);
-  double row[kMaxObservation] = {};
+  T row[kMaxObservation] = {};
   observe_as(i, get<Estimate<double>>(f.estimate, lane), row);
-  for (int k = 0; k < kMaxObservation; ++k) f.observation[k][lane] = static_cast<T>(row[k]);
+  for (int k = 0; k < kMaxObservation; ++k) f.observation[k][lane] = row[k];
 }
 
+/// In the arithmetic of the lanes, to the bit.
 template <class T>
-void Fleet<T>::Storage::observe_as(std::size_t i, const Estimate<double>& x, double* row) {
+void Fleet<T>::Storage::observe_as(std::size_t i, const Estimate<double>& x, T* row) {
+  using L = model::Lanes<T, 1>;
   const auto [f, lane] = at(i);
-  const double phase = model::beat_fraction<double>(batch.storage().at(i).block.phase[lane]);
-  WingBeat<double> learnt{};
+  WingBeat<L> learnt{L(0), L(0), L(0), L(0)};
   if (options.controller.kind == Controller::Kind::pid)
-    learnt = trim(options.controller.pid, get<Pid<double>>(f.controller, lane));
+    learnt = trim(plan.pid, rounded<L>(get<Pid<double>>(f.controller, lane)));
   else if (options.controller.kind == Controller::Kind::arc)
-    learnt = trim(options.controller.arc, get<Arc<double>>(f.controller, lane));
-  observe(options.task.parts, x, setpoint(f, lane), get<Episode<double>>(f.episode, lane), phase,
-          f.tick[lane] * period_steps * options.batch.step_s, learnt, row);
+    learnt = trim(plan.arc, rounded<L>(get<Arc<double>>(f.controller, lane)));
+  std::uint32_t segment = f.segment[lane];
+  const auto ref = setpoint_at<L>(plan.path, &f.tick[lane], &segment);
+  const T fraction = model::beat_fraction<T>(batch.storage().at(i).block.phase[lane]);
+  const T time = static_cast<T>(f.tick[lane]) * plan.task.tick_s;
+  L seen[kMaxObservation];
+  const int rows = observe(options.task.parts, rounded<L>(x), ref, rounded<L>(get<Episode<double>>(f.episode, lane)),
+                           L::load(&fraction), L::load(&time), learnt, seen);
+  for (int k = 0; k < rows; ++k) row[k] = seen[k].raw[0];
 }
 
 template <class T>
@@ -367,13 +331,7 @@ void Fleet<T>::Storage::start_fusion(std::size_t i, const Truth<double>& truth, 
   fusion.horizon.position_m = add_scaled(imu.position_m, -schedule.horizon_age_s(), imu.velocity_m_s);
   fusion.now.position_m = add_scaled(imu.position_m, -schedule.present_age_s(), imu.velocity_m_s);
   fusion.body_rate_rad_s = x.body_rate_rad_s;
-  const auto& bias = s.imu.gyro_bias_sd_rad_s;
-  Covariance<double>& c = fusion.covariance;
-  c.angle = square(s.mocap.attitude_noise_rad);
-  c.gyro_bias = (square(bias.x) + square(bias.y) + square(bias.z)) / 3;
-  c.position = square(s.mocap.position_noise_m);
-  c.velocity = square(s.fusion.initial_velocity_sd_m_s);
-  c.accel_bias = square(s.fusion.accel_bias_sd_m_s2);
+  fusion.covariance = start_covariance(s);
   put(fusion, f.fusion, lane);
   const Vec3<double> weight = transpose_times(rotation_matrix(x.attitude), Vec3<double>{0, 0, gravity});
   std::vector<Advance> past = schedule.pending();

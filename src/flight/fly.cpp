@@ -97,7 +97,7 @@ class Part {
 
   void finish(FlyResult& result) {
     for (std::size_t i = 0; i < scores_.size(); ++i) {
-      result.hash = sim::mixed(result.hash, fleet_.hash(i, i + 1));
+      result.hash = sim::mixed(result.hash, fleet_.batch().hash(i, i + 1));
       for (std::size_t k = 0; k < result.ended.size(); ++k) result.ended[k] += ended_[i] >> k & 1;
       result.handed_back += fleet_.handed_back(i);
       const double captured_s = fleet_.captured_s(i);

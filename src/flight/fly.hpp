@@ -29,7 +29,7 @@ struct FlyResult {
   std::vector<double> capture_s;  ///< when each flight that captured its goal did so
   std::size_t successes = 0;      ///< captured it, kept it as the task asks, and did not crash
   std::size_t logs = 0;
-  std::uint64_t hash = 0;  ///< of all that moves, of each flight in order
+  std::uint64_t hash = 0;  ///< of how each vehicle moves, at the end, in order
   double wall_s = 0, scoring_s = 0, steps = 0;
 };
 

@@ -270,6 +270,7 @@ struct Recorder<T>::Storage {
       imu.accel_z_m_s2.push_back(s.accel_m_s2[2]);
     }
     for (const auto& s : fleet.mocap_samples(flapper)) {
+      if (!s.valid) continue;
       MocapStream& m = log.mocap;
       m.t_s.push_back(tidy(s.arrival_s));
       m.x_m.push_back(s.position_m[0]);

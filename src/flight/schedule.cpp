@@ -9,10 +9,13 @@ namespace {
 
 constexpr double kSame_s = 1e-9;  // times closer than this are the same
 
+/// In whole microseconds, as clocks on board count.
+double whole_us(double s) { return std::round(s * 1e6) / 1e6; }
+
 }  // namespace
 
 Schedule::Schedule(const Sensors& sensors, double step_s, int period_steps)
-    : sensors_(sensors), step_s_(step_s), lag_s_(low_pass_lag_s(sensors.imu)), period_steps_(period_steps) {
+    : sensors_(sensors), step_s_(step_s), lag_s_(whole_us(low_pass_lag_s(sensors.imu))), period_steps_(period_steps) {
   if (sensors.imu.rate_hz * step_s > 1 + 1e-9 || sensors.mocap.rate_hz * step_s > 1 + 1e-9)
     throw std::invalid_argument("a sensor's rate is above that of the physics steps");
   const double period_s = step_s * period_steps;

@@ -50,14 +50,15 @@ FinishedRun read_finished_run(const fs::path& folder) {
       refuse(folder, "is not finished: stopped at update " + json.at("updates").dump(), go_on);
   });
 
+  const std::string task = flight::read_actor(actor).task;
   const TrainConfig config = read_train_config(folder / "config" / "train.toml");
   if (config.sha256 != run.info.config_sha256)
     refuse(folder / "config", "is not the configuration of the run: SHA-256 " + config.sha256,
            "the one with " + run.info.config_sha256 + ", as " + start.string() + " says");
   run.fly = flight::read_fly_config(folder / "config" / "fly.toml");
   if (!run.fly.actor) refuse(folder / "config" / "fly.toml", "names no actor", "the run's best.json");
-  if (run.fly.actor->task != run.info.task || run.fly.fleet.task.name != run.info.task)
-    refuse(actor, "is of task " + run.fly.actor->task, "a policy of the run's task " + run.info.task);
+  if (task != run.info.task || run.fly.fleet.task.name != run.info.task)
+    refuse(actor, "is of task " + task, "a policy of the run's task " + run.info.task);
   return run;
 }
 

@@ -40,6 +40,7 @@ class Follower {
   explicit Follower(const Case& c) : c_(c), schedule_(sensors_of(c), kStep_s, kPeriodSteps) {
     const double share = c.low_pass_hz > 0 ? 1 - std::exp(-2 * M_PI * c.low_pass_hz / c.imu_hz) : 1;
     lag_s_ = (1 - share) / share / c.imu_hz;  // sum of n (1 - share)^n share, in samples
+    lag_s_ = std::round(lag_s_ * 1e6) / 1e6;  // clocks count microseconds
     horizon_s_ = present_s_ = covered_s_ = -lag_s_;
   }
 

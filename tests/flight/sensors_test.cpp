@@ -273,7 +273,7 @@ INSTANTIATE_TEST_SUITE_P(Sensors, Presets, testing::Values("paper", "code"));
 TEST(Mocap, LosesBurstsOfSamples) {
   constexpr std::size_t kCount = 512;
   constexpr double kBegins = 0.02, kLength = 5;
-  // one sample in each period: what is not there was lost
+  // one sample in each period
   const Sensors s = sensors("paper", {"mocap.rate_hz=500.0", "mocap.loss_probability=0.02", "mocap.loss_length=5.0"});
   Fleet<float> fleet = standing<float>(kCount, s);
   fleet.record(true);
@@ -283,7 +283,9 @@ TEST(Mocap, LosesBurstsOfSamples) {
   for (int period = 0; period < kPeriods; ++period) {
     fleet.step();
     for (std::size_t i = 0; i < kCount; ++i) {
-      const bool gone = fleet.mocap_samples(i).empty();
+      const auto poses = fleet.mocap_samples(i);
+      ASSERT_EQ(poses.size(), 1u);
+      const bool gone = !poses[0].valid;
       if (period >= kSettled) lost += gone;
       if (!gone && run[i] > 0) {  // bursts from their first sample to their last
         ++bursts, in_bursts += run[i];
@@ -309,7 +311,7 @@ TEST(Mocap, WithoutLossesSeesEverySample) {
   fleet.record(true);
   for (int period = 0; period < 200; ++period) {
     fleet.step();
-    for (std::size_t i = 0; i < 9; ++i) ASSERT_EQ(fleet.mocap_samples(i).size(), 1u);
+    for (std::size_t i = 0; i < 9; ++i) ASSERT_TRUE(fleet.mocap_samples(i).at(0).valid);
   }
 }
 

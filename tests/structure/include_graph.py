@@ -93,7 +93,7 @@ def self_test():
         ({"src/blind/x.cpp": '#include "model/a.hpp"\n'}, "blind may include flight, io, not model"),
         ({"src/deploy/x.cpp": '#include "learn/d.hpp"\n', "src/learn/d.hpp": ""}, "not learn"),
         ({"src/learn/x.cpp": '#include "deploy/d.hpp"\n', "src/deploy/d.hpp": '#include "flight/c.hpp"\n'}, None),
-        ({"src/deploy/x.cpp": '#include "sim/b.hpp"\n'}, "deploy may include flight, io, not sim"),
+        ({"src/deploy/x.cpp": '#include "gap/b.hpp"\n', "src/gap/b.hpp": ""}, "deploy may include flight, io, model, sim, not gap"),
         ({"src/flight/x.cpp": "#include <torch/script.h>\n"}, "LibTorch belongs to deploy"),
         ({"src/learn/x.cpp": "#include <torch/torch.h>\n"}, "LibTorch belongs to deploy"),
         ({"src/attic/x.cpp": ""}, "src/attic/x.cpp: no known room"),

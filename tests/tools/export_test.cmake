@@ -115,6 +115,11 @@ copy_run(bad)
 file(WRITE ${WORK}/file "")
 expect_refused("${WORK}/file/below: cannot be written: Not a directory" ${bad} --out ${WORK}/file/below)
 
+# a run whose feedback controller has no C
+execute_process(COMMAND ${TRAIN} ${SOURCE}/configs/train/escape.toml ${small} --set learn.updates=30 --set evaluate.every=30
+  --set checkpoint.every=30 --set controller=${SOURCE}/configs/controllers/arc.toml --out ${WORK}/arc OUTPUT_QUIET)
+refused("controller: is none that can be exported; accepted: kind = \"pid\"" ${WORK}/arc)
+
 # a policy whose numbers are none
 copy_run(bad)
 file(READ ${bad}/best.json text)

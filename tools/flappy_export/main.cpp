@@ -1,9 +1,12 @@
 // flappy-export: a finished run as TorchScript and as C headers that prove themselves.
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "deploy/controller_header.hpp"
 #include "deploy/policy_header.hpp"
 #include "deploy/proof.hpp"
 #include "deploy/rollout.hpp"
@@ -76,10 +79,15 @@ void print(const char* what, const OutputError& e, const std::vector<flight::Sig
 
 Json json_of(const OutputError& e) { return {{"largest", e.largest}, {"rms", e.rms}}; }
 
-void write_all(const fs::path& folder, const std::map<std::string, std::string>& files) {
+/// Before the work, which takes a while.
+void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
+  if (!error && access(folder.c_str(), W_OK) != 0) error = std::error_code(errno, std::generic_category());
   if (error) throw io::InputError(folder.string() + ": cannot be written: " + error.message());
+}
+
+void write_all(const fs::path& folder, const std::map<std::string, std::string>& files) {
   for (const auto& [name, text] : files) io::write_atomically(folder / name, text);
   io::sync_folder(folder);
 }
@@ -89,6 +97,8 @@ void run(const Request& request, const io::Program& program) {
   const deploy::PolicyNetwork network = deploy::network_of(run.fly);
   const auto signals = run.fly.fleet.task.observation();
   Export e;
+  e.files["flappy_controller.h"] = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
+  make_folder(request.out);
   e.flown = deploy::roll_out(run.fly, 0, kProofFlights);
   PolicyVectors tests = some_of(e.flown, kTestVectors);
   append(tests, deploy::corners(network, signals));
@@ -119,21 +129,26 @@ void run(const Request& request, const io::Program& program) {
     std::printf("policy.pt is not written: this build has no LibTorch\n");
   }
 
+  const auto measure = [&](const std::string& name, const fs::path& folder, const char* header) {
+    if (!request.prove) return;
+    const std::vector<deploy::Footprint> rows = deploy::footprints(folder, header);
+    std::printf("%s\n%s", name.c_str(), table_of(rows).c_str());
+    json["footprints"][name] = json_of(rows);
+  };
   for (const auto& [name, vectors] : e.proofs) {
     const fs::path folder = work / name.substr(0, name.find('.'));
     fs::create_directory(folder);
     io::write_atomically(folder / "flappy_policy.h", e.files[name]);
+    io::write_atomically(folder / "flappy_controller.h", e.files["flappy_controller.h"]);
     const std::vector<deploy::Parity> rows =
         deploy::prove(folder, vectors, request.prove ? deploy::Reach::everywhere : deploy::Reach::here);
     std::printf("%s\n%s", name.c_str(), table_of(rows).c_str());
     json["parity"][name] = json_of(rows);
     if (std::ranges::any_of(rows, &deploy::Parity::failed))
       throw std::runtime_error(name + " does not compute what was trained; nothing is written");
-    if (!request.prove) continue;
-    const std::vector<deploy::Footprint> prints = deploy::footprints(folder, "flappy_policy.h");
-    std::printf("%s", table_of(prints).c_str());
-    json["footprints"][name] = json_of(prints);
+    measure(name, folder, "flappy_policy.h");
   }
+  measure("flappy_controller.h", work / "flappy_policy", "flappy_controller.h");
   write_all(request.out, e.files);
   for (const auto& [name, text] : e.files)
     std::printf("%s: %zu bytes\n", (fs::path(request.out) / name).c_str(), text.size());

@@ -7,11 +7,11 @@ typedef union {
 } flappy_float;
 
 /* a b + c, rounded once. */
-static inline float flappy_fma(float a, float b, float c) {
 #if defined __OPTIMIZE__ && (defined __FMA__ || (defined __ARM_FEATURE_FMA && defined __ARM_FP) || defined __riscv_flen)
-  return __builtin_fmaf(a, b, c);
+static inline float flappy_fma(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
 #else
-  /* The product is exact in double. The sum is rounded to odd there, so that rounding it to float is the only rounding. */
+/* The product is exact in double. The sum is rounded to odd there, so that rounding it to float is the only rounding. */
+__attribute__((noinline, unused)) static float flappy_fma(float a, float b, float c) {
   union {
     double number;
     uint64_t bits;
@@ -23,8 +23,8 @@ static inline float flappy_fma(float a, float b, float c) {
   lost = (product - (sum.number - of_c)) + ((double)c - of_c);
   if ((lost > 0 || lost < 0) && (sum.bits & 1U) == 0U) sum.bits += (lost > 0) == (sum.number > 0) ? 1U : ~(uint64_t)0;
   return (float)sum.number;
-#endif
 }
+#endif
 
 static inline float flappy_min(float a, float b) { return a < b ? a : b; }
 static inline float flappy_max(float a, float b) { return a > b ? a : b; }

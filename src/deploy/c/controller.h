@@ -1,0 +1,253 @@
+/* Hand-back. */
+
+static inline int flappy_shorter(flappy_vector v, float limit) { return flappy_dot(v, v) < limit * limit; }
+
+/* Whether the policy's work is done. */
+static inline int flappy_controller_arrived(const flappy_controller *c, const flappy_setpoint *ref, float time_s) {
+  const flappy_controller_constants *k = &flappy_controller_k;
+  const flappy_matrix R = flappy_rotation_matrix(c->estimate.attitude);
+  const flappy_vector position = flappy_minus(c->estimate.position_m, ref->position_m);
+  const flappy_vector velocity = flappy_minus(c->estimate.velocity_m_s, ref->velocity_m_s);
+  const float facing = flappy_sum2(ref->heading.cos, R.x.x, ref->heading.sin, R.y.x);
+  const float aside = flappy_difference2(ref->heading.cos, R.y.x, ref->heading.sin, R.x.x);
+  const float heading_cos =
+      facing / flappy_sqrt(flappy_max(flappy_sum2(facing, facing, aside, aside), (float)1e-12));
+  const int there = position.x > k->hand_back_x_m && flappy_shorter(position, k->hand_back_distance_m) &&
+                    flappy_abs(velocity.x) < k->hand_back_speed_x_m_s &&
+                    flappy_shorter(velocity, k->hand_back_speed_m_s) && heading_cos > k->hand_back_heading_cos &&
+                    R.z.z > k->hand_back_tilt_cos &&
+                    flappy_shorter(c->estimate.body_rate_rad_s, k->hand_back_body_rate_rad_s);
+  return FLAPPY_CONTROLLER_HANDS_BACK && (there || time_s >= k->hand_back_at_s);
+}
+
+/* Interface. */
+
+/* False for NaN, infinity and what no sensor shows. */
+static inline int flappy_plausible(flappy_vector v, float limit) {
+  return flappy_abs(v.x) <= limit && flappy_abs(v.y) <= limit && flappy_abs(v.z) <= limit;
+}
+
+/* A sample of an instant that is after b, but not much after the last tick. */
+static inline int flappy_controller_timely(const flappy_controller *c, uint32_t taken_us, uint32_t b) {
+  return flappy_after(taken_us, b) && !flappy_after(taken_us, c->now_us + 100000U);
+}
+
+/* The set point now. */
+static inline flappy_setpoint flappy_controller_reference(const flappy_controller *c, uint32_t *segment) {
+  flappy_setpoint s;
+  if (!c->hovering) return flappy_controller_setpoint(c->tick, segment);
+  s.position_m = c->hover_m;
+  s.velocity_m_s = s.acceleration_m_s2 = flappy_vector_of(0.0F, 0.0F, 0.0F);
+  s.heading = c->hover_heading;
+  s.heading_rate_rad_s = 0.0F;
+  return s;
+}
+
+/* A new task: its clock is at 0 and the policy acts; what estimator and controller have learnt stays. */
+static inline void flappy_controller_begin(flappy_controller *c) {
+  uint32_t i;
+  c->tick = c->segment = 0;
+  c->handed_back = c->hovering = 0;
+  for (i = 0; i < 4; ++i) c->added[i] = flappy_controller_k.start_added[i];
+}
+
+/* Feedback alone, to where the task begins and to stay there until flappy_controller_begin(): so the trim is learnt, to
+   which a task that holds it adds no feedback until the hand-back. */
+static inline void flappy_controller_hover(flappy_controller *c) {
+  c->handed_back = c->hovering = 1;
+  c->hover_m = flappy_controller_k.start_position_m;
+  c->hover_heading = flappy_sin_cos_wide(flappy_controller_k.start_heading_rad);
+}
+
+/* Feedback alone, to stay at the present estimate. */
+static inline void flappy_controller_stay(flappy_controller *c) {
+  const flappy_matrix R = flappy_rotation_matrix(c->estimate.attitude);
+  c->handed_back = c->hovering = 1;
+  c->hover_m = c->estimate.position_m;
+  c->hover_heading = flappy_heading(&R);
+}
+
+/* At rest at this pose of the torso, integrators at 0; the task begins. */
+static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us, flappy_vector position_m,
+                                           flappy_quaternion attitude) {
+  const flappy_controller_constants *k = &flappy_controller_k;
+  const flappy_vector none = flappy_vector_of(0.0F, 0.0F, 0.0F);
+  const flappy_matrix R = flappy_rotation_matrix(attitude);
+  flappy_estimator *e = &c->estimator;
+  e->horizon.attitude = attitude;
+  e->horizon.position_m = flappy_plus(position_m, flappy_turn(&R, k->imu_position_m));
+  e->horizon.velocity_m_s = none;
+  e->now = e->horizon;
+  e->gyro_bias_rad_s = e->accel_bias_m_s2 = e->body_rate_rad_s = none;
+  e->angle = k->start_angle_rad2;
+  e->gyro_bias = k->start_gyro_bias_rad2_s2;
+  e->position = k->start_position_m2;
+  e->velocity = k->start_velocity_m2_s2;
+  e->accel_bias = k->start_accel_bias_m2_s4;
+  e->angle_bias = e->position_velocity = e->position_bias = e->velocity_bias = 0.0F;
+  e->gathered.turn_rad = e->gathered.velocity_m_s = none;
+  e->angle_innovation = e->position_innovation = 0.0F;
+  c->estimate.position_m = position_m;
+  c->estimate.attitude = attitude;
+  c->estimate.velocity_m_s = c->estimate.body_rate_rad_s = none;
+  c->pid.integral_x = c->pid.integral_y = c->pid.integral_z = 0.0F;
+  c->pid.integral_roll = c->pid.integral_pitch = c->pid.integral_yaw = 0.0F;
+  c->pid.velocity_m_s = c->pid.body_rate_rad_s = none;
+  c->input.amplitude_V = c->input.difference_V = c->input.bias_V = c->input.split_cycle = 0.0F;
+  c->phase = 0;
+  c->now_us = c->last_imu_us = c->pushed_us = now_us;
+  c->horizon_us = c->present_us = now_us - FLAPPY_CONTROLLER_IMU_LAG_US;
+  c->newest.turn_rad = c->newest.velocity_m_s = none;
+  c->newest_us = c->oldest = c->in_ring = c->in_frames = 0;
+  flappy_controller_hover(c);
+  flappy_controller_begin(c);
+}
+
+/* A sample of the IMU: its mean since the one before. It is dropped, and 0 returned, unless it is newer than that one, not
+   from the future, and below 2,000 rad/s and 1e6 m/s^2: NaN and infinity never get in. */
+static inline int flappy_controller_imu(flappy_controller *c, uint32_t taken_us, flappy_vector gyro_rad_s,
+                                        flappy_vector accel_m_s2) {
+  flappy_increment *sum = &c->estimator.gathered;
+  flappy_vector turn, gained;
+  float interval_s;
+  if (!flappy_controller_timely(c, taken_us, c->last_imu_us)) return 0;
+  if (!flappy_plausible(gyro_rad_s, 2000.0F) || !flappy_plausible(accel_m_s2, 1e6F)) return 0;
+  interval_s = flappy_seconds(taken_us - c->last_imu_us);
+  c->last_imu_us = taken_us;
+  turn = flappy_times(interval_s, gyro_rad_s);
+  gained = flappy_times(interval_s, accel_m_s2);
+  /* the later sample, seen from the frame of the earlier ones */
+  gained = flappy_plus(gained, flappy_times(0.5F, flappy_cross(sum->turn_rad, gained)));
+  sum->velocity_m_s = flappy_minus(flappy_plus(sum->velocity_m_s, gained),
+                                   flappy_times(0.5F, flappy_cross(turn, sum->velocity_m_s)));
+  sum->turn_rad = flappy_plus(sum->turn_rad, turn);
+  return 1;
+}
+
+/* A frame of the motion capture: the torso's pose when it was taken. A frame that is not valid (not tracked), or that is
+   not finite, moves the horizon and corrects nothing. It is dropped, and 0 returned, unless it is newer than the one before
+   and than the horizon, and not from the future. */
+static inline int flappy_controller_pose(flappy_controller *c, uint32_t taken_us, int valid, flappy_vector position_m,
+                                         flappy_quaternion attitude) {
+  flappy_frame *f = &c->frames[c->in_frames < FLAPPY_CONTROLLER_FRAMES ? c->in_frames : 0];
+  const uint32_t newest_us = c->in_frames > 0 ? c->frames[c->in_frames - 1].taken_us : c->horizon_us;
+  if (c->in_frames == FLAPPY_CONTROLLER_FRAMES || !flappy_controller_timely(c, taken_us, newest_us)) return 0;
+  if (!flappy_plausible(position_m, 20000.0F) || !(flappy_abs(attitude.w) <= 2.0F) ||
+      !flappy_plausible(flappy_vector_of(attitude.x, attitude.y, attitude.z), 2.0F)) {
+    valid = 0;
+    position_m = flappy_vector_of(0.0F, 0.0F, 0.0F);
+    attitude.w = 1.0F;
+    attitude.x = attitude.y = attitude.z = 0.0F;
+  }
+  f->position_m = position_m;
+  f->attitude = attitude;
+  f->valid = valid ? 1.0F : 0.0F;
+  f->taken_us = taken_us;
+  ++c->in_frames;
+  return 1;
+}
+
+/* End of a control period: estimate, set point, hand-back. Returns whether it is handed back. */
+static inline int flappy_controller_tick(flappy_controller *c, uint32_t now_us) {
+  flappy_setpoint ref;
+  c->now_us = now_us;
+  flappy_controller_estimate(c);
+  ++c->tick;
+  ref = flappy_controller_reference(c, &c->segment);
+  if (flappy_controller_arrived(c, &ref, (float)c->tick * flappy_controller_k.period_s)) c->handed_back = 1;
+  return c->handed_back;
+}
+
+static inline float *flappy_put(float *row, flappy_vector v) {
+  row[0] = v.x;
+  row[1] = v.y;
+  row[2] = v.z;
+  return row + 3;
+}
+static inline float *flappy_put4(float *row, float a, float b, float c, float d) {
+  row[0] = a;
+  row[1] = b;
+  row[2] = c;
+  row[3] = d;
+  return row + 4;
+}
+
+/* What the policy sees: the parts that its task shows, in this order. */
+static inline void flappy_controller_observe(const flappy_controller *c, float obs[FLAPPY_CONTROLLER_OBS]) {
+  const uint32_t parts = FLAPPY_CONTROLLER_PARTS;
+  const flappy_motion *x = &c->estimate;
+  const flappy_matrix R = flappy_rotation_matrix(x->attitude);
+  const flappy_wing_beat trim = flappy_pid_trim(&c->pid);
+  uint32_t segment = c->segment;
+  const flappy_setpoint ref = flappy_controller_reference(c, &segment);
+  const float cos = ref.heading.cos, sin = ref.heading.sin;
+  float *row = obs;
+  if (parts & 1U) row = flappy_put(flappy_put(flappy_put(row, R.x), R.y), R.z); /* rotation matrix */
+  if (parts & 2U) row = flappy_put(row, flappy_minus(x->position_m, ref.position_m));
+  if (parts & 4U) row = flappy_put(row, flappy_minus(x->velocity_m_s, ref.velocity_m_s));
+  if (parts & 8U) row = flappy_put(row, x->body_rate_rad_s);
+  if (parts & 16U) { /* phase of the wing beat */
+    const float fraction = flappy_beat_fraction(c->phase);
+    const flappy_sin_cos beat = flappy_sin_cos_pi(fraction + fraction);
+    *row++ = beat.sin;
+    *row++ = beat.cos;
+  }
+  if (parts & 32U) { /* heading error */
+    const flappy_sin_cos yaw = flappy_heading(&R);
+    *row++ = flappy_difference2(yaw.sin, cos, yaw.cos, sin);
+    *row++ = flappy_sum2(yaw.cos, cos, yaw.sin, sin);
+  }
+  if (parts & 64U) row = flappy_put4(row, c->added[0], c->added[1], c->added[2], c->added[3]);
+  if (parts & 128U) { /* attitude as seen from the heading of the set point */
+    const flappy_vector minus_x = flappy_vector_of(-R.x.x, -R.x.y, -R.x.z);
+    row = flappy_put(row, flappy_add_scaled(flappy_times(cos, R.x), sin, R.y));
+    row = flappy_put(row, flappy_add_scaled(flappy_times(cos, R.y), sin, minus_x));
+    row = flappy_put(row, R.z);
+  }
+  if (parts & 256U) *row++ = (float)c->tick * flappy_controller_k.period_s;
+  if (parts & 512U) row = flappy_put4(row, trim.amplitude_V, trim.difference_V, trim.bias_V, trim.split_cycle);
+  (void)row;
+}
+
+/* Whether the policy is to act now. */
+static inline int flappy_controller_policy_due(const flappy_controller *c) {
+  return !c->handed_back && c->tick % FLAPPY_CONTROLLER_HOLD == 0;
+}
+
+/* What the policy adds from now on until the hand-back; what is not finite adds nothing. */
+static inline void flappy_controller_act(flappy_controller *c, const float added[4]) {
+  uint32_t i;
+  for (i = 0; i < 4; ++i) c->added[i] = flappy_abs(added[i]) <= 1e6F ? added[i] : 0.0F;
+}
+
+/* Start of a control period: sets the inputs of the wing beat. */
+static inline void flappy_controller_steer(flappy_controller *c) {
+  const flappy_setpoint ref = flappy_controller_reference(c, &c->segment);
+  const flappy_pid before = c->pid;
+  flappy_wing_beat u = flappy_pid_control(&c->pid, &c->estimate, &ref);
+  if (FLAPPY_CONTROLLER_HOLDS_TRIM && !c->handed_back) {
+    const flappy_pid low_passed = c->pid;
+    u = flappy_pid_trim(&before);
+    c->pid = before;
+    c->pid.velocity_m_s = low_passed.velocity_m_s;
+    c->pid.body_rate_rad_s = low_passed.body_rate_rad_s;
+  }
+  c->input.amplitude_V = u.amplitude_V + (0.0F + (c->handed_back ? 0.0F : c->added[0]));
+  c->input.difference_V = u.difference_V + (0.0F + (c->handed_back ? 0.0F : c->added[1]));
+  c->input.bias_V = u.bias_V + (0.0F + (c->handed_back ? 0.0F : c->added[2]));
+  c->input.split_cycle = u.split_cycle + (0.0F + (c->handed_back ? 0.0F : c->added[3]));
+}
+
+/* Every FLAPPY_CONTROLLER_DRIVE_US: voltages that hold until the next call. */
+static inline void flappy_controller_drive(flappy_controller *c, float *left_V, float *right_V) {
+  const flappy_controller_constants *k = &flappy_controller_k;
+  const float fraction = flappy_beat_fraction(c->phase);
+  flappy_wing_beat u;
+  u.amplitude_V = flappy_clamp(c->input.amplitude_V, 0.0F, k->driver_amplitude_V);
+  u.difference_V = flappy_within(c->input.difference_V, k->driver_difference_V);
+  u.bias_V = flappy_within(c->input.bias_V, k->driver_bias_V);
+  u.split_cycle = flappy_within(c->input.split_cycle, k->driver_split_cycle);
+  *left_V = flappy_voltage(1.0F, &u, fraction, k->left_limit_V);
+  *right_V = flappy_voltage(-1.0F, &u, fraction, k->right_limit_V);
+  c->phase += FLAPPY_CONTROLLER_PHASE_STEP;
+}

@@ -1,0 +1,159 @@
+/* Set points: quintic segments in x, y, z and heading over whole control ticks; the last one holds for ever. */
+
+typedef struct {
+  flappy_vector position_m, velocity_m_s, acceleration_m_s2; /* in W */
+  flappy_sin_cos heading;
+  float heading_rate_rad_s;
+} flappy_setpoint;
+
+/* At a tick; segment: where it was last, moved on here. */
+static inline flappy_setpoint flappy_controller_setpoint(uint32_t tick, uint32_t *segment) {
+  const float *a;
+  float t, value[4], rate[4], bend[4];
+  flappy_setpoint s;
+  uint32_t i;
+  while (*segment + 1 < FLAPPY_CONTROLLER_SEGMENTS && tick >= (uint32_t)flappy_controller_path_start[*segment + 1])
+    ++*segment;
+  t = (float)(tick - (uint32_t)flappy_controller_path_start[*segment]) * flappy_controller_k.period_s;
+  a = flappy_controller_path + 24 * *segment;
+  for (i = 0; i < 4; ++i, a += 6) {
+    value[i] = flappy_fma(flappy_fma(flappy_fma(a[5], t, a[4]), t, a[3]), t, a[2]);
+    value[i] = flappy_fma(flappy_fma(value[i], t, a[1]), t, a[0]);
+    rate[i] = flappy_fma(flappy_fma(5.0F * a[5], t, 4.0F * a[4]), t, 3.0F * a[3]);
+    rate[i] = flappy_fma(flappy_fma(rate[i], t, 2.0F * a[2]), t, a[1]);
+    bend[i] = flappy_fma(flappy_fma(flappy_fma(20.0F * a[5], t, 12.0F * a[4]), t, 6.0F * a[3]), t, 2.0F * a[2]);
+  }
+  s.position_m = flappy_vector_of(value[0], value[1], value[2]);
+  s.velocity_m_s = flappy_vector_of(rate[0], rate[1], rate[2]);
+  s.acceleration_m_s2 = flappy_vector_of(bend[0], bend[1], bend[2]);
+  s.heading = flappy_sin_cos_wide(value[3]);
+  s.heading_rate_rad_s = rate[3];
+  return s;
+}
+
+/* Cascaded PID: position P -> velocity PID -> lean angles -> attitude PID -> wing beat. f: forward, l: left, in the
+   heading frame.
+     v_sp = v_ref + k (p_ref - p)             e = v_sp - v        a_f,l = a_ref + PID(e)       V_z = PID(e_z)
+     pitch_sp = atan(a_f / g)                 roll_sp = -atan(a_l cos(pitch_sp) / g)
+     V_d = PID(roll_sp - roll)                V_0 = PID(pitch_sp - pitch)      d_sigma = PID(yaw_ref - yaw)
+     V_amp = V_hover + V_z / (cos roll cos pitch)
+   Derivatives come from low-passed velocity and body rate. Integrators are clamped, and stand still while what they drive
+   is at its limit. */
+
+static inline float flappy_within(float x, float limit) { return flappy_clamp(x, -limit, limit); }
+
+/* +1 or -1 where x is at its limit, else 0. */
+static inline float flappy_saturation(float x, float low, float high) {
+  return x > high ? 1.0F : x < low ? -1.0F : 0.0F;
+}
+
+/* Adds to an integral in the unit of the output, within its limit, and not further out while blocked. */
+static inline float flappy_integrated(float integral, const flappy_gains *k, float error, float blocked_towards) {
+  const float step = (k->i * flappy_controller_k.period_s) * error;
+  const float moved = flappy_within(integral + step, k->integral_limit);
+  return step * blocked_towards > 0.0F ? integral : moved;
+}
+
+static inline float flappy_attitude_pid(const flappy_gains *k, float *integral, float error, float rate_error,
+                                        float limit) {
+  const float out = flappy_fma(k->p, error, flappy_fma(k->d, rate_error, *integral));
+  *integral = flappy_integrated(*integral, k, error, flappy_saturation(out, -limit, limit));
+  return flappy_within(out, limit);
+}
+
+static inline float flappy_forward(flappy_sin_cos yaw, float x, float y) { return flappy_sum2(yaw.cos, x, yaw.sin, y); }
+static inline float flappy_left(flappy_sin_cos yaw, float x, float y) {
+  return flappy_difference2(yaw.cos, y, yaw.sin, x);
+}
+
+static inline float flappy_velocity_pid(const flappy_gains *k, float error, float slope, float sum) {
+  return flappy_fma(k->p, error, flappy_fma(k->d, slope, sum));
+}
+
+static inline flappy_wing_beat flappy_pid_control(flappy_pid *m, const flappy_motion *x, const flappy_setpoint *ref) {
+  const flappy_controller_constants *k = &flappy_controller_k;
+  const flappy_matrix R = flappy_rotation_matrix(x->attitude);
+  const flappy_sin_cos yaw = flappy_heading(&R);
+  const flappy_vector before = m->velocity_m_s, way = flappy_minus(ref->position_m, x->position_m);
+  const flappy_vector wanted = flappy_vector_of(
+      flappy_within(flappy_fma(k->position_xy_1_s, way.x, ref->velocity_m_s.x), k->speed_limit_m_s),
+      flappy_within(flappy_fma(k->position_xy_1_s, way.y, ref->velocity_m_s.y), k->speed_limit_m_s),
+      flappy_within(flappy_fma(k->position_z_1_s, way.z, ref->velocity_m_s.z), k->climb_limit_m_s));
+  const float a_most = k->acceleration_limit_m_s2, g = k->gravity_m_s2;
+  flappy_vector slope, error, w;
+  flappy_wing_beat u;
+  float sum_f, sum_l, error_f, error_l, a_f, a_l, pitch_for_a, pitch_wanted, roll_for_a, roll_wanted, blocked_f, blocked_l;
+  float step_f, step_l, roll, pitch, yaw_error, climb, lift;
+
+  /* position, velocity, acceleration */
+  m->velocity_m_s = flappy_add_scaled(before, k->velocity_share, flappy_minus(x->velocity_m_s, before));
+  slope = flappy_times(k->per_period_Hz, flappy_minus(before, m->velocity_m_s)); /* of the error */
+  error = flappy_minus(wanted, m->velocity_m_s);
+  sum_f = flappy_forward(yaw, m->integral_x, m->integral_y);
+  sum_l = flappy_left(yaw, m->integral_x, m->integral_y);
+  error_f = flappy_forward(yaw, error.x, error.y);
+  error_l = flappy_left(yaw, error.x, error.y);
+  a_f = flappy_velocity_pid(&k->forward, error_f, flappy_forward(yaw, slope.x, slope.y),
+                            sum_f + flappy_forward(yaw, ref->acceleration_m_s2.x, ref->acceleration_m_s2.y));
+  a_l = flappy_velocity_pid(&k->left, error_l, flappy_left(yaw, slope.x, slope.y),
+                            sum_l + flappy_left(yaw, ref->acceleration_m_s2.x, ref->acceleration_m_s2.y));
+
+  /* lean */
+  pitch_for_a = flappy_atan2(flappy_within(a_f, a_most), g);
+  pitch_wanted = flappy_within(pitch_for_a, k->pitch_limit_rad);
+  roll_for_a = -flappy_atan2(flappy_within(a_l, a_most) * flappy_sin_cos_of(pitch_wanted).cos, g);
+  roll_wanted = flappy_within(roll_for_a, k->roll_limit_rad);
+  blocked_f = flappy_saturation(a_f, -a_most, a_most) +
+              flappy_saturation(pitch_for_a, -k->pitch_limit_rad, k->pitch_limit_rad);
+  blocked_l = flappy_saturation(a_l, -a_most, a_most) -
+              flappy_saturation(roll_for_a, -k->roll_limit_rad, k->roll_limit_rad);
+  step_f = flappy_integrated(sum_f, &k->forward, error_f, blocked_f) - sum_f;
+  step_l = flappy_integrated(sum_l, &k->left, error_l, blocked_l) - sum_l;
+  m->integral_x += flappy_difference2(yaw.cos, step_f, yaw.sin, step_l);
+  m->integral_y += flappy_sum2(yaw.sin, step_f, yaw.cos, step_l);
+  roll = flappy_atan2(R.z.y, R.z.z);
+  pitch = -flappy_asin(R.z.x);
+  yaw_error = flappy_atan2(flappy_difference2(ref->heading.sin, yaw.cos, ref->heading.cos, yaw.sin),
+                           flappy_sum2(ref->heading.cos, yaw.cos, ref->heading.sin, yaw.sin));
+
+  /* wing beat */
+  m->body_rate_rad_s = flappy_add_scaled(m->body_rate_rad_s, k->rate_share,
+                                         flappy_minus(x->body_rate_rad_s, m->body_rate_rad_s));
+  w = m->body_rate_rad_s;
+  u.difference_V = flappy_attitude_pid(&k->roll, &m->integral_roll, roll_wanted - roll, -w.x, k->difference_limit_V);
+  u.bias_V = flappy_attitude_pid(&k->pitch, &m->integral_pitch, pitch_wanted - pitch, -w.y, k->bias_limit_V);
+  u.split_cycle = flappy_attitude_pid(&k->yaw, &m->integral_yaw, flappy_within(yaw_error, k->yaw_error_limit_rad),
+                                      ref->heading_rate_rad_s - w.z, k->split_cycle_limit);
+
+  /* climb */
+  climb = flappy_velocity_pid(&k->up, error.z, slope.z, m->integral_z);
+  lift = climb / flappy_max(R.z.z, 0.5F); /* cos roll cos pitch */
+  m->integral_z = flappy_integrated(m->integral_z, &k->up, error.z, flappy_saturation(lift, k->lower_V, k->upper_V));
+  u.amplitude_V = k->hover_V + flappy_clamp(lift, k->lower_V, k->upper_V);
+  return u;
+}
+
+/* The inputs that its integrators have learnt: those of a settled vehicle. */
+static inline flappy_wing_beat flappy_pid_trim(const flappy_pid *m) {
+  flappy_wing_beat u;
+  u.amplitude_V = flappy_controller_k.hover_V + m->integral_z;
+  u.difference_V = m->integral_roll;
+  u.bias_V = m->integral_pitch;
+  u.split_cycle = m->integral_yaw;
+  return u;
+}
+
+/* Driver. Within a beat of fraction t in [0, 1):
+     V = A cos(pi t / s) + V_0              for t < s
+     V = A cos(pi (t - 1) / (1 - s)) + V_0  after
+     left:  A = V_amp + V_d, s = 0.5 - d_sigma      right: A = V_amp - V_d, s = 0.5 + d_sigma */
+static inline float flappy_voltage(float side, const flappy_wing_beat *u, float fraction, float limit) {
+  const float s = 0.5F - side * u->split_cycle;
+  const float t = fraction < 0.0F ? fraction + 1.0F : fraction;
+  const float x = t < s ? t / s : (t - 1.0F) / (1.0F - s);
+  const float amplitude = flappy_fma(side, u->difference_V, u->amplitude_V);
+  return flappy_within(flappy_fma(amplitude, flappy_cos_pi(x), u->bias_V), limit);
+}
+
+/* Of the beat, in [-1/2, 1/2). */
+static inline float flappy_beat_fraction(uint32_t phase) { return (float)(int32_t)phase * 0x1p-32F; }

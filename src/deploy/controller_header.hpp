@@ -1,0 +1,13 @@
+// The estimator and feedback controller of a run as one header in C99 that tests itself.
+#pragma once
+
+#include "deploy/contract.hpp"
+#include "deploy/controller_trace.hpp"
+
+namespace flappy::deploy {
+
+/// Text of flappy_controller.h: the same bytes for the same arguments. io::InputError where the controller is none that can
+/// be exported, or a period is no whole number of microseconds.
+std::string controller_header(const flight::FlyConfig& config, const RunInfo& run, const ControllerTrace& trace);
+
+}  // namespace flappy::deploy

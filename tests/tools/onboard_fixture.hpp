@@ -1,0 +1,141 @@
+// The onboard loop around the headers of an escape, compiled on the spot.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "deploy/board.hpp"
+#include "deploy/controller_header.hpp"
+#include "deploy/policy_header.hpp"
+#include "deploy/rollout.hpp"
+#include "tools/onboard_loop.hpp"
+
+namespace flappy::deploy {
+
+using flight::FlyConfig;
+using flight::Folder;
+using flight::source_path;
+using Words = std::vector<std::string>;
+
+/// Keeps roll, pitch and height much as the feedback would, besides small weights of everything it sees.
+inline std::shared_ptr<const flight::Actor> upright_actor(const flight::Task& task) {
+  flight::Actor a;
+  a.task = task.name;
+  std::mt19937 random(3);
+  for (const auto& s : task.observation()) a.observation.push_back(s.name);
+  for (const auto& s : task.action()) a.action.push_back(s.name);
+  a.widths = {static_cast<int>(a.observation.size()), flight::kActions};
+  a.mean.assign(a.observation.size(), 0);
+  a.scale.assign(a.observation.size(), 1);
+  a.clip = 100;
+  const double none[] = {-0.235, 0, 0, 0};  // what adds nothing, of -5 to 8 V for the amplitude
+  for (int out = 0; out < flight::kActions; ++out) {
+    a.weights.push_back(none[out]);
+    for (const std::string& name : a.observation) {
+      double w = (name.starts_with("trim") ? 0.0002 : 0.005) * (static_cast<double>(random()) / 0x1p31 - 1);
+      if (out == 0 && name == "z_error") w = -15 / 6.5;
+      if (out == 0 && name == "z_velocity") w = -4 / 6.5;
+      if (out == 1 && name == "goal_R_zy") w = -16.7 / 3;
+      if (out == 1 && name == "roll_rate") w = -0.708 / 3;
+      if (out == 2 && name == "goal_R_zx") w = 14.9 / 3.5;
+      if (out == 2 && name == "pitch_rate") w = -0.319 / 3.5;
+      a.weights.push_back(w);
+    }
+  }
+  return std::make_shared<const flight::Actor>(a);
+}
+
+/// A short way, which the feedback can go if the policy does not.
+inline const Words kShort = {"task.start.position_m.x=-0.05", "task.start.x_low_m=-0.1", "task.start.x_high_m=0.1",
+                             "task.start.rotation_rad.z=0.1", "task.hand_back.distance_m=0.01"};
+
+inline FlyConfig escape(const Words& overrides = kShort) {
+  FlyConfig c = flight::read_fly_config(source_path("configs/fly/escape.toml"), overrides);
+  c.actor = upright_actor(c.fleet.task);
+  return c;
+}
+
+inline FlyConfig of_nominal(FlyConfig config) {
+  config.randomisation.reset();
+  return config;
+}
+
+inline const RunInfo kRun{std::string(64, 'a'), "0123456789ab", false, "escape"};
+
+inline std::string policy_text(const FlyConfig& config) {
+  const PolicyNetwork network = network_of(config);
+  PolicyVectors v = some_of(roll_out(config, 0, 4), 20);
+  append(v, corners(network, config.fleet.task.observation()));
+  v.action = evaluate(network, v.observation);
+  return policy_header(config, kRun, network, v);
+}
+
+inline std::string controller_text(const FlyConfig& config) {
+  return controller_header(config, kRun, record_controller(config));
+}
+
+struct Headers {
+  std::string policy, controller;
+};
+inline const Headers& escape_headers() {
+  static const Headers headers{policy_text(escape()), controller_text(escape())};
+  return headers;
+}
+
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos) throw std::runtime_error("nowhere: " + from);
+  return text.replace(at, from.size(), to);
+}
+
+/// The loop compiled around headers.
+class Loop {
+ public:
+  explicit Loop(const Headers& headers) {
+    folder_.write("flappy_policy.h", headers.policy);
+    folder_.write("flappy_controller.h", headers.controller);
+    write_board(folder_ / "");
+  }
+  /// Of this machine; the complaints of the compiler.
+  std::string build(const std::string& compiler, const Words& options = {"-O1"}) {
+    Words command = {compiler};
+    append(command, strict());
+    append(command, options);
+    append(command, sources());
+    append(command, {folder_ / "board_host.c", "-o", folder_ / "loop"});
+    return run_limited(command).err;
+  }
+  std::string build_for_board(const Words& options = {"-O2"}) {
+    Words all = strict();
+    append(all, options);
+    std::vector<std::filesystem::path> list;
+    for (const std::string& s : sources()) list.emplace_back(s);
+    return run_limited(board_build(folder_ / "", list, all, folder_ / "loop.elf")).err;
+  }
+  Words program() const { return {folder_ / "loop"}; }
+  Words board() const { return board_run(folder_ / "loop.elf", false); }
+
+ private:
+  Words strict() const {
+    Words options = {"-std=c99"};
+    append(options, strict_options({folder_ / "", source_path("tools/onboard")}));
+    return options;
+  }
+  static Words sources() {
+    const std::string at = source_path("tools/onboard/");
+    return {at + "main.c", at + "onboard.c", at + "hal_simulated.c"};
+  }
+  Folder folder_;
+};
+
+/// The escape's loop on this machine, once.
+inline const Words& escape_loop() {
+  static Loop loop(escape_headers());
+  static const std::string complaints = loop.build("gcc", {"-O2"});
+  if (!complaints.empty()) throw std::runtime_error(complaints);
+  static const Words program = loop.program();
+  return program;
+}
+
+}  // namespace flappy::deploy

@@ -1,0 +1,162 @@
+// The onboard loop in the simulator: its flapper moves as one that the lanes fly, to the bit.
+#include <cstddef>
+
+#include "flight/constants.hpp"
+#include "sim/storage.hpp"
+#include "tools/onboard_fixture.hpp"
+
+namespace flappy::deploy {
+namespace {
+
+using flight::Fleet;
+using flight::FlightBlock;
+
+// A flapper that flies by itself.
+
+constexpr std::uint32_t kHoverTick = 1000000;  // of a path that begins with the goal and never gets there by itself
+
+/// The escape with the place where it begins as a set point of its own.
+flight::FleetOptions with_hover(const FlyConfig& config, std::uint32_t flapper) {
+  flight::FleetOptions o = LedFlight::with_number(config.fleet, flapper);
+  flight::Segment<double> hover{kHoverTick, {}};
+  for (int i = 0; i < 3; ++i) hover.coefficients[i][0] = o.task.start.position_m[i].centre;
+  hover.coefficients[3][0] = o.task.start.rotation_rad[2].centre;
+  o.task.path.push_back(hover);
+  return o;
+}
+
+FlightBlock<float>& block_of(Fleet<float>& fleet) {
+  return *reinterpret_cast<FlightBlock<float>*>(fleet.memory()[1].data());
+}
+
+class OwnFlight {
+  using L = model::Lanes<float, 1>;
+  template <template <class> class S>
+  static S<L> lanes_of(const float (*rows)[flight::kLanes<float>]) {
+    return flight::rounded<L>(sim::get<S<double>>(rows, 0));
+  }
+
+ public:
+  OwnFlight(const FlyConfig& config, std::uint32_t flapper)
+      : fleet_(1, config.vehicle_of(flapper), with_hover(config, flapper)) {
+    LedFlight::place(fleet_, config);
+    fleet_.set_actor(config.actor);
+    FlightBlock<float>& f = block_of(fleet_);
+    auto estimate = sim::get<flight::Estimate<double>>(f.estimate, 0);
+    estimate.velocity_m_s = estimate.body_rate_rad_s = {0, 0, 0};  // as an estimator assumes that sees the first pose
+    sim::put(estimate, f.estimate, 0);
+    auto fusion = sim::get<flight::Fusion<double>>(f.fusion, 0);
+    fusion.horizon.velocity_m_s = fusion.now.velocity_m_s = {0, 0, 0};
+    sim::put(fusion, f.fusion, 0);
+    for (auto& row : f.controller) row[0] = 0;
+    f.tick[0] = kHoverTick;
+    set_handed_back(true);
+  }
+  /// The manoeuvre, from now on.
+  void begin() {
+    FlightBlock<float>& f = block_of(fleet_);
+    const flight::Task& task = fleet_.options().task;
+    f.tick[0] = f.segment[0] = 0;
+    set_handed_back(false);
+    const double middle[flight::kActions] = {};
+    fleet_.set_action(0, middle);
+    // what the end of the period before would have shown
+    flight::Segment<float> goal{0, {}};
+    for (int i = 0; i < 4; ++i)
+      for (int k = 0; k < 6; ++k) goal.coefficients[i][k] = static_cast<float>(task.path[0].coefficients[i][k]);
+    const flight::PathView<float> path{&goal, 1, static_cast<float>(fleet_.period_s())};
+    const auto ref = flight::setpoint_at<L>(path, f.tick, f.segment);
+    const auto pid = flight::rounded<float>(flight::flight_constants(fleet_.options()).pid);
+    L row[flight::kMaxObservation];
+    const int rows =
+        flight::observe(task.parts, lanes_of<flight::Estimate>(f.estimate), ref, lanes_of<flight::Episode>(f.episode),
+                        L(model::beat_fraction<float>(fleet_.snapshot(0).phase)), L(0),
+                        flight::trim(pid, lanes_of<flight::Pid>(f.controller)), row);
+    for (int i = 0; i < rows; ++i) f.observation[i][0] = row[i].raw[0];
+  }
+  Fleet<float>& fleet() { return fleet_; }
+
+ private:
+  void set_handed_back(bool to) {
+    FlightBlock<float>& f = block_of(fleet_);
+    auto episode = sim::get<flight::Episode<double>>(f.episode, 0);
+    episode.handed_back = to;
+    sim::put(episode, f.episode, 0);
+  }
+  Fleet<float> fleet_;
+};
+
+void fly_as_the_lanes(const FlyConfig& config, std::uint32_t flapper, const Words& program, const Script& script = {}) {
+  OwnFlight own(config, flapper);
+  LedFlight led(config, flapper, program);
+  for (const loop_output& said : led.before()) {
+    ASSERT_EQ(said.state, kWaiting);
+    for (std::uint32_t d = 0; d < said.drive_count; ++d) ASSERT_EQ(said.volts[d][0], 0);
+  }
+  int acted = 0;
+  while (led.period() < script.periods) {
+    const int period = led.period();
+    if (period == script.manoeuvre) own.begin();
+    ASSERT_TRUE(led.step(script)) << "voltages of period " << period;
+    own.fleet().step();
+    const auto is = led.fleet().snapshot(0), should_be = own.fleet().snapshot(0);
+    ASSERT_EQ(is.phase, should_be.phase);
+    for (std::size_t r = 0; r < is.body.size(); ++r)
+      ASSERT_EQ(std::bit_cast<std::uint32_t>(is.body[r]), std::bit_cast<std::uint32_t>(should_be.body[r]))
+          << "row " << r << " of the body, period " << period << ", flapper " << flapper << ": " << is.body[r]
+          << ", not " << should_be.body[r];
+    acted += led.said().state == kActing;
+  }
+  EXPECT_EQ(acted, 175);
+  EXPECT_EQ(led.said().state, kReturned);
+  EXPECT_EQ(led.said().flags, kHandedBack);
+  EXPECT_EQ(led.program().finish(), 0);
+  if (!config.randomisation) EXPECT_LT(led.distance_m(0), 0.05) << "of the goal";
+}
+
+TEST(Onboard, FliesAsTheLanesDo) {
+  const FlyConfig config = escape(), nominal = of_nominal(config);
+  fly_as_the_lanes(nominal, 0, escape_loop());
+  for (std::uint32_t flapper = 0; flapper < 3; ++flapper) fly_as_the_lanes(config, flapper, escape_loop());
+}
+
+TEST(Onboard, FliesAnyPolicyAsTheLanesDo) {
+  // with its turn, several samples in a control period, and a tracker that does not always see
+  FlyConfig config = escape({"sensors.mocap.loss_probability=0.1", "sensors.mocap.loss_length=1.5",
+                             "sensors.imu.rate_hz=1000.0", "sensors.mocap.rate_hz=750.0"});
+  flight::Actor a = *config.actor;
+  a.widths = {static_cast<int>(a.observation.size()), 16, 16, flight::kActions};
+  a.hidden = flight::Activation::relu;
+  std::mt19937 random(7);
+  a.weights.clear();
+  for (std::size_t i = 0; i < flight::weight_count(a.widths); ++i)
+    a.weights.push_back(0.6 * (static_cast<double>(random()) / 0x1p31 - 1));
+  config.actor = std::make_shared<const flight::Actor>(a);
+  Loop loop({policy_text(config), controller_text(config)});
+  ASSERT_EQ(loop.build("gcc"), "");
+  for (std::uint32_t flapper = 0; flapper < 3; ++flapper) fly_as_the_lanes(config, flapper, loop.program());
+}
+
+TEST(Onboard, IsTheSameFromOtherCompilers) {
+  Loop loop(escape_headers());
+  for (const char* level : {"-O0", "-O3"}) {
+    ASSERT_EQ(loop.build("gcc", {level}), "");
+    fly_as_the_lanes(escape(), 5, loop.program());
+  }
+  if (!in_path("clang")) GTEST_SKIP() << "not installed: clang";
+  ASSERT_EQ(loop.build("clang"), "");
+  fly_as_the_lanes(escape(), 5, loop.program());
+}
+
+TEST(Onboard, FliesOnTheBoardAsTheLanesDo) {
+  if (const std::string missing = board_missing(); !missing.empty()) GTEST_SKIP() << missing;
+  Loop loop(escape_headers());
+  ASSERT_EQ(loop.build_for_board(), "");
+  Script script;  // bytes are slow there
+  script.manoeuvre = 500;
+  script.periods = 800;
+  fly_as_the_lanes(of_nominal(escape()), 0, loop.board(), script);
+}
+
+}  // namespace
+}  // namespace flappy::deploy

@@ -1,0 +1,32 @@
+/* What the simulator and the loop tell each other, in lock-step: the simulator sends a loop_input; the loop runs until
+   until_us on its clock, answers with a loop_output, and waits for the next one. Both are of one size, all members of four
+   bytes, lowest first, so there is no padding. The loop ends with the input, or upon wish = -1. */
+#ifndef HAL_SIMULATED
+#define HAL_SIMULATED 1
+
+#include <stdint.h>
+
+enum { LOOP_IMU = 4, LOOP_POSES = 2, LOOP_DRIVES = 4 };
+
+typedef struct {
+  uint32_t now_us, until_us; /* now: later than the until before where the loop was late */
+  int32_t wish;              /* an onboard_wish */
+  uint32_t imu_count, pose_count;
+  struct {
+    uint32_t taken_us;
+    float gyro_rad_s[3], accel_m_s2[3];
+  } imu[LOOP_IMU];
+  struct {
+    uint32_t taken_us, valid;
+    float position_m[3], attitude[4];
+  } pose[LOOP_POSES];
+} loop_input;
+
+typedef struct {
+  uint32_t state, flags; /* an onboard_state, and what has happened */
+  float input[4];        /* of the wing beat, as of the last tick: V, V, V, split cycle; 0 with the motors off */
+  uint32_t drive_count;
+  float volts[LOOP_DRIVES][2]; /* left, right; each until the next */
+} loop_output;
+
+#endif

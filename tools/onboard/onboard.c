@@ -1,0 +1,156 @@
+#include "onboard.h"
+
+int onboard_due(uint32_t due_us, uint32_t now_us) { return (int32_t)(now_us - due_us) >= 0; }
+
+int onboard_flies(const onboard *o) {
+  return o->state == ONBOARD_HOVERING || o->state == ONBOARD_ACTING || o->state == ONBOARD_RETURNED;
+}
+
+void onboard_begin(onboard *o, uint32_t now_us) {
+  static const onboard nothing;
+  *o = nothing;
+  if (flappy_policy_selftest() != 0) o->flags |= ONBOARD_BAD_POLICY;
+  if (flappy_controller_selftest() != 0) o->flags |= ONBOARD_BAD_CONTROLLER;
+  o->state = o->flags == 0 ? ONBOARD_WAITING : ONBOARD_REFUSED;
+  o->tick_us = o->drive_us = now_us;
+}
+
+/* Samples. */
+
+static int is_number(flappy_vector v) { return flappy_plausible(v, 1e6F); }
+
+void onboard_imu(onboard *o, uint32_t now_us, const onboard_imu_sample *s) {
+  const int good = onboard_flies(o) ? flappy_controller_imu(&o->controller, s->taken_us, s->gyro_rad_s, s->accel_m_s2)
+                                    : is_number(s->gyro_rad_s) && is_number(s->accel_m_s2);
+  if (!good) return;
+  o->has_imu = 1;
+  o->imu_us = now_us;
+}
+
+void onboard_pose(onboard *o, uint32_t now_us, const onboard_pose_sample *s) {
+  const flappy_quaternion q = s->attitude;
+  const int number = is_number(s->position_m) && flappy_abs(q.w) <= 2.0F && is_number(flappy_vector_of(q.x, q.y, q.z));
+  const int taken = !onboard_flies(o) ||
+                    flappy_controller_pose(&o->controller, s->taken_us, s->valid != 0 && number, s->position_m, q);
+  if (!taken || !number || s->valid == 0) return;
+  o->has_pose = 1;
+  o->pose_us = now_us;
+  o->pose = *s;
+}
+
+/* Wishes. */
+
+void onboard_hover(onboard *o) { o->wish = ONBOARD_HOVER; }
+void onboard_manoeuvre(onboard *o) { o->wish = ONBOARD_MANOEUVRE; }
+void onboard_stop(onboard *o) { o->wish = ONBOARD_STOP; }
+
+/* Watching. */
+
+static void turn_off(onboard *o, uint32_t why) {
+  o->flags |= why;
+  o->state = ONBOARD_OFF;
+}
+
+/* The policy acts no more, now or later; feedback stays here, for the goal may be further away than it can leap. */
+static void drop_policy(onboard *o, uint32_t why) {
+  o->flags |= why;
+  if (o->state != ONBOARD_ACTING) return;
+  flappy_controller_stay(&o->controller);
+  o->state = ONBOARD_RETURNED;
+}
+
+static void watch_sensors(onboard *o, uint32_t now_us) {
+  const uint32_t imu_age_us = now_us - o->imu_us, pose_age_us = now_us - o->pose_us;
+  if (imu_age_us > ONBOARD_IMU_STALE_US) drop_policy(o, ONBOARD_IMU_STALE);
+  if (pose_age_us > ONBOARD_POSE_STALE_US) drop_policy(o, ONBOARD_POSE_STALE);
+  if (imu_age_us > ONBOARD_IMU_LOST_US) turn_off(o, ONBOARD_IMU_LOST);
+  if (pose_age_us > ONBOARD_POSE_LOST_US) turn_off(o, ONBOARD_POSE_LOST);
+}
+
+/* A NaN would be clipped to full voltage, so it has to be seen before. */
+static void watch_numbers(onboard *o) {
+  const flappy_controller *c = &o->controller;
+  if (!flappy_all_finite((const float *)&c->estimate, (uint32_t)sizeof c->estimate) ||
+      !flappy_all_finite((const float *)&c->input, (uint32_t)sizeof c->input))
+    turn_off(o, ONBOARD_NOT_FINITE);
+}
+
+/* Flying. */
+
+static void take_off(onboard *o, uint32_t now_us) {
+  const int fresh = o->has_imu && now_us - o->imu_us <= ONBOARD_IMU_STALE_US && o->has_pose &&
+                    now_us - o->pose_us <= ONBOARD_POSE_STALE_US;
+  if (!fresh) return;
+  flappy_controller_start(&o->controller, now_us, o->pose.position_m, o->pose.attitude);
+  flappy_controller_hover(&o->controller);
+  o->hover_us = o->drive_us = now_us;
+  o->state = ONBOARD_HOVERING;
+}
+
+static void begin_manoeuvre(onboard *o, uint32_t now_us) {
+  const flappy_vector off = flappy_minus(o->controller.estimate.position_m, o->controller.hover_m);
+  const int ready = o->state == ONBOARD_HOVERING && now_us - o->hover_us >= ONBOARD_HOVER_US &&
+                    flappy_plausible(off, ONBOARD_PLACE_M) && (o->flags & ONBOARD_FAULTS) == 0;
+  if (!ready) {
+    o->flags |= ONBOARD_UNREADY;
+    return;
+  }
+  flappy_controller_begin(&o->controller);
+  o->act_us = now_us;
+  o->state = ONBOARD_ACTING;
+}
+
+static void let_policy_act(onboard *o) {
+  float obs[FLAPPY_POLICY_OBS], action[FLAPPY_POLICY_ACT];
+  if (!flappy_controller_policy_due(&o->controller)) return;
+  flappy_controller_observe(&o->controller, obs);
+  if (flappy_policy_step(obs, action) != 0) {
+    drop_policy(o, ONBOARD_POLICY_REFUSED);
+    return;
+  }
+  flappy_controller_act(&o->controller, action);
+}
+
+void onboard_tick(onboard *o, uint32_t now_us) {
+  const uint32_t late_us = now_us - o->tick_us;
+  const onboard_wish wish = o->wish;
+  o->tick_us += (late_us / ONBOARD_CONTROL_US + 1U) * ONBOARD_CONTROL_US; /* what was missed stays missed */
+  o->wish = ONBOARD_NOTHING;
+
+  if (onboard_flies(o)) {
+    const int handed_back = flappy_controller_tick(&o->controller, now_us);
+    if (o->state == ONBOARD_ACTING && handed_back) {
+      o->flags |= ONBOARD_HANDED_BACK;
+      o->state = ONBOARD_RETURNED;
+    }
+    if (late_us > ONBOARD_LATE_US) drop_policy(o, ONBOARD_LATE);
+    if (o->state == ONBOARD_ACTING && now_us - o->act_us > ONBOARD_ACTING_US) drop_policy(o, ONBOARD_POLICY_TOO_LONG);
+    watch_sensors(o, now_us);
+  }
+  if (wish == ONBOARD_STOP && o->state != ONBOARD_REFUSED) turn_off(o, ONBOARD_STOPPED);
+  if (wish == ONBOARD_HOVER && o->state == ONBOARD_WAITING) take_off(o, now_us);
+  if (wish == ONBOARD_MANOEUVRE) begin_manoeuvre(o, now_us);
+  if (!onboard_flies(o)) return;
+  if (o->state == ONBOARD_ACTING) let_policy_act(o);
+  flappy_controller_steer(&o->controller);
+  watch_numbers(o);
+}
+
+/* Motors. */
+
+static float clamped(onboard *o, float volts) {
+  if (flappy_abs(volts) <= ONBOARD_LIMIT_V) return volts;
+  o->flags |= ONBOARD_CLAMPED;
+  return volts > 0.0F ? ONBOARD_LIMIT_V : volts < 0.0F ? -ONBOARD_LIMIT_V : 0.0F; /* NaN is neither */
+}
+
+void onboard_drive(onboard *o, uint32_t now_us, float *left_V, float *right_V) {
+  const uint32_t missed = (now_us - o->drive_us) / FLAPPY_CONTROLLER_DRIVE_US;
+  o->drive_us += (missed + 1U) * FLAPPY_CONTROLLER_DRIVE_US;
+  *left_V = *right_V = 0.0F;
+  if (!onboard_flies(o)) return;
+  o->controller.phase += missed * FLAPPY_CONTROLLER_PHASE_STEP; /* the beat keeps its time */
+  flappy_controller_drive(&o->controller, left_V, right_V);
+  *left_V = clamped(o, *left_V);
+  *right_V = clamped(o, *right_V);
+}
