@@ -49,7 +49,7 @@ std::array<std::array<Slope, kChannels>, 4> slopes(const std::vector<sim::Input>
                                                    const std::vector<Wrench>& wrenches);
 
 /// InputError where thrust, roll, pitch or yaw answers its input with the sign opposite to the simulated map's, by more
-/// than 4 standard deviations on both sides.
+/// than 4 standard deviations on both sides, or where another torque answers in its place.
 void check_signs(const MeasuredMap& measured, const std::vector<Wrench>& simulated);
 
 /// Every `count`-th part of the rows, evenly spread, leaves `map` for the map returned.
