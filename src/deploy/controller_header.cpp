@@ -17,7 +17,7 @@ namespace {
 constexpr const char* kCodes = R"(/* What flappy_controller_selftest() finds. */
 #define FLAPPY_CONTROLLER_FAILED_CRC 1   /* the numbers are not those of the run */
 #define FLAPPY_CONTROLLER_FAILED_TRACE 2 /* the recorded flight comes out otherwise */
-#define FLAPPY_CONTROLLER_FAILED_NAN 3   /* a sample with a NaN in it is not dropped */
+#define FLAPPY_CONTROLLER_FAILED_NAN 3   /* what is no sample is taken */
 )";
 
 /// Arrays of the header, and the checksum over them in their order.
@@ -190,7 +190,7 @@ void add_trace(const ControllerTrace& t, Constants& to) {
 
 std::string milliseconds(double s) { return io::shortest_digits(std::round(s * 1e9) / 1e6) + " ms"; }
 
-std::string about(const flight::FlyConfig& config, const RunInfo& run, long driver_us) {
+std::string about(const flight::FlyConfig& config, const RunInfo& run, const Periods& periods, int ring) {
   const flight::Sensors& s = config.fleet.sensors;
   const auto& at = s.imu.position_m;
   std::ostringstream text;
@@ -199,7 +199,7 @@ std::string about(const flight::FlyConfig& config, const RunInfo& run, long driv
        << "nothing else is needed.\n\n"
        << contract_text(config, run) << "\nEvery control period:\n"
        << "  1. flappy_controller_observe() where flappy_controller_policy_due(), the policy, flappy_controller_act()\n"
-       << "  2. flappy_controller_steer(), then flappy_controller_drive() every " << driver_us << " us\n"
+       << "  2. flappy_controller_steer(), then flappy_controller_drive() every " << periods.driver_us << " us\n"
        << "  3. flappy_controller_imu() and flappy_controller_pose() with what has arrived, oldest first\n"
        << "  4. flappy_controller_tick() at its end\n"
        << "Times are microseconds of one clock that may wrap; no more than 2^31 of them may pass between two ticks.\n"
@@ -209,9 +209,10 @@ std::string about(const flight::FlyConfig& config, const RunInfo& run, long driv
        << milliseconds(s.imu.latency_s) << " late, at (" << io::shortest_digits(at.x) << ", "
        << io::shortest_digits(at.y) << ", " << io::shortest_digits(at.z) << ") m in B,\n"
        << "and motion capture of " << io::shortest_digits(s.mocap.rate_hz) << " Hz, " << milliseconds(s.mocap.latency_s)
-       << " late. What the IMU hands over in one control period is one\n"
-       << "increment: where its latency is no whole number of periods, the training server groups its samples "
-          "otherwise.\n"
+       << " late; what is later than " << milliseconds(1e-6 * ring * static_cast<double>(periods.control_us))
+       << " is dropped.\n"
+       << "What the IMU hands over in one control period is one increment: where its latency is no whole number of\n"
+       << "periods, the training server groups its samples otherwise.\n"
        << "Angular rates are in B, accelerations the specific force in B: at rest +g upward. Poses are those of the "
           "torso's\n"
        << "origin in W, attitude as a quaternion w, x, y, z from B to W. The hand-back is judged on the estimate.\n";
@@ -244,7 +245,7 @@ std::string controller_header(const flight::FlyConfig& config, const RunInfo& ru
   const auto define = [&](const char* name, const std::string& value) {
     text << "#define FLAPPY_CONTROLLER_" << name << " " << value << "\n";
   };
-  text << c_comment(about(config, run, periods.driver_us))
+  text << c_comment(about(config, run, periods, schedule.ring_slots()))
        << "#ifndef FLAPPY_CONTROLLER_H\n#define FLAPPY_CONTROLLER_H\n\n#include <stdint.h>\n\n"
        << kEmbedded.at("begin.h") << "\n"
        << contract_macros("FLAPPY_CONTROLLER_", config, run);
@@ -254,6 +255,8 @@ std::string controller_header(const flight::FlyConfig& config, const RunInfo& ru
   define("OBS", std::to_string(o.task.observation().size()));
   define("PARTS", number(o.task.parts) + " /* of the observation: bits in flappy_controller_observe() */");
   define("HANDS_BACK", o.task.constants.hand_back.enabled > 0 ? "1" : "0");
+  define("IMU_LATENCY_US", number(std::lround(o.sensors.imu.latency_s * 1e6)) + " /* as trained with */");
+  define("POSE_LATENCY_US", number(std::lround(o.sensors.mocap.latency_s * 1e6)) + " /* the same */");
   define("IMU_LAG_US", number(std::lround(schedule.imu_lag_s() * 1e6)) + " /* of its low-pass */");
   define("RING", number(schedule.ring_slots()) + " /* control periods that a pose may be late */");
   define("FRAMES", number(schedule.queue_slots()) + " /* poses that may wait for the IMU */");

@@ -334,8 +334,11 @@ TEST(ControllerHeader, TestsItself) {
   EXPECT_EQ(test_of("a_l = flappy_velocity_pid(&k->left", "a_l = flappy_velocity_pid(&k->forward"), 2);
   EXPECT_EQ(test_of("u.amplitude_V = k->hover_V", "u.amplitude_V = -k->hover_V"), 2);
   EXPECT_EQ(test_of("return flappy_within(flappy_fma(amplitude", "return flappy_within(-flappy_fma(amplitude"), 2);
-  EXPECT_EQ(test_of("if (!flappy_plausible(gyro_rad_s, 2000.0F)", "if (0"), 3);
-  EXPECT_EQ(test_of("if (!flappy_plausible(position_m, 20000.0F)", "if (0"), 3);
+  EXPECT_EQ(test_of("if (!flappy_plausible_imu(gyro_rad_s, accel_m_s2)", "if (0"), 3);
+  EXPECT_EQ(test_of("if (!flappy_plausible_pose(position_m, attitude)", "if (0"), 3);
+  EXPECT_EQ(test_of("#define FLAPPY_CONTROLLER_LENGTH_LIMIT 0.1F", "#define FLAPPY_CONTROLLER_LENGTH_LIMIT 1.1F"), 3);
+  EXPECT_EQ(test_of("flappy_abs(square - 1.0F) <", "square - 1.0F <"), 3);
+  EXPECT_EQ(test_of("flappy_abs(square - 1.0F) <", "1.0F - square <"), 3);
 }
 
 TEST(ControllerHeader, CatchesEveryFlippedBit) {
@@ -396,6 +399,14 @@ TEST(ControllerHeader, RefusesWhatItCannotExport) {
   EXPECT_EQ(refused({"flight.control_hz=300.0", "flight.step_s=3.3333333333333335e-5"}),
             "a control period of 0.0033333333333333335 s is no whole number of microseconds, in which headers count; "
             "accepted: one that is");
+}
+
+TEST(ControllerHeader, SaysHowLateSamplesAre) {
+  const FlyConfig late = config_of("hover", {"sensors.imu.latency_s=0.004", "sensors.mocap.latency_s=0.0231"});
+  const std::string text = controller_header(late, kRun, record_controller(late));
+  // periods: one of waiting, 12 of latency, 4 of the time between two frames; two to spare
+  for (const char* line : {"IMU_LATENCY_US 4000U", "POSE_LATENCY_US 23100U", "RING 18U", "later than 36 ms is dropped"})
+    EXPECT_NE(text.find(line), text.npos) << line;
 }
 
 TEST(ControllerHeader, FliesOnAMicrocontroller) {
@@ -459,11 +470,22 @@ TEST(ControllerHeader, DropsWhatIsNoSample) {
       x[k] = bad;
       EXPECT_EQ(rest.c.imu(rest.c.at(), rest.now_us + 1000, x.data()), 0);
     }
-  EXPECT_EQ(rest.c.imu(rest.c.at(), rest.now_us, rest.still.data()), 0);           // not newer
-  EXPECT_EQ(rest.c.imu(rest.c.at(), rest.now_us - 1000, rest.still.data()), 0);    // older
-  EXPECT_EQ(rest.c.imu(rest.c.at(), rest.now_us + 200000, rest.still.data()), 0);  // from the future
-  EXPECT_EQ(rest.c.pose(rest.c.at(), rest.now_us, 1, rest.origin.data()), 0);      // at the horizon
-  EXPECT_EQ(rest.c.pose(rest.c.at(), rest.now_us + 200000, 1, rest.origin.data()), 0);
+  EXPECT_EQ(rest.c.imu(rest.c.at(), rest.now_us, rest.still.data()), 0);         // not newer
+  EXPECT_EQ(rest.c.imu(rest.c.at(), rest.now_us - 1000, rest.still.data()), 0);  // older
+  EXPECT_EQ(rest.c.imu(rest.c.at(), rest.now_us + 4001, rest.still.data()), 0);  // from the future
+  for (int k = 0; k < 6; ++k) {
+    std::vector<float> x = rest.still;
+    x[k] = k < 3 ? 201.0F : -1001.0F;
+    EXPECT_EQ(rest.c.imu(rest.c.at(), rest.now_us + 1000, x.data()), 0) << k;
+    x[k] = k < 3 ? -199.0F : 999.0F;
+    EXPECT_EQ(rest.c.imu(rest.c.at(), rest.now_us + 1000, x.data()), 1) << k;
+    rest.c.start(rest.c.at(), rest.now_us, rest.origin.data());
+  }
+  EXPECT_EQ(rest.c.pose(rest.c.at(), rest.now_us, 1, rest.origin.data()), 0);  // at the horizon
+  EXPECT_EQ(rest.c.pose(rest.c.at(), rest.now_us + 4001, 1, rest.origin.data()), 0);
+  EXPECT_EQ(rest.c.imu(rest.c.at(), rest.now_us + 4000, rest.still.data()), 1);
+  rest.now_us += 4000;
+  rest.c.tick(rest.c.at(), rest.now_us);
   for (int i = 0; i < 30; ++i) rest.period();
   const auto before = rest.estimate();
   for (int k = 0; k < 7; ++k) {
@@ -471,6 +493,8 @@ TEST(ControllerHeader, DropsWhatIsNoSample) {
     x[k] = k % 2 == 0 ? nan : infinite;
     rest.period(1, x);
   }
+  for (const float q : {0.0F, 0.47F, 0.53F, 2.0F}) rest.period(1, {5, 5, 5, q, q, q, q});  // length 0, 0.94, 1.06, 4
+  for (int i = 0; i < 30; ++i) rest.period();
   const auto after = rest.estimate();
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(after[k], before[k], 1e-3);
   const float added[4] = {nan, infinite, 0, -infinite};

@@ -147,8 +147,18 @@ TEST(OnboardFaults, NeverActsAfterAFault) {
 
 TEST(OnboardFaults, BeginsNowhereElse) {
   Loop loop(escape_headers());
-  ASSERT_EQ(loop.build("gcc", {"-O1", "-DONBOARD_PLACE_M=1e-6F"}), "");
-  EXPECT_EQ(fly(loop.program(), {}).flags, kUnready);
+  for (const char* limit : {"-DONBOARD_PLACE_M=1e-6F", "-DONBOARD_HEADING_RAD=1e-6F"}) {
+    ASSERT_EQ(loop.build("gcc", {"-O1", limit}), "");
+    EXPECT_EQ(fly(loop.program(), {}).flags, kUnready) << limit;
+  }
+}
+
+TEST(OnboardFaults, JudgesSamplesAndWishes) {
+  Loop loop(escape_headers());
+  ASSERT_EQ(loop.build_around(source_path("tests/tools/onboard_checks.c")), "");
+  const io::Finished checks = run_limited(loop.program());
+  EXPECT_EQ(checks.exit_code, 0);
+  EXPECT_EQ(checks.out, "all hold\n");
 }
 
 TEST(OnboardFaults, Stops) {

@@ -106,6 +106,14 @@ class Loop {
     append(command, {folder_ / "board_host.c", "-o", folder_ / "loop"});
     return run_limited(command).err;
   }
+  /// The flight logic without its loop, around a program of the tests.
+  std::string build_around(const std::string& program, const Words& options = {"-O2"}) {
+    Words command = {"gcc"};
+    append(command, strict());
+    append(command, options);
+    append(command, {program, source_path("tools/onboard/onboard.c"), "-o", folder_ / "loop"});
+    return run_limited(command).err;
+  }
   std::string build_for_board(const Words& options = {"-O2"}) {
     Words all = strict();
     append(all, options);

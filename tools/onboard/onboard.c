@@ -17,32 +17,45 @@ void onboard_begin(onboard *o, uint32_t now_us) {
 
 /* Samples. */
 
-static int is_number(flappy_vector v) { return flappy_plausible(v, 1e6F); }
+/* One stamp from the future would have all good samples refused until the clock has caught up. */
+static int in_time(uint32_t now_us, uint32_t taken_us) { return !flappy_after(taken_us, now_us + ONBOARD_LATE_US); }
+
+/* When a sample would have arrived with the latency of the training; not after now. */
+static uint32_t due_us_of(uint32_t now_us, uint32_t taken_us, uint32_t latency_us) {
+  return flappy_after(taken_us + latency_us, now_us) ? now_us : taken_us + latency_us;
+}
 
 void onboard_imu(onboard *o, uint32_t now_us, const onboard_imu_sample *s) {
-  const int good = onboard_flies(o) ? flappy_controller_imu(&o->controller, s->taken_us, s->gyro_rad_s, s->accel_m_s2)
-                                    : is_number(s->gyro_rad_s) && is_number(s->accel_m_s2);
-  if (!good) return;
+  if (!in_time(now_us, s->taken_us) || !flappy_plausible_imu(s->gyro_rad_s, s->accel_m_s2)) return;
+  if (onboard_flies(o)) {
+    o->controller.now_us = now_us; /* by which it judges times; the last tick may be long ago */
+    if (!flappy_controller_imu(&o->controller, s->taken_us, s->gyro_rad_s, s->accel_m_s2)) return;
+  }
   o->has_imu = 1;
-  o->imu_us = now_us;
+  o->imu_us = due_us_of(now_us, s->taken_us, FLAPPY_CONTROLLER_IMU_LATENCY_US);
 }
 
 void onboard_pose(onboard *o, uint32_t now_us, const onboard_pose_sample *s) {
-  const flappy_quaternion q = s->attitude;
-  const int number = is_number(s->position_m) && flappy_abs(q.w) <= 2.0F && is_number(flappy_vector_of(q.x, q.y, q.z));
-  const int taken = !onboard_flies(o) ||
-                    flappy_controller_pose(&o->controller, s->taken_us, s->valid != 0 && number, s->position_m, q);
-  if (!taken || !number || s->valid == 0) return;
+  const int seen = s->valid != 0 && flappy_plausible_pose(s->position_m, s->attitude);
+  if (!in_time(now_us, s->taken_us)) return;
+  if (onboard_flies(o)) {
+    o->controller.now_us = now_us;
+    if (!flappy_controller_pose(&o->controller, s->taken_us, seen, s->position_m, s->attitude)) return;
+  }
+  if (!seen) return;
   o->has_pose = 1;
-  o->pose_us = now_us;
+  o->pose_us = due_us_of(now_us, s->taken_us, FLAPPY_CONTROLLER_POSE_LATENCY_US);
   o->pose = *s;
 }
 
 /* Wishes. */
 
-void onboard_hover(onboard *o) { o->wish = ONBOARD_HOVER; }
-void onboard_manoeuvre(onboard *o) { o->wish = ONBOARD_MANOEUVRE; }
-void onboard_stop(onboard *o) { o->wish = ONBOARD_STOP; }
+static void wish_for(onboard *o, onboard_wish wish) {
+  if (o->wish != ONBOARD_STOP) o->wish = wish;
+}
+void onboard_hover(onboard *o) { wish_for(o, ONBOARD_HOVER); }
+void onboard_manoeuvre(onboard *o) { wish_for(o, ONBOARD_MANOEUVRE); }
+void onboard_stop(onboard *o) { wish_for(o, ONBOARD_STOP); }
 
 /* Watching. */
 
@@ -67,6 +80,12 @@ static void watch_sensors(onboard *o, uint32_t now_us) {
   if (pose_age_us > ONBOARD_POSE_LOST_US) turn_off(o, ONBOARD_POSE_LOST);
 }
 
+/* Before the flight: what is stale is forgotten, for after a turn of the clock it would look fresh. */
+static void forget_stale(onboard *o, uint32_t now_us) {
+  if (now_us - o->imu_us > ONBOARD_IMU_STALE_US) o->has_imu = 0;
+  if (now_us - o->pose_us > ONBOARD_POSE_STALE_US) o->has_pose = 0;
+}
+
 /* A NaN would be clipped to full voltage, so it has to be seen before. */
 static void watch_numbers(onboard *o) {
   const flappy_controller *c = &o->controller;
@@ -78,19 +97,37 @@ static void watch_numbers(onboard *o) {
 /* Flying. */
 
 static void take_off(onboard *o, uint32_t now_us) {
-  const int fresh = o->has_imu && now_us - o->imu_us <= ONBOARD_IMU_STALE_US && o->has_pose &&
-                    now_us - o->pose_us <= ONBOARD_POSE_STALE_US;
-  if (!fresh) return;
+  if (!o->has_imu || !o->has_pose) return;
   flappy_controller_start(&o->controller, now_us, o->pose.position_m, o->pose.attitude);
   flappy_controller_hover(&o->controller);
-  o->hover_us = o->drive_us = now_us;
+  o->drive_us = now_us;
   o->state = ONBOARD_HOVERING;
 }
 
+/* Whether it is where the task begins, and faces whereto. */
+static int at_place(const flappy_controller *c) {
+  const flappy_matrix R = flappy_rotation_matrix(c->estimate.attitude);
+  const flappy_sin_cos is = flappy_heading(&R), wanted = c->hover_heading;
+  const float turn_rad = flappy_atan2(flappy_difference2(is.sin, wanted.cos, is.cos, wanted.sin),
+                                      flappy_sum2(is.cos, wanted.cos, is.sin, wanted.sin));
+  return flappy_plausible(flappy_minus(c->estimate.position_m, c->hover_m), ONBOARD_PLACE_M) &&
+         flappy_abs(turn_rad) <= ONBOARD_HEADING_RAD;
+}
+
+/* Counts no further than it has to: a hover may outlast the clock. */
+static void settle(onboard *o, uint32_t passed_us) {
+  if (!at_place(&o->controller)) {
+    o->settled_us = 0;
+  } else if (passed_us >= ONBOARD_HOVER_US - o->settled_us) {
+    o->settled_us = ONBOARD_HOVER_US;
+  } else {
+    o->settled_us += passed_us;
+  }
+}
+
 static void begin_manoeuvre(onboard *o, uint32_t now_us) {
-  const flappy_vector off = flappy_minus(o->controller.estimate.position_m, o->controller.hover_m);
-  const int ready = o->state == ONBOARD_HOVERING && now_us - o->hover_us >= ONBOARD_HOVER_US &&
-                    flappy_plausible(off, ONBOARD_PLACE_M) && (o->flags & ONBOARD_FAULTS) == 0;
+  const int ready = o->state == ONBOARD_HOVERING && o->settled_us >= ONBOARD_HOVER_US &&
+                    (o->flags & ONBOARD_FAULTS) == 0;
   if (!ready) {
     o->flags |= ONBOARD_UNREADY;
     return;
@@ -114,6 +151,8 @@ static void let_policy_act(onboard *o) {
 void onboard_tick(onboard *o, uint32_t now_us) {
   const uint32_t late_us = now_us - o->tick_us;
   const onboard_wish wish = o->wish;
+  const uint32_t passed_us = now_us - o->ticked_us;
+  o->ticked_us = now_us;
   o->tick_us += (late_us / ONBOARD_CONTROL_US + 1U) * ONBOARD_CONTROL_US; /* what was missed stays missed */
   o->wish = ONBOARD_NOTHING;
 
@@ -123,9 +162,12 @@ void onboard_tick(onboard *o, uint32_t now_us) {
       o->flags |= ONBOARD_HANDED_BACK;
       o->state = ONBOARD_RETURNED;
     }
+    if (o->state == ONBOARD_HOVERING) settle(o, passed_us);
     if (late_us > ONBOARD_LATE_US) drop_policy(o, ONBOARD_LATE);
     if (o->state == ONBOARD_ACTING && now_us - o->act_us > ONBOARD_ACTING_US) drop_policy(o, ONBOARD_POLICY_TOO_LONG);
     watch_sensors(o, now_us);
+  } else {
+    forget_stale(o, now_us);
   }
   if (wish == ONBOARD_STOP && o->state != ONBOARD_REFUSED) turn_off(o, ONBOARD_STOPPED);
   if (wish == ONBOARD_HOVER && o->state == ONBOARD_WAITING) take_off(o, now_us);

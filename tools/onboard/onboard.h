@@ -32,7 +32,8 @@
 #error "flappy_policy.h does not take what flappy_controller.h shows, or does not give four numbers"
 #endif
 
-/* Limits; each may be set by the compiler. A time counts from the arrival of the last good sample. */
+/* Limits; each may be set by the compiler. A sample is as old as its arrival, or as its stamp and the latency of the training
+   make it, whichever is more. */
 
 /* Five control periods: an IMU of 500 Hz has then missed five samples, which is no jitter. The policy has never flown on an
    estimate that is extrapolated further. */
@@ -52,7 +53,8 @@
 #ifndef ONBOARD_POSE_LOST_US
 #define ONBOARD_POSE_LOST_US 1500000U
 #endif
-/* Half a period: what the policy sees then belongs to the next tick rather than to this one. */
+/* Half a period: what the policy sees then belongs to the next tick rather than to this one. Samples from further ahead are
+   dropped. */
 #ifndef ONBOARD_LATE_US
 #define ONBOARD_LATE_US 1000U
 #endif
@@ -60,13 +62,17 @@
 #ifndef ONBOARD_ACTING_US
 #define ONBOARD_ACTING_US 1000000U
 #endif
-/* The integrators have settled, as in the flights that the policy was trained from. */
+/* So long at its place: the integrators have settled, as in the flights that the policy was trained from. */
 #ifndef ONBOARD_HOVER_US
 #define ONBOARD_HOVER_US 1000000U
 #endif
 /* Along each axis from where the task begins, for the policy to begin: twice what it was trained from. */
 #ifndef ONBOARD_PLACE_M
 #define ONBOARD_PLACE_M 0.1F
+#endif
+/* From the heading with which it begins: twice what the escape was trained from. */
+#ifndef ONBOARD_HEADING_RAD
+#define ONBOARD_HEADING_RAD 0.4F
 #endif
 /* What the motors may ever get, whatever was computed: theirs is 18 V. */
 #ifndef ONBOARD_LIMIT_V
@@ -119,8 +125,10 @@ typedef struct {
   uint32_t flags;
   onboard_wish wish;
   uint32_t tick_us, drive_us; /* when onboard_tick() and onboard_drive() are due next */
-  uint32_t imu_us, pose_us;   /* when the last good sample arrived */
-  uint32_t hover_us, act_us;  /* when that began */
+  uint32_t ticked_us;         /* when the last tick was */
+  uint32_t imu_us, pose_us;   /* when the last good sample arrived, or should have */
+  uint32_t settled_us;        /* for so long it has been at its place, up to ONBOARD_HOVER_US */
+  uint32_t act_us;            /* when that began */
   onboard_pose_sample pose;   /* the last good one */
   int has_imu, has_pose;
 } onboard;
@@ -128,12 +136,13 @@ typedef struct {
 /* Tests both headers; `now_us`: when the first tick is due. */
 void onboard_begin(onboard *o, uint32_t now_us);
 
-/* Samples as they arrive, oldest first, before the tick. What is no sample (NaN, too old, from the future) is dropped. */
+/* Samples as they arrive, oldest first, before the tick. What is no sample (NaN, beyond what a sensor shows, too old, from the
+   future, a quaternion not of length 1) is dropped. */
 void onboard_imu(onboard *o, uint32_t now_us, const onboard_imu_sample *sample);
 void onboard_pose(onboard *o, uint32_t now_us, const onboard_pose_sample *sample);
 
-/* Wishes of whoever flies, looked at in the next tick. A manoeuvre begins only from a hover of ONBOARD_HOVER_US, at its place
-   and without a fault; otherwise nothing changes. */
+/* Wishes of whoever flies, looked at in the next tick: the last one, but nothing undoes a stop. A manoeuvre begins only from a
+   hover of ONBOARD_HOVER_US at its place and heading, without a fault; otherwise nothing changes. */
 void onboard_hover(onboard *o);
 void onboard_manoeuvre(onboard *o);
 void onboard_stop(onboard *o);

@@ -22,14 +22,31 @@ static inline int flappy_controller_arrived(const flappy_controller *c, const fl
 
 /* Interface. */
 
-/* False for NaN, infinity and what no sensor shows. */
+/* What no sensor shows, along an axis: in the simulator a tumbling vehicle reaches 106 rad/s, and 512 m/s^2 with the IMU 4 cm
+   from the origin. Of a quaternion: by how much the square of its length may differ from 1. */
+#define FLAPPY_CONTROLLER_GYRO_LIMIT_RAD_S 200.0F
+#define FLAPPY_CONTROLLER_ACCEL_LIMIT_M_S2 1000.0F
+#define FLAPPY_CONTROLLER_POSITION_LIMIT_M 20000.0F
+#define FLAPPY_CONTROLLER_LENGTH_LIMIT 0.1F
+
+/* False for NaN and infinity too. */
 static inline int flappy_plausible(flappy_vector v, float limit) {
   return flappy_abs(v.x) <= limit && flappy_abs(v.y) <= limit && flappy_abs(v.z) <= limit;
 }
+static inline int flappy_plausible_imu(flappy_vector gyro_rad_s, flappy_vector accel_m_s2) {
+  return flappy_plausible(gyro_rad_s, FLAPPY_CONTROLLER_GYRO_LIMIT_RAD_S) &&
+         flappy_plausible(accel_m_s2, FLAPPY_CONTROLLER_ACCEL_LIMIT_M_S2);
+}
+static inline int flappy_plausible_pose(flappy_vector position_m, flappy_quaternion q) {
+  const float square = flappy_sum2(q.w, q.w, q.x, q.x) + flappy_sum2(q.y, q.y, q.z, q.z);
+  return flappy_plausible(position_m, FLAPPY_CONTROLLER_POSITION_LIMIT_M) &&
+         flappy_abs(square - 1.0F) < FLAPPY_CONTROLLER_LENGTH_LIMIT;
+}
 
-/* A sample of an instant that is after b, but not much after the last tick. */
+/* A sample of an instant that is after b, but no more than two control periods after the last tick: one from further ahead
+   would have every good one refused until the clock has caught up. */
 static inline int flappy_controller_timely(const flappy_controller *c, uint32_t taken_us, uint32_t b) {
-  return flappy_after(taken_us, b) && !flappy_after(taken_us, c->now_us + 100000U);
+  return flappy_after(taken_us, b) && !flappy_after(taken_us, c->now_us + 2U * FLAPPY_CONTROLLER_CONTROL_US);
 }
 
 /* The set point now. */
@@ -103,15 +120,15 @@ static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us
   flappy_controller_begin(c);
 }
 
-/* A sample of the IMU: its mean since the one before. It is dropped, and 0 returned, unless it is newer than that one, not
-   from the future, and below 2,000 rad/s and 1e6 m/s^2: NaN and infinity never get in. */
+/* A sample of the IMU: its mean since the one before. It is dropped, and 0 returned, unless it is newer than that one, no
+   more than two control periods after the last tick, and within the limits above: NaN and infinity never get in. */
 static inline int flappy_controller_imu(flappy_controller *c, uint32_t taken_us, flappy_vector gyro_rad_s,
                                         flappy_vector accel_m_s2) {
   flappy_increment *sum = &c->estimator.gathered;
   flappy_vector turn, gained;
   float interval_s;
   if (!flappy_controller_timely(c, taken_us, c->last_imu_us)) return 0;
-  if (!flappy_plausible(gyro_rad_s, 2000.0F) || !flappy_plausible(accel_m_s2, 1e6F)) return 0;
+  if (!flappy_plausible_imu(gyro_rad_s, accel_m_s2)) return 0;
   interval_s = flappy_seconds(taken_us - c->last_imu_us);
   c->last_imu_us = taken_us;
   turn = flappy_times(interval_s, gyro_rad_s);
@@ -124,16 +141,15 @@ static inline int flappy_controller_imu(flappy_controller *c, uint32_t taken_us,
   return 1;
 }
 
-/* A frame of the motion capture: the torso's pose when it was taken. A frame that is not valid (not tracked), or that is
-   not finite, moves the horizon and corrects nothing. It is dropped, and 0 returned, unless it is newer than the one before
-   and than the horizon, and not from the future. */
+/* A frame of the motion capture: the torso's pose when it was taken. A frame that is not valid (not tracked), not finite, or
+   whose quaternion is not of length 1, moves the horizon and corrects nothing. It is dropped, and 0 returned, unless it is
+   newer than the one before and than the horizon, and no more than two control periods after the last tick. */
 static inline int flappy_controller_pose(flappy_controller *c, uint32_t taken_us, int valid, flappy_vector position_m,
                                          flappy_quaternion attitude) {
   flappy_frame *f = &c->frames[c->in_frames < FLAPPY_CONTROLLER_FRAMES ? c->in_frames : 0];
   const uint32_t newest_us = c->in_frames > 0 ? c->frames[c->in_frames - 1].taken_us : c->horizon_us;
   if (c->in_frames == FLAPPY_CONTROLLER_FRAMES || !flappy_controller_timely(c, taken_us, newest_us)) return 0;
-  if (!flappy_plausible(position_m, 20000.0F) || !(flappy_abs(attitude.w) <= 2.0F) ||
-      !flappy_plausible(flappy_vector_of(attitude.x, attitude.y, attitude.z), 2.0F)) {
+  if (!flappy_plausible_pose(position_m, attitude)) {
     valid = 0;
     position_m = flappy_vector_of(0.0F, 0.0F, 0.0F);
     attitude.w = 1.0F;

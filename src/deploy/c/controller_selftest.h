@@ -131,18 +131,19 @@ static inline int flappy_controller_selftest(void) {
   if (flappy_controller_crc() != FLAPPY_CONTROLLER_CRC32) return FLAPPY_CONTROLLER_FAILED_CRC;
   if (!(flappy_controller_test_fly(&c) <= 1e-4F)) return FLAPPY_CONTROLLER_FAILED_TRACE;
   nan.bits = 0x7fc00000U;
-  for (bad = 0; bad < 13; ++bad) {
+  for (bad = 0; bad < 15; ++bad) { /* a NaN in each number, and quaternions of length 0 and 4 */
     float x[13];
     flappy_quaternion q;
     for (i = 0; i < 13; ++i) x[i] = i == bad ? nan.number : 0.0F;
     now_us = c.now_us + FLAPPY_CONTROLLER_CONTROL_US;
     if (flappy_controller_imu(&c, now_us, flappy_vector_from(x), flappy_vector_from(x + 3)) != (bad >= 6))
       return FLAPPY_CONTROLLER_FAILED_NAN;
-    q.w = bad == 9 ? nan.number : 1.0F;
-    q.x = x[10];
-    q.y = x[11];
-    q.z = x[12];
+    q.w = bad == 9 ? nan.number : bad == 13 ? 0.0F : bad == 14 ? 2.0F : 1.0F;
+    q.x = bad == 14 ? 2.0F : x[10];
+    q.y = bad == 14 ? 2.0F : x[11];
+    q.z = bad == 14 ? 2.0F : x[12];
     if (bad >= 6 && !flappy_controller_pose(&c, now_us, 1, flappy_vector_from(x + 6), q)) return FLAPPY_CONTROLLER_FAILED_NAN;
+    if (bad >= 6 && c.frames[c.in_frames - 1].valid > 0.0F) return FLAPPY_CONTROLLER_FAILED_NAN;
     (void)flappy_controller_tick(&c, now_us);
     flappy_controller_steer(&c);
     if (!flappy_all_finite((const float *)&c.estimator, (uint32_t)sizeof c.estimator) ||
