@@ -31,7 +31,7 @@ class Constants {
     crc_ = crc32(crc_, words);
     text_ << c_array<std::int32_t>("static const int32_t flappy_controller_" + name + "[" + count + "]", words);
   }
-  /// A flat list of numbers as a struct: `widths` of its members, in braces where there are several.
+  /// A struct of named members, each in braces where it is several numbers.
   void add_struct(const std::string& declaration,
                   const std::vector<std::pair<std::string, std::vector<float>>>& members) {
     text_ << declaration << " = {\n";

@@ -224,13 +224,8 @@ void describe(ForceFit& result, const FitConfig& config, const Problem& problem,
   result.misfit = left.squaredNorm() / freedom;
   const double widened = result.misfit > 1 + 3 * std::sqrt(2 / freedom) ? result.misfit : 1;
   const MatrixXd j = jacobian(problem, point) / std::sqrt(widened);
-  const Eigen::JacobiSVD<MatrixXd> svd(j, Eigen::ComputeThinV);
+  const Eigen::JacobiSVD<MatrixXd> svd(j);
   result.singular_values.assign(svd.singularValues().begin(), svd.singularValues().end());
-  result.directions.clear();
-  for (Eigen::Index i = 0; i < svd.matrixV().cols(); ++i) {
-    const VectorXd v = svd.matrixV().col(i);
-    result.directions.emplace_back(v.begin(), v.end());
-  }
   const Eigen::Index n = point.size();
   const MatrixXd c = (j.transpose() * j + kUniformPrecision * MatrixXd::Identity(n, n)).inverse();
   result.parameters.clear();

@@ -64,8 +64,6 @@ struct ForceFit {
   std::vector<Confounded> confounded;  ///< beyond +-0.9
   std::vector<double>
       singular_values;  ///< of J, largest first: below sqrt(12) a direction is known from its bounds alone
-  std::vector<std::vector<double>>
-      directions;  ///< right singular vectors, one for each value, in the parameters' order
   MapError before, after;
   std::vector<Stage> stages;
   bool sd_declared = false;

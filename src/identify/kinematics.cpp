@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "identify/measured_map.hpp"
 #include "io/csv.hpp"
 #include "io/run_program.hpp"
 
@@ -17,7 +18,6 @@ using Eigen::VectorXd;
 
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr Eigen::Index kMostHarmonics = 20;
-const std::array<std::string, 4> kInputNames = {"amplitude_V", "difference_V", "bias_V", "split_cycle"};
 
 /// 1, cos, sin, cos 2, sin 2, ... of a phase.
 Eigen::MatrixXd harmonics_at(const std::vector<double>& phases, Eigen::Index harmonics) {
@@ -107,22 +107,9 @@ std::vector<double> beat_phases() {
 
 WingSamples read_wing_samples(const std::filesystem::path& path) {
   const io::CsvTable table = io::read_csv(path);
-  std::vector<std::string> known = {"t_s"};
-  known.insert(known.end(), kAngleNames.begin(), kAngleNames.end());
-  std::string accepted;
-  for (const std::string& name : known) accepted += (accepted.empty() ? "" : ", ") + name;
-  const std::vector<std::string> required = known;
-  known.insert(known.end(), kInputNames.begin(), kInputNames.end());
-  for (const std::string& name : table.names) {
-    if (std::ranges::count(known, name) > 0) continue;
-    const std::string unit = io::in_another_unit(name, known);
-    throw io::InputError(table.name + ":1: " + name + ": " +
-                         (unit.empty() ? "unknown column; accepted: " + accepted + io::did_you_mean(name, known)
-                                       : "wrong unit; accepted: " + unit));
-  }
-  for (const std::string& name : required)
-    if (std::ranges::count(table.names, name) == 0)
-      throw io::InputError(table.name + ":1: " + name + ": column is missing; accepted: " + accepted);
+  std::vector<std::string> required = {"t_s"};
+  required.insert(required.end(), kAngleNames.begin(), kAngleNames.end());
+  check_columns(table, required, {kInputNames.begin(), kInputNames.end()});
   WingSamples s{table.name, table.column("t_s"), {}, {}};
   for (std::size_t a = 0; a < 4; ++a) s.angles_rad[a] = table.column(kAngleNames[a]);
   for (std::size_t i = 1; i < s.t_s.size(); ++i)

@@ -9,8 +9,6 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-const std::array<std::string, 4> kInputNames = {"amplitude_V", "difference_V", "bias_V", "split_cycle"};
-
 std::array<double, 4> numbers_of(const sim::Input& u) {
   return {u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle};
 }
@@ -25,23 +23,6 @@ std::string joined(const Names& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
-}
-
-/// Unknown columns first: a column in a wrong unit is both unknown and missing, and the unit is what is wrong.
-void check_columns(const io::CsvTable& table, const Names& required, const Names& optional) {
-  Names known = required;
-  known.insert(known.end(), optional.begin(), optional.end());
-  for (const std::string& name : table.names) {
-    if (std::ranges::count(known, name) > 0) continue;
-    const std::string unit = io::in_another_unit(name, known);
-    throw io::InputError(table.name + ":1: " + name + ": " +
-                         (unit.empty() ? "unknown column; accepted: " + joined(known) + io::did_you_mean(name, known)
-                                       : "wrong unit; accepted: " + unit));
-  }
-  for (const std::string& name : required)
-    if (std::ranges::count(table.names, name) == 0)
-      throw io::InputError(table.name + ":1: " + name + ": column is missing; accepted: " + joined(required) +
-                           (optional.empty() ? "" : ", optional " + joined(optional)));
 }
 
 std::string at(const io::CsvTable& table, std::size_t row, const std::string& column) {
@@ -94,6 +75,23 @@ MeasuredMap map_of(const io::CsvTable& table, const model::Driver& driver) {
 }
 
 }  // namespace
+
+void check_columns(const io::CsvTable& table, const Names& required, const Names& optional) {
+  // unknown ones first: a column in a wrong unit is both unknown and missing, and the unit is what is wrong
+  Names known = required;
+  known.insert(known.end(), optional.begin(), optional.end());
+  for (const std::string& name : table.names) {
+    if (std::ranges::count(known, name) > 0) continue;
+    const std::string unit = io::in_another_unit(name, known);
+    throw io::InputError(table.name + ":1: " + name + ": " +
+                         (unit.empty() ? "unknown column; accepted: " + joined(known) + io::did_you_mean(name, known)
+                                       : "wrong unit; accepted: " + unit));
+  }
+  for (const std::string& name : required)
+    if (std::ranges::count(table.names, name) == 0)
+      throw io::InputError(table.name + ":1: " + name + ": column is missing; accepted: " + joined(required) +
+                           (optional.empty() ? "" : ", optional " + joined(optional)));
+}
 
 const std::array<std::string, kChannels>& channel_names() {
   static const std::array<std::string, kChannels> names = {"force_x_N",   "force_y_N",   "force_z_N",

@@ -24,6 +24,12 @@ struct MeasuredMap {
   std::size_t size() const { return inputs.size(); }
 };
 
+/// The columns of an input.
+inline const std::array<std::string, 4> kInputNames = {"amplitude_V", "difference_V", "bias_V", "split_cycle"};
+/// InputError "file:1: column: what is wrong; what is accepted" for a column that is missing, unknown or in another unit.
+void check_columns(const io::CsvTable& table, const std::vector<std::string>& required,
+                   const std::vector<std::string>& optional);
+
 /// "force_x_N", ...; "force_x_sd_N", ...
 const std::array<std::string, kChannels>& channel_names();
 const std::array<std::string, kChannels>& sd_names();
@@ -52,7 +58,7 @@ std::array<std::array<Slope, kChannels>, 4> slopes(const std::vector<sim::Input>
 /// than 4 standard deviations on both sides, or where another torque answers in its place.
 void check_signs(const MeasuredMap& measured, const std::vector<Wrench>& simulated);
 
-/// Every `count`-th part of the rows, evenly spread, leaves `map` for the map returned.
+/// `count` of the rows, evenly spread, leave `map` for the map returned.
 MeasuredMap hold_out(MeasuredMap& map, std::size_t count);
 
 }  // namespace flappy::identify

@@ -47,7 +47,8 @@ struct Replayed {
 };
 
 /// Flies every window to its checkpoints: steps after its start, ascending. `recorded` is called from several threads, at
-/// the start of a window and, where it is carried, before. Every checkpoint rounds, as every call of Batch::step does. A voltage that changes within a step counts by its share of it.
+/// the start of a window and, where it is carried, before. Every checkpoint rounds, as every call of Batch::step does. A
+/// voltage that changes within a step counts by its share of it.
 /// std::invalid_argument where options or checkpoints make no sense.
 std::vector<Replayed> replay(const std::vector<ReplayWindow>& windows, const std::vector<int>& checkpoints,
                              const RecordedState& recorded, const ReplayOptions& options);
