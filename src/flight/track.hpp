@@ -66,6 +66,11 @@ class Track {
   /// the motion within it.
   double imu_bound_s(double t_s) const;
 
+  /// Bounds of the IMU's intervals, gaps among them.
+  const std::vector<double>& bounds_s() const { return bounds_s_; }
+  /// Mean specific force that the IMU showed over a time, in B as it turned.
+  Eigen::Vector3d mean_force_m_s2(double from_s, double to_s) const;
+
   /// At any time from begin_s() to end_s(); std::out_of_range elsewhere.
   TorsoMotion at(double t_s) const;
   Eigen::Vector3d gyro_bias_rad_s(double t_s) const { return nodes_[node_before(t_s)].state.gyro_bias; }

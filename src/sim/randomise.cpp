@@ -135,6 +135,27 @@ model::Vehicle Randomisation::sample(RandomKey key) const {
   return vehicle;
 }
 
+bool Randomisation::is_uniform(std::size_t draw) const {
+  return draws_[draw].law == Law::scale_uniform || draws_[draw].law == Law::replace_uniform;
+}
+
+std::string Randomisation::name(std::size_t draw) const {
+  model::Vehicle vehicle = nominal_;
+  return model::parameters(vehicle)[draws_[draw].parameters.front()].path;
+}
+
+model::Vehicle Randomisation::at(const std::vector<double>& variates) const {
+  model::Vehicle vehicle = nominal_;
+  const std::vector<model::Parameter> parameters = model::parameters(vehicle);
+  for (std::size_t d = 0; d < draws_.size(); ++d) {
+    Draw draw = draws_[d];
+    if (draw.law == Law::scale_half_normal) draw.law = Law::scale_normal;
+    for (const std::size_t i : draw.parameters)
+      *parameters[i].value = std::clamp(apply(draw, *parameters[i].value, variates[d]), parameters[i].low, parameters[i].high);
+  }
+  return vehicle;
+}
+
 Randomisation read_randomisation(model::Vehicle nominal, const io::Table& root) {
   root.integer("schema", 1, 1);
   Randomisation randomisation(std::move(nominal), root);

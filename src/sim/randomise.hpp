@@ -31,6 +31,14 @@ class Randomisation {
   /// The vehicle of this key: the same for the same key, whatever else was sampled.
   model::Vehicle sample(RandomKey key) const;
 
+  /// Draws of the table; each has one variate, standard normal or uniform in [-1, 1].
+  std::size_t draws() const { return draws_.size(); }
+  bool is_uniform(std::size_t draw) const;
+  /// Path of its first parameter.
+  std::string name(std::size_t draw) const;
+  /// The vehicle of given variates, one for each draw; a half-normal law takes the sign of its own.
+  model::Vehicle at(const std::vector<double>& variates) const;
+
  private:
   enum class Law { scale_normal, scale_half_normal, replace_normal, add_normal, scale_uniform, replace_uniform };
   struct Draw {

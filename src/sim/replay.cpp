@@ -178,6 +178,14 @@ class ReplayBlock {
 
 }  // namespace
 
+void step_voltages(const VoltageScript& script, double begin_s, double step_s, std::size_t steps, std::vector<double>& left_V,
+                   std::vector<double>& right_V) {
+  StepVoltages voltages(script, begin_s, step_s);
+  left_V.resize(steps);
+  right_V.resize(steps);
+  for (std::size_t i = 0; i < steps; ++i) voltages.take(static_cast<int>(i), left_V[i], right_V[i]);
+}
+
 std::vector<Replayed> replay(const std::vector<ReplayWindow>& windows, const std::vector<int>& checkpoints,
                              const RecordedState& recorded, const ReplayOptions& options) {
   if (checkpoints.empty() || checkpoints.front() < 0 || !std::ranges::is_sorted(checkpoints))

@@ -15,6 +15,10 @@ struct VoltageScript {
   std::vector<double> t_s, left_V, right_V;
 };
 
+/// Means of a script over `steps` steps from a time on.
+void step_voltages(const VoltageScript& script, double begin_s, double step_s, std::size_t steps, std::vector<double>& left_V,
+                   std::vector<double>& right_V);
+
 struct ReplayWindow {
   double start_s = 0;
   const model::Vehicle* vehicle = nullptr;

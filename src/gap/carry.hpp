@@ -1,0 +1,68 @@
+// What the sensors of many vehicles would have shown, had they flown a recorded flight: the voltages are the recorded
+// ones, and the torso is carried along the recorded motion, put back onto it at every interval of the IMU; wings and
+// motors are the vehicle's own. So every interval tests the forces and torques of that moment alone, and a whole flight
+// costs its own length once. A vehicle's numbers depend on no other's.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gap/beat_rows.hpp"
+#include "gap/recording.hpp"
+
+namespace flappy::gap {
+
+/// The channels that residuals are sorted by.
+enum Channel : int {
+  kTorqueX, kTorqueY, kTorqueZ,  ///< angular acceleration, rad/s^2, B
+  kForceX, kForceY, kForceZ,     ///< specific force at the IMU, m/s^2, B
+  kStrokeLeft, kStrokeRight,     ///< rad, where logged
+  kChannels
+};
+const char* channel_name(int channel);
+
+/// Rows of one flight: [beat][channel][coefficient].
+using Rows = std::vector<double>;
+inline constexpr std::size_t kRowsPerBeat = static_cast<std::size_t>(kChannels) * kCoefficients;
+
+/// What flies a recording once more.
+struct Candidate {
+  model::Vehicle vehicle;
+  /// By which the sensors are later, against the voltages, than the header says.
+  double lag_s = 0;
+};
+
+/// A recording with what its own sensors showed, as rows.
+class CarriedFlight {
+ public:
+  explicit CarriedFlight(Recording recording);
+
+  const Recording& recording() const { return recording_; }
+  std::size_t beats() const { return recording_.beats; }
+  bool covers(std::size_t beat, int channel) const;
+  /// As measured.
+  const Rows& measured() const { return measured_; }
+  /// What moved: as measured, and for torques the angular acceleration of the recorded motion, of which `measured` holds
+  /// nothing, for there the prediction is already the difference.
+  const Rows& signal() const { return signal_; }
+
+  /// As every candidate's sensors would have shown it; empty for one that came apart.
+  std::vector<Rows> predict(const std::vector<const Candidate*>& candidates) const;
+
+  /// Rows of the sensors' declared noise alone: one of its many courses, the same for a seed.
+  Rows declared_noise(std::uint64_t seed) const;
+
+ private:
+  Rows rows_of(const std::vector<double>& samples) const;
+
+  Recording recording_;
+  BeatProjection imu_, wings_;
+  bool has_wings_ = false;
+  Rows measured_, signal_;
+};
+
+/// All flights under all candidates on all processors: [candidate][flight].
+std::vector<std::vector<Rows>> predict_all(const std::vector<CarriedFlight>& flights,
+                                           const std::vector<Candidate>& candidates, int threads);
+
+}  // namespace flappy::gap

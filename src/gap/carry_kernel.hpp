@@ -1,0 +1,38 @@
+// One interval of the IMU for a block of vehicles that all fly one recorded motion: compiled once for each instruction
+// set, as the step is.
+#pragma once
+
+#include "sim/block.hpp"
+
+namespace flappy::gap {
+
+/// The torso origin where an interval begins or ends; body to world, velocity in W.
+struct TorsoAt {
+  double position_m[3] = {0, 0, 0}, attitude[4] = {1, 0, 0, 0}, velocity_m_s[3] = {0, 0, 0}, body_rate_rad_s[3] = {0, 0, 0};
+};
+
+/// What a vehicle's sensors would have shown over an interval, as rows of lanes.
+enum CarriedRow : int {
+  kTurnRate = 0,        ///< mean over the interval, recorded less flown, rad/s, B: 3 rows
+  kForce = 3,           ///< mean specific force at the IMU, m/s^2, B as half-way: 3 rows
+  kStroke = 6,          ///< at the end, left and right
+  kStrokeRate = 8,      ///< the same
+  kRotation = 10,       ///< the same
+  kCarriedRows = 12
+};
+
+/// What a block keeps from one interval to the next.
+struct CarriedBlock {
+  alignas(64) double imu_velocity_m_s[3][sim::kLanes<double>];  ///< in W, where the interval began
+  alignas(64) double rows[kCarriedRows][sim::kLanes<double>];
+};
+
+/// Reads what the interval from `from` to `to` gave and puts every torso back onto the record at `to`, wings kept; with
+/// `from` null it only puts. The body rate becomes what makes the flown turn the recorded one.
+using CarryBlock = void (*)(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
+                            const double imu_position_m[3], double gravity_m_s2, CarriedBlock& kept);
+
+/// The kernel of the named instruction set, of the best for an empty name.
+CarryBlock carry_kernel(const char* instruction_set);
+
+}  // namespace flappy::gap

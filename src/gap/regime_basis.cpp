@@ -1,0 +1,70 @@
+#include <cmath>
+
+#include "gap/evidence.hpp"
+
+namespace flappy::gap {
+namespace {
+
+/// How far what is near a surface reaches: a wing's length.
+constexpr double kReach_m = 0.07;
+
+}  // namespace
+
+RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
+  const auto add = [&](const char* name, auto&& value) {
+    double sum = 0, squares = 0, n = 0;
+    std::vector<Eigen::VectorXd> column;
+    for (const CarriedFlight& f : flights) {
+      Eigen::VectorXd v(static_cast<Eigen::Index>(f.beats()));
+      for (std::size_t j = 0; j < f.beats(); ++j) {
+        const double x = v[static_cast<Eigen::Index>(j)] = value(f.recording(), f.recording().regimes[j]);
+        sum += x, squares += x * x, n += 1;
+      }
+      column.push_back(std::move(v));
+    }
+    const double mean = sum / n, sd = std::sqrt(std::max(0.0, squares / n - mean * mean));
+    if (names_.empty()) {
+      values_.resize(flights.size());
+    } else if (!(sd > 1e-9 * (std::abs(mean) + 1e-3))) {
+      return;  // what never changes is the constant
+    }
+    for (std::size_t f = 0; f < flights.size(); ++f) {
+      const Eigen::Index k = static_cast<Eigen::Index>(names_.size());
+      values_[f].conservativeResize(column[f].size(), k + 1);
+      values_[f].col(k) = names_.empty() ? column[f] : Eigen::VectorXd((column[f].array() - mean) / sd);
+    }
+    names_.emplace_back(name);
+  };
+  using R = const Recording&;
+  using S = const Regime&;
+  add("1", [](R, S) { return 1.0; });
+  add("amplitude", [](R, S s) { return s.amplitude_V; });
+  add("difference", [](R, S s) { return s.difference_V; });
+  add("bias", [](R, S s) { return s.bias_V; });
+  add("split_cycle", [](R, S s) { return s.split_cycle; });
+  add("velocity_x", [](R, S s) { return s.velocity_B_m_s.x(); });
+  add("velocity_y", [](R, S s) { return s.velocity_B_m_s.y(); });
+  add("velocity_z", [](R, S s) { return s.velocity_B_m_s.z(); });
+  add("rate_x", [](R, S s) { return s.rate_rad_s.x(); });
+  add("rate_y", [](R, S s) { return s.rate_rad_s.y(); });
+  add("rate_z", [](R, S s) { return s.rate_rad_s.z(); });
+  plain_ = size();
+  add("amplitude^2", [](R, S s) { return s.amplitude_V * s.amplitude_V; });
+  add("|velocity| velocity_x", [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.x(); });
+  add("|velocity| velocity_y", [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.y(); });
+  add("|velocity| velocity_z", [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.z(); });
+  add("near ground", [](R r, S s) { return std::exp(-std::max(0.0, s.position_m.z() - r.world.ground_z_m) / kReach_m); });
+  add("near ceiling", [](R r, S s) { return std::exp(-std::max(0.0, r.world.ceiling_z_m - s.position_m.z()) / kReach_m); });
+  add("near wall", [](R r, S s) {
+    double near = 0;
+    for (const sim::Wall& w : r.world.walls)
+      near += std::exp(-std::max(0.0, w.normal_x * (s.position_m.x() - w.x_m) + w.normal_y * (s.position_m.y() - w.y_m)) / kReach_m);
+    return near;
+  });
+  add("height", [](R, S s) { return s.position_m.z(); });
+  add("cos heading", [](R, S s) { return std::cos(s.heading_rad); });
+  add("sin heading", [](R, S s) { return std::sin(s.heading_rad); });
+  add("time", [](R r, S s) { return s.t_s - r.begin_s; });
+}
+
+}  // namespace flappy::gap
