@@ -182,7 +182,7 @@ struct Squares {
   double parts[5] = {}, motion = 0, count = 0;
   void add(const Track& track, std::size_t i, const Eigen::Matrix<double, 15, 1>& error) {
     const Track::Covariance& p = track.covariance(i);
-    for (int k = 0; k < 5; ++k)
+    for (Eigen::Index k = 0; k < 5; ++k)
       parts[k] += error.segment<3>(3 * k).dot(p.block<3, 3>(3 * k, 3 * k).llt().solve(error.segment<3>(3 * k)));
     motion += error.head<9>().dot(p.topLeftCorner<9, 9>().llt().solve(error.head<9>()));
     ++count;
