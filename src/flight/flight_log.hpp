@@ -128,7 +128,8 @@ struct FlightLog {
 namespace log_file {
 inline const std::string kHeader = "flight.toml", kCommand = "command.csv", kMocap = "mocap.csv", kImu = "imu.csv",
                          kPower = "power.csv", kWings = "wings.csv", kTruth = "truth.csv";
-}
+inline const std::vector<std::string> kAll = {kHeader, kCommand, kMocap, kImu, kPower, kWings, kTruth};
+}  // namespace log_file
 
 /// Texts of the files of a log by name, truth.csv left out.
 using LogFiles = std::map<std::string, std::string>;
@@ -144,12 +145,15 @@ FlightLog parse_flight_log(const LogFiles& files, const std::filesystem::path& f
 /// The texts that parse_flight_log reads back exactly, quaternions to the last digit where their length is 1.
 LogFiles flight_log_files(const FlightLog& log);
 
-/// Writes a log as a whole or not at all. The folder is created, or replaced, truth.csv and all, if it is a flight log
-/// already. InputError if it holds anything else, if it cannot be written, or if the log would be refused when read.
+/// Writes a log as a whole or not at all. The folder is created, or replaced, truth.csv, vehicle and all, if it is a
+/// flight log already. InputError if it holds anything else, if it cannot be written, or if the log would be refused when read.
 void write_flight_log(const std::filesystem::path& folder, const FlightLog& log);
 
 /// Adds truth.csv to a log; columns of one length. InputError if the folder holds no flight log.
 void write_truth(const std::filesystem::path& folder, const std::vector<std::string>& names,
                  const std::vector<Column>& columns);
+
+/// Adds the file of the vehicle, `name` as the header declares it, so that the folder stands alone. InputError as above.
+void write_vehicle(const std::filesystem::path& folder, const std::string& name, std::string_view text);
 
 }  // namespace flappy::flight

@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "flight/flight_log.hpp"
+#include "io/config.hpp"
 #include "io/csv.hpp"
 
 namespace flappy::flight {
@@ -17,6 +18,20 @@ using namespace log_file;
   throw io::InputError(place.string() + ": " + what + (accepted.empty() ? "" : "; accepted: " + std::string(accepted)));
 }
 
+/// The vehicle that a log declares, whose file may lie in it; none in a log that cannot be read.
+std::string declared_vehicle(const fs::path& folder) {
+  try {
+    return io::Config::load(folder / kHeader).root().string("vehicle");
+  } catch (const io::InputError&) {
+    return "";
+  }
+}
+
+void require_log(const fs::path& folder) {
+  std::error_code ignored;
+  if (!fs::exists(folder / kHeader, ignored)) refuse(folder, "is no flight log", "a folder with " + kHeader);
+}
+
 /// Refuses a place that holds something other than a flight log.
 void require_replaceable(const fs::path& folder) {
   std::error_code error;
@@ -24,7 +39,8 @@ void require_replaceable(const fs::path& folder) {
   if (!fs::exists(status)) return;
   constexpr std::string_view kAccepted = "a new folder, an empty one, or a flight log to replace";
   if (!fs::is_directory(status)) refuse(folder, "is no folder", kAccepted);
-  const std::vector<std::string> known = {kHeader, kCommand, kMocap, kImu, kPower, kWings, kTruth};
+  std::vector<std::string> known = kAll;
+  known.push_back(declared_vehicle(folder));
   bool empty = true, has_header = false;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
@@ -99,9 +115,13 @@ void write_flight_log(const fs::path& folder, const FlightLog& log) {
 }
 
 void write_truth(const fs::path& folder, const std::vector<std::string>& names, const std::vector<Column>& columns) {
-  std::error_code ignored;
-  if (!fs::exists(folder / kHeader, ignored)) refuse(folder, "is no flight log", "a folder with " + kHeader);
+  require_log(folder);
   io::write_atomically(folder / kTruth, io::csv_text(names, columns));
+}
+
+void write_vehicle(const fs::path& folder, const std::string& name, std::string_view text) {
+  require_log(folder);
+  io::write_atomically(folder / name, text);
 }
 
 }  // namespace flappy::flight

@@ -29,7 +29,9 @@ std::string log_name(std::size_t i, std::size_t count) {
 }
 
 /// Refuses, before anything flies, a folder that cannot be written or where logs of this run would lie beside others.
-void prepare_log_folder(const fs::path& folder, std::size_t count) {
+void prepare_log_folder(const fs::path& folder, std::size_t count, const std::string& vehicle) {
+  if (std::ranges::count(log_file::kAll, vehicle) > 0)
+    throw io::InputError("vehicle: " + vehicle + " is also the name of a file of the log; accepted: another name");
   std::error_code error;
   const auto refuse = [&](const std::string& what) {
     throw io::InputError(folder.string() + ": " + what +
@@ -118,7 +120,9 @@ class Part {
       try {
         const bool alone = options.count == 1;
         const fs::path folder = alone ? options.log_folder : options.log_folder / log_name(first_ + i, options.count);
-        written += recorders_[i].write(folder);
+        if (!recorders_[i].write(folder)) continue;
+        write_vehicle(folder, config_.vehicle_file_name, config_.vehicle_text);
+        ++written;
       } catch (...) {
 #pragma omp critical
         fault = std::current_exception();
@@ -172,7 +176,7 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
   const bool logged = !options.log_folder.empty();
   std::size_t at_a_time = options.count;
   if (logged) {
-    prepare_log_folder(options.log_folder, options.count);
+    prepare_log_folder(options.log_folder, options.count, config.vehicle_file_name);
     const double room = options.log_bytes / (Recorder<T>::bytes_per_s(config) * config.duration_s);
     at_a_time = std::clamp<std::size_t>(static_cast<std::size_t>(std::min(room, 1e6)), 1, options.count);
     if (at_a_time > 16) at_a_time -= at_a_time % 16;  // whole blocks

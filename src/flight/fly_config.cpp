@@ -138,9 +138,11 @@ class Reader {
   void read_files() {
     const std::filesystem::path vehicle = root_.file("vehicle");
     c_.vehicle = for_file("vehicle", [&] { return model::read_vehicle(vehicle, to_["vehicle"]); });
-    file("vehicle");
+    const io::Config vehicle_config = file("vehicle");
     c_.vehicle_file_name = vehicle.filename().string();
-    if (to_["vehicle"].empty()) c_.vehicle_sha256 = io::sha256(io::read_text(vehicle));
+    const bool as_filed = to_["vehicle"].empty();
+    c_.vehicle_text = as_filed ? io::read_text(vehicle) : vehicle_config.resolved();
+    if (as_filed) c_.vehicle_sha256 = io::sha256(c_.vehicle_text);
     const auto read = [&](const std::string& key, const auto& reader) {
       const io::Config config = file(key);
       return for_file(key, [&] { return reader(config.root()); });

@@ -34,6 +34,7 @@ struct LogOptions {
 struct FlyConfig {
   std::string vehicle_file_name;  ///< without folder
   std::string vehicle_sha256;     ///< of that file; empty where an override made another vehicle of it
+  std::string vehicle_text;       ///< of that file; of the vehicle that overrides made of it
   model::Vehicle vehicle;
   std::optional<sim::Randomisation> randomisation;
   FleetOptions fleet;

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "flight/flight_log.hpp"
+#include "flight/mean_spline.hpp"
 #include "sim/replay.hpp"
 
 namespace flappy::flight {
@@ -30,23 +31,6 @@ struct TorsoMotion {
   Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();
   Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();
   Eigen::Vector3d body_rate_rad_s = Eigen::Vector3d::Zero();
-};
-
-/// A signal known by its means over adjoining intervals.
-class MeanSpline {
- public:
-  MeanSpline() = default;
-  /// One bound more than means.
-  MeanSpline(const std::vector<double>& bounds_s, std::vector<Eigen::Vector3d> means);
-  /// At share `u` of interval `k`.
-  Eigen::Vector3d value(std::size_t k, double u) const;
-  /// Integral over [u, v] of interval `k`, divided by its length.
-  Eigen::Vector3d integral(std::size_t k, double u, double v) const;
-  /// Of the integral from u on, over [u, v], divided by the square of the length.
-  Eigen::Vector3d second_integral(std::size_t k, double u, double v) const;
-
- private:
-  std::vector<Eigen::Vector3d> means_, knots_;
 };
 
 class Track {

@@ -30,21 +30,13 @@ std::string at(const io::CsvTable& table, std::size_t row, const std::string& co
 }
 
 std::vector<sim::Input> inputs_of(const io::CsvTable& table, const model::Driver& driver) {
-  const std::array<double, 4> limits = {driver.amplitude_limit_V, driver.difference_limit_V, driver.bias_limit_V,
-                                        driver.split_cycle_limit};
   std::vector<sim::Input> inputs(table.columns.front().size());
   if (inputs.empty()) throw io::InputError(table.name + ":1: has no rows; accepted: a row for each input");
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     std::array<double, 4> u{};
-    for (std::size_t k = 0; k < 4; ++k) {
-      u[k] = table.column(kInputNames[k])[i];
-      const double low = k == 0 ? 0 : -limits[k];
-      if (u[k] < low || u[k] > limits[k])
-        throw io::InputError(at(table, i, kInputNames[k]) + io::shortest_digits(u[k]) +
-                             " is beyond the vehicle's limits; accepted: " + io::shortest_digits(low) + " to " +
-                             io::shortest_digits(limits[k]));
-    }
+    for (std::size_t k = 0; k < 4; ++k) u[k] = table.column(kInputNames[k])[i];
     inputs[i] = {u[0], u[1], u[2], u[3]};
+    check_limits(inputs[i], driver, table.name + ":" + std::to_string(i + 2));
   }
   return inputs;
 }
@@ -91,6 +83,19 @@ void check_columns(const io::CsvTable& table, const Names& required, const Names
     if (std::ranges::count(table.names, name) == 0)
       throw io::InputError(table.name + ":1: " + name + ": column is missing; accepted: " + joined(required) +
                            (optional.empty() ? "" : ", optional " + joined(optional)));
+}
+
+void check_limits(const sim::Input& input, const model::Driver& driver, const std::string& where) {
+  const std::array<double, 4> limits = {driver.amplitude_limit_V, driver.difference_limit_V, driver.bias_limit_V,
+                                        driver.split_cycle_limit};
+  const std::array<double, 4> u = numbers_of(input);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double low = k == 0 ? 0 : -limits[k];
+    if (!(u[k] >= low && u[k] <= limits[k]))
+      throw io::InputError(where + ": " + kInputNames[k] + ": " + io::shortest_digits(u[k]) +
+                           " is beyond the vehicle's limits; accepted: " + io::shortest_digits(low) + " to " +
+                           io::shortest_digits(limits[k]));
+  }
 }
 
 const std::array<std::string, kChannels>& channel_names() {

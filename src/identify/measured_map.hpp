@@ -30,6 +30,9 @@ inline const std::array<std::string, 4> kInputNames = {"amplitude_V", "differenc
 void check_columns(const io::CsvTable& table, const std::vector<std::string>& required,
                    const std::vector<std::string>& optional);
 
+/// InputError "where: column: ..." for an input beyond the driver's limits, or no number.
+void check_limits(const sim::Input& input, const model::Driver& driver, const std::string& where);
+
 /// "force_x_N", ...; "force_x_sd_N", ...
 const std::array<std::string, kChannels>& channel_names();
 const std::array<std::string, kChannels>& sd_names();

@@ -2,16 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "flight/track.hpp"
+#include "identify/force_map.hpp"
 #include "io/csv.hpp"
 #include "sim/replay.hpp"
 
 namespace flappy::identify {
 namespace {
 
-constexpr double kStep_s = 1e-4;
 /// Beats until wings at rest have come into phase.
 constexpr double kSpinUpBeats = 3;
 /// Of what a logged stroke is off, taken back once in each interval of the IMU: a quarter of its noise remains.
@@ -58,15 +59,21 @@ sim::FlapperState with_mean_rate(const sim::FlapperState& before, sim::FlapperSt
   return x;
 }
 
+/// On a line between neighbours.
 double quantile_of(std::vector<double> values, double share) {
   if (values.empty()) return std::nan("");
   const double at = share * static_cast<double>(values.size() - 1);
   const auto k = static_cast<std::size_t>(at);
   std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(k));
   const double low = values[k];
-  if (k + 1 >= values.size()) return low;
+  if (k + 1 >= values.size() || at == static_cast<double>(k) || std::isinf(low)) return low;
   const double high = *std::min_element(values.begin() + static_cast<std::ptrdiff_t>(k) + 1, values.end());
   return low + (at - static_cast<double>(k)) * (high - low);
+}
+
+std::string in_ms(const std::array<double, 2>& window_s) {
+  const auto ms = [](double s) { return io::shortest_digits(std::round(1e4 * s) / 10); };
+  return ms(window_s[0]) + " and " + ms(window_s[1]) + " ms";
 }
 
 sim::World world_of(const flight::FlightHeader& h) {
@@ -86,8 +93,22 @@ StateVector noise_of(const flight::FlightHeader& h) {
 /// The full state of a simulated flight.
 class Truth {
  public:
-  explicit Truth(const std::filesystem::path& folder) : table_(io::read_csv(folder / flight::log_file::kTruth)) {}
+  /// InputError for rows that do not come at equal intervals of whole steps.
+  explicit Truth(const std::filesystem::path& folder) : table_(io::read_csv(folder / flight::log_file::kTruth)) {
+    const auto& t = t_s();
+    if (t.size() < 2)
+      throw io::InputError(table_.name + ": has " + (t.empty() ? "no row" : "one row") + "; accepted: at least two");
+    const double interval_s = std::round((t[1] - t[0]) / kStep_s) * kStep_s;
+    for (std::size_t i = 1; i < t.size(); ++i)
+      if (!(interval_s > 0) || !(std::abs(t[i] - t[i - 1] - interval_s) < 0.01 * kStep_s))
+        throw io::InputError(table_.name + ":" + std::to_string(i + 2) + ": t_s: is " +
+                             io::shortest_digits(t[i] - t[i - 1]) + " s after the row before; accepted: " +
+                             (interval_s > 0 ? io::shortest_digits(interval_s) + " s, as the rows before"
+                                             : "a whole number of steps of " + io::shortest_digits(kStep_s) + " s"));
+  }
   const std::vector<double>& t_s() const { return table_.column("t_s"); }
+  double interval_s() const { return t_s()[1] - t_s()[0]; }
+  bool covers(double from_s, double to_s) const { return from_s >= t_s().front() && to_s <= t_s().back(); }
   std::size_t row_near(double at_s) const {
     const auto& t = t_s();
     const auto after = static_cast<std::size_t>(std::ranges::lower_bound(t, at_s) - t.begin());
@@ -141,12 +162,14 @@ struct Transitions::Flight {
   }
 
   /// Where states are known best: the ends of the IMU's intervals, or the rows of truth.csv.
-  double grid_s() const { return truth ? truth->t_s()[1] - truth->t_s()[0] : imu_interval_s; }
+  double grid_s() const { return truth ? truth->interval_s() : imu_interval_s; }
   int grid_steps() const { return std::max(1, static_cast<int>(std::lround(grid_s() / kStep_s))); }
   /// Steps of so many beats, on the grid.
   int beat_steps(double beats) const {
     return std::max(1, static_cast<int>(std::lround(beats * beat_s / grid_s()))) * grid_steps();
   }
+  /// One and two beats on the grid.
+  std::array<double, 2> window_s() const { return {beat_steps(1) * kStep_s, beat_steps(2) * kStep_s}; }
   int spin_up_steps() const { return truth ? 0 : beat_steps(kSpinUpBeats); }
 
   sim::FlapperState at(double t_s) const {
@@ -184,7 +207,9 @@ struct Transitions::Flight {
     for (const double pose_s : track.pose_s()) {
       ++recorded;
       const double t_s = truth ? truth->t_s()[truth->row_near(pose_s)] : track.imu_bound_s(pose_s);
-      if (!track.covers(t_s - before_s, t_s + after_s) || !commanded(t_s - before_s, t_s + after_s)) ++not_covered;
+      const double from_s = t_s - before_s, to_s = t_s + after_s;
+      if (!track.covers(from_s, to_s) || !commanded(from_s, to_s) || (truth && !truth->covers(from_s, to_s)))
+        ++not_covered;
       else if (track.at(t_s).position_m.z() <= least_z_m) ++low;
       else starts_s.push_back(t_s);
     }
@@ -216,21 +241,28 @@ void Transitions::add(const std::filesystem::path& folder, const flight::FlightL
   auto flight = std::make_unique<Flight>(folder, log, vehicle, options_.source);
   const flight::Track& t = flight->track;
   const double surprise = std::sqrt(std::max({t.angle_surprise(), t.position_surprise(), t.bias_surprise()}));
-  if (!(surprise <= kLargestSurprise))
+  if (!(surprise <= kLargestSurprise) && !options_.accept_surprise)
     refuse("motion capture and IMU disagree, or are biased, by " + io::shortest_digits(std::round(10 * surprise) / 10) +
            " times their declared noise; accepted: at most " + io::shortest_digits(kLargestSurprise) +
-           "; flappy-gap check says more");
+           ", or any by --accept-surprise; flappy-gap check says more");
+  surprise_ = std::max(surprise_, surprise);
   flight->choose_starts();
   if (flight->starts_s.empty()) {
     if (flight->low > 0) refuse("no sample is higher than five mean chords above the ground; accepted: free flight");
     refuse("no sample has " + io::shortest_digits(kSpinUpBeats) +
            " beats before and 2 after it in which all streams are there; accepted: longer flights");
   }
+  if (!flights_.empty() && flight->window_s() != flights_.front()->window_s())
+    refuse("one and two of its beats are " + in_ms(flight->window_s()) + ", those of the flights before " +
+           in_ms(flights_.front()->window_s()) +
+           ", in whole intervals of the IMU; accepted: flights of equal beats, others in a run of their own");
   flights_.push_back(std::move(flight));
 }
 
 TransitionReport Transitions::run() const {
   TransitionReport report;
+  report.surprise = surprise_;
+  if (!flights_.empty()) report.beats_s = flights_.front()->window_s();
   std::size_t available = 0;
   for (const auto& f : flights_) {
     available += f->starts_s.size();
@@ -267,10 +299,13 @@ TransitionReport Transitions::run() const {
       ranges.push_back(f->range(windows[i].start_s));
       if (results[i].status & sim::kFrozen) {
         ++report.diverged;
+        for (auto& errors : report.errors) {
+          errors.emplace_back();
+          errors.back().fill(std::numeric_limits<double>::infinity());
+        }
         continue;
       }
       for (std::size_t b = 0; b < 2; ++b) {
-        report.beats_s[b] = ends[b] * kStep_s;
         const double end_s = windows[i].start_s + report.beats_s[b], interval_s = interval * kStep_s;
         const auto simulated = with_mean_rate(results[i].states[2 * b], results[i].states[2 * b + 1], interval_s);
         const auto recorded = with_mean_rate(f->at(end_s - interval_s), f->at(end_s), interval_s);

@@ -29,19 +29,23 @@ enum class Source {
 
 struct TransitionOptions {
   Source source = Source::sensors;
-  std::size_t samples = 2500;  ///< at most, evenly chosen
-  std::size_t every = 0;       ///< in place of it, where above 0: every so many samples
-  int threads = 0;             ///< 0: one for each processor
+  std::size_t samples = 2500;    ///< at most, evenly chosen
+  std::size_t every = 0;         ///< in place of it, where above 0: every so many samples
+  bool accept_surprise = false;  ///< also flights whose sensors disagree by more than their declared noise explains
+  int threads = 0;               ///< 0: one for each processor
 };
 
 struct TransitionReport {
   std::size_t samples = 0, recorded = 0, low = 0, not_covered = 0, diverged = 0;
-  double beats_s[2] = {0, 0};  ///< length of the replays: one and two beats in whole intervals of the IMU
-  StateVector range{};         ///< within a beat, median over samples, never below the sensors' noise
-  /// |simulated - recorded| of each sample that did not diverge, after one and two beats.
+  /// Length of the replays: one and two beats in whole intervals of the IMU, or between rows of truth.csv.
+  std::array<double, 2> beats_s{};
+  double surprise = 0;  ///< by how many times their declared noise the sensors disagree, in the worst of the flights
+  StateVector range{};  ///< within a beat, median over samples, never below the sensors' noise
+  /// |simulated - recorded| of each sample, after one and two beats; infinite where the simulator diverged.
   std::array<std::vector<StateVector>, 2> errors;
 
-  /// Quantile of the absolute errors; of errors over range where `of_range`.
+  /// Quantile of the absolute errors; of errors over range where `of_range`. Infinite where it falls on samples that
+  /// diverged.
   StateVector quantile(int beats, double share, bool of_range) const;
 };
 
@@ -51,8 +55,9 @@ class Transitions {
   explicit Transitions(const TransitionOptions& options);
   ~Transitions();
 
-  /// io::InputError "folder: what is wrong; accepted" where a flight is too short, never higher than five chords, or no
-  /// consistent record. `vehicle` flies in the air density of the log.
+  /// io::InputError "folder: what is wrong; accepted" where a flight is too short, never higher than five chords, no
+  /// consistent record, or has beats of another length than the flights before. `vehicle` flies in the air density of the
+  /// log.
   void add(const std::filesystem::path& folder, const flight::FlightLog& log, const model::Vehicle& vehicle);
   /// Of all flights that were added.
   TransitionReport run() const;
@@ -60,6 +65,7 @@ class Transitions {
  private:
   struct Flight;
   TransitionOptions options_;
+  double surprise_ = 0;
   std::vector<std::unique_ptr<Flight>> flights_;
 };
 

@@ -262,6 +262,7 @@ TEST_F(FlightLogFolder, IsWrittenAndReplacedAsAWhole) {
   fs::create_directory(folder_);
   write_flight_log(folder_, sample_log());
   write_truth(folder_, {"t_s", "x_m"}, {{0, 1}, {2, 3}});
+  write_vehicle(folder_, sample_log().header.vehicle, "mass");
   EXPECT_EQ(io::read_text(folder_ / "truth.csv"), "t_s,x_m\n0,2\n1,3\n");
   EXPECT_EQ(read_flight_log(folder_), sample_log());
 
@@ -272,6 +273,7 @@ TEST_F(FlightLogFolder, IsWrittenAndReplacedAsAWhole) {
   EXPECT_EQ(read_flight_log(folder_), other);
   EXPECT_FALSE(fs::exists(folder_ / "power.csv"));
   EXPECT_FALSE(fs::exists(folder_ / "truth.csv"));  // it was another flight's
+  EXPECT_FALSE(fs::exists(folder_ / sample_log().header.vehicle));
   EXPECT_EQ(names(), std::vector<std::string>{"flight_1"});
 }
 

@@ -6,9 +6,11 @@
 #include <cmath>
 #include <complex>
 
+#include "flappy/vehicle_file.hpp"
 #include "flight/fly_fixture.hpp"
 #include "flight/recorder.hpp"
 #include "io/csv.hpp"
+#include "io/sha256.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::flight {
@@ -299,6 +301,17 @@ TEST(Recorder, DeclaresTheVehicleOnlyWhereItIsThatOfTheFile) {
   fly(read_fly_config(kHover, {"flight.duration_s=0.1", "vehicle.torso.mass_kg=11e-3"}),
       {.log_folder = folder / "log"});
   EXPECT_EQ(read_flight_log(folder / "log").header.vehicle_sha256, "");
+  const fs::path copy = folder / "log" / "hummingbird_identified.toml";
+  EXPECT_EQ(model::read_vehicle(copy).torso.mass_kg, 11e-3);
+  // replaced by that of another flight, byte for byte the file
+  fly(read_fly_config(kHover, {"flight.duration_s=0.1"}), {.log_folder = folder / "log"});
+  EXPECT_EQ(io::sha256(io::read_text(copy)), read_flight_log(folder / "log").header.vehicle_sha256);
+  // one whose name the log needs itself
+  fs::copy_file(source_path("configs/vehicles/hummingbird_identified.toml"), folder / "flight.toml");
+  const FlyConfig clashes =
+      read_fly_config(kHover, {"flight.duration_s=0.1", "vehicle=\"" + (folder / "flight.toml").string() + "\""});
+  EXPECT_EQ(message([&] { fly(clashes, {.log_folder = folder / "clash"}); }),
+            "vehicle: flight.toml is also the name of a file of the log; accepted: another name");
   // a flight without a pose in it leaves no log
   EXPECT_EQ(fly(read_fly_config(kHover, {"flight.duration_s=0.02"}), {.log_folder = folder / "short"}).logs, 0u);
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "flight/fly.hpp"
 #include "flight/fly_fixture.hpp"
@@ -161,6 +162,99 @@ TEST_F(TransitionsTest, RefusesWhatIsNoRecordOfAFreeFlight) {
   log = logs()[0];
   for (double& t : log.imu.t_s) t += 10;
   EXPECT_NE(refusal(log).find("share 0 poses"), std::string::npos) << refusal(log);
+}
+
+TEST_F(TransitionsTest, AcceptsSurpriseWhereAsked) {
+  FlightLog log = logs()[0];
+  for (double& a : log.imu.accel_z_m_s2) a += 3;
+  EXPECT_NE(refusal(log).find("; accepted: at most 5, or any by --accept-surprise; "), std::string::npos);
+  Transitions t({.accept_surprise = true});
+  t.add("flights/it", log, test::identified());
+  t.add("flights/other", logs()[1], test::identified());
+  const TransitionReport r = t.run();
+  // over the 0.2 m/s^2 that a bias may be, on one axis of three; the smoother knows it to 0.02: 3 sd are 0.17, and it
+  // pulls it by (0.02/0.2)^2 towards 0, another 0.09
+  EXPECT_NEAR(r.surprise, 3 / (0.2 * std::sqrt(3.0)), 0.26);
+  EXPECT_GT(r.samples, 100u);
+}
+
+TEST_F(TransitionsTest, RefusesBeatsOfAnotherLength) {
+  FlightLog log = logs()[1];
+  log.header.flapping_Hz = 40;
+  EXPECT_EQ(message([&] {
+              Transitions t({});
+              t.add("flights/a", logs()[0], test::identified());
+              t.add("flights/b", log, test::identified());
+            }),
+            "flights/b: one and two of its beats are 26 and 50 ms, those of the flights before 30 and 58 ms, in whole "
+            "intervals of the IMU; accepted: flights of equal beats, others in a run of their own");
+}
+
+TEST_F(TransitionsTest, RefusesTruthWithoutItsRows) {
+  const Folder folder;
+  const auto refused = [&](const std::string& truth) {
+    folder.write("truth.csv", truth);
+    return message([&] {
+      Transitions t(from_truth());
+      t.add(folder / "", logs()[0], test::identified());
+    });
+  };
+  const std::string name = (folder / "truth.csv").string();
+  EXPECT_EQ(refused("t_s,x_m\n"), name + ": has no row; accepted: at least two");
+  EXPECT_EQ(refused("t_s,x_m\n0,0\n"), name + ": has one row; accepted: at least two");
+  EXPECT_EQ(refused("t_s,x_m\n1,0\n1,0\n"),
+            name + ":3: t_s: is 0 s after the row before; accepted: a whole number of steps of 1e-04 s");
+  EXPECT_EQ(refused("t_s,x_m\n1,0\n1.002,0\n1.0045,0\n").substr(0, name.size() + 20), name + ":4: t_s: is 0.002499");
+}
+
+TEST_F(TransitionsTest, LeavesOutWhatTruthDoesNotSpan) {
+  const Folder folder;
+  io::CsvTable truth = io::read_csv(places()[0] / "truth.csv");
+  const auto rows = [&](std::size_t from, std::size_t to) {
+    auto columns = truth.columns;
+    for (auto& c : columns)
+      c = {c.begin() + static_cast<std::ptrdiff_t>(from), c.begin() + static_cast<std::ptrdiff_t>(to)};
+    folder.write("truth.csv", io::csv_text(truth.names, columns));
+    Transitions t(from_truth());
+    t.add(folder / "", logs()[0], test::identified());
+    return t.run();
+  };
+  const TransitionReport whole = rows(0, 2001), part = rows(600, 1301);  // of 1.2 to 2.6 s
+  // from three beats and a row after 1.2 s to two and a row before 2.6: 1.4 - 0.151 s at 150/s
+  EXPECT_NEAR(static_cast<double>(part.samples), 187, 2);
+  EXPECT_EQ(part.samples + part.low + part.not_covered, whole.recorded);
+  for (const double e : part.quantile(2, 1, false)) EXPECT_LT(e, 1e-6);
+}
+
+TEST_F(TransitionsTest, CountsWhatDivergesAsInfinitelyFarOff) {
+  FlightLog log = logs()[0];  // a pulse as strong as the motor allows, on one side alone
+  for (std::size_t i = 0; i < log.command.t_s.size(); ++i)
+    if (log.command.t_s[i] >= 2 && log.command.t_s[i] < 2.02) log.command.left_voltage_V[i] = 1e6;
+  Transitions t({.samples = 1'000'000});
+  t.add("flights/it", log, test::identified());
+  const TransitionReport r = t.run();
+  EXPECT_GT(r.diverged, 0u);
+  EXPECT_LT(r.diverged, 30u);  // whose three beats before or two after meet it: 0.167 s at 150/s, and some
+  const auto last = static_cast<double>(r.samples - 1), diverged = static_cast<double>(r.diverged);
+  for (int beats = 1; beats <= 2; ++beats) {
+    EXPECT_EQ(r.errors[static_cast<std::size_t>(beats - 1)].size(), r.samples);
+    for (const double e : r.quantile(beats, 1, true)) EXPECT_TRUE(std::isinf(e));
+    for (const double e : r.quantile(beats, 1 - (diverged - 0.5) / last, false)) EXPECT_TRUE(std::isinf(e));
+    for (const double e : r.quantile(beats, 1 - (diverged + 0.5) / last, false)) EXPECT_TRUE(std::isfinite(e));
+  }
+}
+
+TEST(TransitionReport, QuantilesAreNumbersBesideInfiniteErrors) {
+  TransitionReport r;
+  const double infinite = std::numeric_limits<double>::infinity();
+  for (const double e : {infinite, 1.0, infinite, 2.0, infinite}) {
+    r.errors[0].emplace_back();
+    r.errors[0].back().fill(e);
+  }
+  r.range.fill(4);
+  EXPECT_EQ(r.quantile(1, 0.125, true)[0], 1.5 / 4);
+  EXPECT_EQ(r.quantile(1, 0.25, false)[0], 2);
+  for (const double share : {0.3, 0.5, 0.6, 1.0}) EXPECT_EQ(r.quantile(1, share, true)[0], infinite) << share;
 }
 
 TEST_F(TransitionsTest, LeavesOutWhereStreamsHaveGaps) {

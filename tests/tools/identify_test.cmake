@@ -98,6 +98,19 @@ expect_refused("--parameters: left.motor.resistance: not among those of ${SOURCE
   forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/out.toml --parameters left.motor.resistance)
 expect_refused("${WORK}/still.csv: amplitude_V: column is missing; accepted: this column, or --amplitude"
   kinematics ${WORK}/still.csv --vehicle ${nominal})
+foreach(value IN ITEMS 100 nan -5)
+  expect_refused("command line: amplitude_V: ${value} is beyond the vehicle's limits; accepted: 0 to 18"
+    kinematics ${WORK}/still.csv --vehicle ${nominal} --amplitude ${value})
+endforeach()
+expect_refused("command line: split_cycle: 3 is beyond the vehicle's limits; accepted: -0.15 to 0.15"
+  kinematics ${WORK}/still.csv --vehicle ${nominal} --amplitude 10 --split-cycle 3)
+file(STRINGS ${WORK}/still.csv rows)
+list(TRANSFORM rows APPEND ",19")
+list(POP_FRONT rows)
+list(JOIN rows "\n" rows)
+file(WRITE ${WORK}/high.csv "t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad,amplitude_V\n${rows}\n")
+expect_refused("${WORK}/high.csv: amplitude_V: 19 is beyond the vehicle's limits; accepted: 0 to 18"
+  kinematics ${WORK}/high.csv --vehicle ${nominal})
 if(EXISTS ${WORK}/out.toml)
   message(SEND_ERROR "a refused run left a vehicle")
 endif()

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "command.hpp"
+#include "identify/measured_map.hpp"
 #include "io/files.hpp"
 #include "shared_options.hpp"
 
@@ -32,7 +33,9 @@ Json run(const Settings& s) {
   cut(samples, s.from_s, s.to_s);
   if (s.amplitude->count() == 0 && !samples.input)
     throw io::InputError(samples.name + ": amplitude_V: column is missing; accepted: this column, or --amplitude");
-  const sim::Input input = s.amplitude->count() > 0 ? s.input : *samples.input;
+  const bool given = s.amplitude->count() > 0;
+  const sim::Input input = given ? s.input : *samples.input;
+  check_limits(input, vehicle.driver, given ? "command line" : samples.name);
   const WingComparison c = compare_wings(vehicle, input, samples, s.source.options(vehicle));
   if (!s.csv.empty()) write_beat_csv(s.csv, c);
   if (!s.svg.empty()) write_beat_svg(s.svg, c);

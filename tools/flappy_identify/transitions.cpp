@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 #include <numbers>
+#include <set>
 
 #include "command.hpp"
 #include "flappy/vehicle_file.hpp"
@@ -51,6 +52,11 @@ void print(const Request& request, const TransitionReport& r, double wall_s) {
   std::printf(
       "%zu flights, %zu samples replayed of %zu (%zu too low, %zu where streams are missing), %zu diverged; %.2f s\n",
       request.flights.size(), r.samples, r.recorded, r.low, r.not_covered, r.diverged, wall_s);
+  if (r.diverged > 0) std::printf("those that diverged count as infinitely far off\n");
+  if (request.options.accept_surprise)
+    std::printf("motion capture and IMU disagree by up to %.1f times their declared noise\n", r.surprise);
+  std::printf("one beat is %.1f ms, two are %.1f: whole intervals of %s\n", 1e3 * r.beats_s[0], 1e3 * r.beats_s[1],
+              request.options.source == Source::truth ? "truth.csv" : "the IMU");
   std::printf(request.options.source == Source::truth ? "from truth.csv: what is left is the vehicle's error alone\n"
                                                       : "with what the sensors leave unknown of a start and an end: of "
                                                         "a simulated flight, --truth leaves it out\n");
@@ -72,16 +78,21 @@ void print(const Request& request, const TransitionReport& r, double wall_s) {
       "  paper  after one beat under 5 %%, angles under 1 deg, position about 1 mm; more in pitch and vx after two\n");
 }
 
-Json by_state(const StateVector& values) {
-  Json json;
+/// Infinite ones, of samples that diverged, become null.
+Json by_state(const StateVector& values, const char* unit) {
+  Json json = {{"unit", unit}};
   for (std::size_t k = 0; k < values.size(); ++k) json[kStateNames[k]] = values[k];
   return json;
 }
 
 Json run(const Request& request) {
   const auto begin = std::chrono::steady_clock::now();
+  if (!request.csv.empty()) io::AtomicFile refused_before_the_work(request.csv);
   Transitions transitions(request.options);
+  std::set<fs::path> seen;
   for (const fs::path folder : request.flights) {
+    if (!seen.insert(fs::weakly_canonical(folder / ".")).second)
+      throw io::InputError(folder.string() + ": is given twice; accepted: each flight once");
     const flight::FlightLog log = flight::read_flight_log(folder);
     transitions.add(folder, log, model::read_vehicle(vehicle_path(request, folder, log.header)));
   }
@@ -89,22 +100,26 @@ Json run(const Request& request) {
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   print(request, r, wall_s);
   if (!request.csv.empty()) io::write_atomically(request.csv, distribution_csv(r));
+  constexpr const char *kShare = "fraction of range", *kAbsolute = "as each name says";
   return {{"flights", request.flights.size()},
           {"samples", r.samples},
           {"recorded", r.recorded},
           {"low", r.low},
           {"not_covered", r.not_covered},
           {"diverged", r.diverged},
+          {"beat_s", r.beats_s[0]},
+          {"two_beats_s", r.beats_s[1]},
+          {"sensor_surprise", r.surprise},
           {"from_truth", request.options.source == Source::truth},
-          {"range", by_state(r.range)},
-          {"error_1beat", by_state(r.quantile(1, 0.5, true))},
-          {"error_2beats", by_state(r.quantile(2, 0.5, true))},
-          {"error_1beat_p90", by_state(r.quantile(1, 0.9, true))},
-          {"error_2beats_p90", by_state(r.quantile(2, 0.9, true))},
-          {"absolute_1beat", by_state(r.quantile(1, 0.5, false))},
-          {"absolute_2beats", by_state(r.quantile(2, 0.5, false))},
-          {"absolute_1beat_p90", by_state(r.quantile(1, 0.9, false))},
-          {"absolute_2beats_p90", by_state(r.quantile(2, 0.9, false))},
+          {"range", by_state(r.range, kAbsolute)},
+          {"error_1beat", by_state(r.quantile(1, 0.5, true), kShare)},
+          {"error_2beats", by_state(r.quantile(2, 0.5, true), kShare)},
+          {"error_1beat_p90", by_state(r.quantile(1, 0.9, true), kShare)},
+          {"error_2beats_p90", by_state(r.quantile(2, 0.9, true), kShare)},
+          {"absolute_1beat", by_state(r.quantile(1, 0.5, false), kAbsolute)},
+          {"absolute_2beats", by_state(r.quantile(2, 0.5, false), kAbsolute)},
+          {"absolute_1beat_p90", by_state(r.quantile(1, 0.9, false), kAbsolute)},
+          {"absolute_2beats_p90", by_state(r.quantile(2, 0.9, false), kAbsolute)},
           {"wall_s", wall_s}};
 }
 
@@ -123,6 +138,8 @@ Command add_transitions(CLI::App& program) {
       ->check(CLI::Range(1, 10'000'000))
       ->excludes(samples);
   sub->add_option("--csv", request->csv, "write the distributions of all errors to this file");
+  sub->add_flag("--accept-surprise", request->options.accept_surprise,
+                "also flights whose motion capture and IMU disagree by more than 5 times their declared noise");
   sub->add_flag("--truth", request->truth,
                 "states and wings from truth.csv of simulated flights: the floor without sensors");
   return {sub, [request] {
