@@ -39,10 +39,12 @@ constexpr int kSignals = kChannels;
 /// Voltages of steps, some steps later.
 class ShiftedVoltage {
  public:
-  explicit ShiftedVoltage(double steps) : whole_(static_cast<std::ptrdiff_t>(std::floor(steps))), share_(steps - std::floor(steps)) {}
+  explicit ShiftedVoltage(double steps)
+      : whole_(static_cast<std::ptrdiff_t>(std::floor(steps))), share_(steps - std::floor(steps)) {}
   double of(const std::vector<double>& voltage_V, std::size_t step) const {
     const auto at = [&](std::ptrdiff_t i) {
-      return voltage_V[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i, 0, static_cast<std::ptrdiff_t>(voltage_V.size()) - 1))];
+      return voltage_V[static_cast<std::size_t>(
+          std::clamp<std::ptrdiff_t>(i, 0, static_cast<std::ptrdiff_t>(voltage_V.size()) - 1))];
     };
     const auto i = static_cast<std::ptrdiff_t>(step) - whole_;
     return share_ == 0 ? at(i) : (1 - share_) * at(i) + share_ * at(i - 1);
@@ -80,7 +82,8 @@ CarriedFlight::CarriedFlight(Recording recording) : recording_(std::move(recordi
   measured_ = rows_of(samples);
   for (std::size_t k = 0; k < r.intervals(); ++k)
     for (std::size_t i = 0; i < 3; ++i)
-      samples[k * kSignals + kTorqueX + i] = (r.torso[k + 1].body_rate_rad_s[i] - r.torso[k].body_rate_rad_s[i]) / r.interval_s(k);
+      samples[k * kSignals + kTorqueX + i] =
+          (r.torso[k + 1].body_rate_rad_s[i] - r.torso[k].body_rate_rad_s[i]) / r.interval_s(k);
   signal_ = rows_of(samples);
 }
 
@@ -178,7 +181,8 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
     for (std::size_t j = 0; j < r.beats; ++j)
       for (std::size_t c = 0; c < kCoefficients; ++c)
         for (std::size_t s = 0; s < kSignals; ++s)
-          rows[j * kRowsPerBeat + s * kCoefficients + c] = together[((j * kCoefficients + c) * kSignals + s) * kVehicles + lane];
+          rows[j * kRowsPerBeat + s * kCoefficients + c] =
+              together[((j * kCoefficients + c) * kSignals + s) * kVehicles + lane];
   }
   return result;
 }
@@ -195,7 +199,8 @@ std::vector<std::vector<Rows>> predict_all(const std::vector<CarriedFlight>& fli
       const std::size_t flight = static_cast<std::size_t>(job) % flights.size();
       const std::size_t first = static_cast<std::size_t>(job) / flights.size() * kVehicles;
       std::vector<const Candidate*> group;
-      for (std::size_t i = first; i < std::min(first + kVehicles, candidates.size()); ++i) group.push_back(&candidates[i]);
+      for (std::size_t i = first; i < std::min(first + kVehicles, candidates.size()); ++i)
+        group.push_back(&candidates[i]);
       std::vector<Rows> rows = flights[flight].predict(group);
       for (std::size_t i = 0; i < group.size(); ++i) result[first + i][flight] = std::move(rows[i]);
     } catch (...) {  // nothing may leave a parallel loop

@@ -14,9 +14,14 @@ namespace flappy::gap {
 
 /// The channels that residuals are sorted by.
 enum Channel : int {
-  kTorqueX, kTorqueY, kTorqueZ,  ///< angular acceleration, rad/s^2, B
-  kForceX, kForceY, kForceZ,     ///< specific force at the IMU, m/s^2, B
-  kStrokeLeft, kStrokeRight,     ///< rad, where logged
+  kTorqueX,
+  kTorqueY,
+  kTorqueZ,  ///< angular acceleration, rad/s^2, B
+  kForceX,
+  kForceY,
+  kForceZ,  ///< specific force at the IMU, m/s^2, B
+  kStrokeLeft,
+  kStrokeRight,  ///< rad, where logged
   kChannels
 };
 const char* channel_name(int channel);

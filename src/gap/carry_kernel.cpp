@@ -37,7 +37,8 @@ void carry_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& 
       Vec3<V> force = per_interval * (flight::point_velocity(flown, imu) - load(kept.imu_velocity_m_s, first));
       force.z += V(gravity_m_s2);
       const Matrix3<V> halfway = rotation_matrix(turned(begin, V(0.25) * turn));
-      const Vec3<V> missed = per_interval * flight::rotation_vector(flight::from_to(flown.attitude, quaternion(to.attitude)));
+      const Vec3<V> missed =
+          per_interval * flight::rotation_vector(flight::from_to(flown.attitude, quaternion(to.attitude)));
       store(missed, kept.rows + kTurnRate, first);
       store(transpose_times(halfway, force), kept.rows + kForce, first);
       x.left.stroke_rad.store(kept.rows[kStroke] + first);

@@ -8,16 +8,17 @@ namespace flappy::gap {
 
 /// The torso origin where an interval begins or ends; body to world, velocity in W.
 struct TorsoAt {
-  double position_m[3] = {0, 0, 0}, attitude[4] = {1, 0, 0, 0}, velocity_m_s[3] = {0, 0, 0}, body_rate_rad_s[3] = {0, 0, 0};
+  double position_m[3] = {0, 0, 0}, attitude[4] = {1, 0, 0, 0}, velocity_m_s[3] = {0, 0, 0},
+         body_rate_rad_s[3] = {0, 0, 0};
 };
 
 /// What a vehicle's sensors would have shown over an interval, as rows of lanes.
 enum CarriedRow : int {
-  kTurnRate = 0,        ///< mean over the interval, recorded less flown, rad/s, B: 3 rows
-  kForce = 3,           ///< mean specific force at the IMU, m/s^2, B as half-way: 3 rows
-  kStroke = 6,          ///< at the end, left and right
-  kStrokeRate = 8,      ///< the same
-  kRotation = 10,       ///< the same
+  kTurnRate = 0,    ///< mean over the interval, recorded less flown, rad/s, B: 3 rows
+  kForce = 3,       ///< mean specific force at the IMU, m/s^2, B as half-way: 3 rows
+  kStroke = 6,      ///< at the end, left and right
+  kStrokeRate = 8,  ///< the same
+  kRotation = 10,   ///< the same
   kCarriedRows = 12
 };
 

@@ -49,10 +49,11 @@ Evidence::Evidence(const std::vector<CarriedFlight>& flights) : flights_(flights
   }
   Signature declared;
   for (std::size_t f = 0; f < flights.size(); ++f) declared.push_back(flights[f].declared_noise(f + 1));
-  find_noise(declared, true);
+  find_noise(declared, Find::declared);
 }
 
-void Evidence::learn_noise(const Signature& residual) { find_noise(residual, false); }
+void Evidence::learn_weights(const Signature& residual) { find_noise(residual, Find::weights); }
+void Evidence::learn_noise(const Signature& residual) { find_noise(residual, Find::noise); }
 
 /// Calls use(beat, whether the one before it counts) for the beats of a flight that a channel covers.
 template <class Use>
@@ -66,8 +67,7 @@ void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
   }
 }
 
-/// `declared`: the residual is noise as declared, of which no row is too far off.
-void Evidence::find_noise(const Signature& residual, bool declared) {
+void Evidence::find_noise(const Signature& residual, Find what) {
   const Index q = basis_.size();
 #pragma omp parallel for schedule(dynamic) num_threads(2)
   for (int g = 0; g < kGroups; ++g) {
@@ -100,7 +100,8 @@ void Evidence::find_noise(const Signature& residual, bool declared) {
         product += a * b;
         square += (a * a + b * b) / 2;
       });
-    Group& group = groups_[static_cast<std::size_t>(g)];
+    Group& known = groups_[static_cast<std::size_t>(g)];
+    Group group = known;
     group.past = square > 0 ? std::clamp(product / square, -kMostPast, kMostPast) : 0;
     std::vector<double> steps;
     const auto innovation = [&](std::size_t f, std::size_t j, bool before) {
@@ -109,14 +110,37 @@ void Evidence::find_noise(const Signature& residual, bool declared) {
     for (std::size_t f = 0; f < flights_.size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) { steps.push_back(std::abs(innovation(f, j, before))); });
     group.sd = std::max({1.4826 * median(steps), group.least_sd, 1e-9});
-    if (declared) {
-      group.least_sd = group.sd;
-      continue;
-    }
+    if (what == Find::declared) group.least_sd = group.sd;
+    if (what != Find::weights) known = group;
+    if (what == Find::declared) continue;  // of what is declared, no row is too far off
     for (std::size_t f = 0; f < flights_.size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) {
         const double t = innovation(f, j, before) / group.sd;
         weights_[f][row_of(j, g)] = std::min(1.0, (kTail + 1) / (kTail + t * t));
+      });
+  }
+}
+
+void Evidence::smooth(Signature& rows) const {
+  const Index q = basis_.size();
+  for (int channel = 0; channel < kChannels; ++channel) {
+    MatrixXd normal = MatrixXd::Zero(q, q), right = MatrixXd::Zero(q, kCoefficients);
+    double n = 0;
+    for (std::size_t f = 0; f < flights_.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool) {
+        const auto b = basis_.values(f).row(static_cast<Index>(j));
+        const Eigen::Map<const Eigen::RowVectorXd> y(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
+        normal.noalias() += b.transpose() * b;
+        right.noalias() += b.transpose() * y;
+        n += 1;
+      });
+    if (n == 0) continue;
+    normal.diagonal().array() += kLooseRidge * n;
+    const MatrixXd eta = normal.ldlt().solve(right);
+    for (std::size_t f = 0; f < flights_.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool) {
+        Eigen::Map<Eigen::RowVectorXd> y(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
+        y = basis_.values(f).row(static_cast<Index>(j)) * eta;
       });
   }
 }
@@ -200,9 +224,10 @@ Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& co
   Posterior p;
   p.mean = llt.solve(right);
   p.covariance = llt.solve(MatrixXd::Identity(k, k));
-  p.log_evidence = reduced.log_scale -
-                   0.5 * (reduced.sums(last, last) + weight.dot(prior_mean.cwiseProduct(prior_mean)) - right.dot(p.mean)) -
-                   llt.matrixLLT().diagonal().array().log().sum() - prior_sd.array().log().sum();
+  p.log_evidence =
+      reduced.log_scale -
+      0.5 * (reduced.sums(last, last) + weight.dot(prior_mean.cwiseProduct(prior_mean)) - right.dot(p.mean)) -
+      llt.matrixLLT().diagonal().array().log().sum() - prior_sd.array().log().sum();
   return p;
 }
 

@@ -72,8 +72,13 @@ class Evidence {
   explicit Evidence(const std::vector<CarriedFlight>& flights);
 
   const RegimeBasis& basis() const { return basis_; }
-  /// Finds the scale of the noise, its autocorrelation and the weights of rows; before, noise is as the headers declare it.
+  /// Noise is as the headers declare it, until it is learnt from what a good fit leaves: its scale, its autocorrelation, and
+  /// which rows count less. The weights alone are for residuals that are no noise yet.
+  void learn_weights(const Signature& residual);
   void learn_noise(const Signature& residual);
+  /// The part of rows that is a smooth function of the regime. Differences of simulations are rough: where in its step a
+  /// wing meets its stop decides on more than the parameter that was moved.
+  void smooth(Signature& rows) const;
   Grams grams(const Signature& residual, const std::vector<const Signature*>& columns) const;
   /// `use`: which flights.
   Reduced reduce(const Grams& grams, const std::vector<char>& use, Discrepancy discrepancy) const;
@@ -91,7 +96,8 @@ class Evidence {
     double sd = 1, past = 0, signal = 0;
     double least_sd = 0;  ///< as declared
   };
-  void find_noise(const Signature& residual, bool declared);
+  enum class Find { declared, weights, noise };
+  void find_noise(const Signature& residual, Find what);
   template <class Use>
   void for_rows(std::size_t flight, int channel, const Use& use) const;
 

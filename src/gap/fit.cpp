@@ -1,18 +1,18 @@
 #include "gap/fit.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace flappy::gap {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Of a coordinate, to either side: small against its prior, large against rounding.
-constexpr double kDifference = 0.1;
-/// Effects of one sign step to one side from 0.
-constexpr double kSizeDifference = 0.2;
+/// Reach of the first differences, and bounds of the later ones: so many standard deviations of what is known then, for a
+/// step has to be long where little is known and short where much is.
+constexpr double kFirstReach = 0.3, kLeastReach = 0.1, kMostReach = 1, kReachSd = 3;
 constexpr double kConverged = 0.02;
 /// Nats that another linearisation has to bring.
 constexpr double kWorthwhile = 0.05;
@@ -34,35 +34,60 @@ std::vector<Signature> Fitter::residuals(const std::vector<Candidate>& candidate
   return list;
 }
 
-Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, const std::vector<Index>& which) const {
+Directions Fitter::axes(const Hypothesis& hypothesis) {
+  return {MatrixXd::Identity(hypothesis.size(), hypothesis.size()), VectorXd::Constant(hypothesis.size(), kFirstReach)};
+}
+
+Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions) const {
   std::vector<Candidate> candidates = {hypothesis.candidate(at)};
-  struct Difference {
-    Index coordinate;
-    double span;
-  };
-  std::vector<Difference> differences;
-  for (const Index i : which) {
-    const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(i)];
-    VectorXd up = at, down = at;
-    up[i] += u.size ? kSizeDifference : kDifference;
-    down[i] -= u.size ? kSizeDifference : kDifference;
-    up = hypothesis.bounded(up);
-    down = hypothesis.bounded(down);
-    if (u.size && u.low >= 0 && at[i] < kSizeDifference) down = at;
-    differences.push_back({i, up[i] - down[i]});
+  std::vector<double> spans;
+  for (Index d = 0; d < directions.reach.size(); ++d) {
+    const VectorXd axis = directions.axes.col(d);
+    const VectorXd up = hypothesis.bounded(at + directions.reach[d] * axis);
+    const VectorXd down = hypothesis.bounded(at - directions.reach[d] * axis);
+    spans.push_back((up - down).dot(axis));
     candidates.push_back(hypothesis.candidate(up));
     candidates.push_back(hypothesis.candidate(down));
   }
   std::vector<Signature> rows = residuals(candidates);
-  Linearised l{at, std::move(rows[0]), std::vector<Signature>(static_cast<std::size_t>(hypothesis.size()))};
-  for (std::size_t d = 0; d < differences.size(); ++d) {
+  Linearised l{at, std::move(directions), std::move(rows[0]), {}};
+  for (std::size_t d = 0; d < spans.size(); ++d) {
     Signature &up = rows[1 + 2 * d], &down = rows[2 + 2 * d];
-    if (up.empty() || down.empty()) continue;
+    l.columns.emplace_back();
+    if (up.empty() || down.empty() || !(spans[d] > 0)) continue;
     for (std::size_t f = 0; f < up.size(); ++f)
-      for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / differences[d].span;
-    l.columns[static_cast<std::size_t>(differences[d].coordinate)] = std::move(up);
+      for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / spans[d];
+    evidence_.smooth(up);
+    l.columns.back() = std::move(up);
   }
   return l;
+}
+
+Posterior Fitter::solve(const Linearised& point) const {
+  const Index k = point.directions.reach.size();
+  std::vector<const Signature*> columns;
+  std::vector<int> chosen;
+  std::vector<Index> seen;
+  for (Index d = 0; d < k; ++d) {
+    if (point.columns[static_cast<std::size_t>(d)].empty()) continue;
+    chosen.push_back(static_cast<int>(columns.size()));
+    columns.push_back(&point.columns[static_cast<std::size_t>(d)]);
+    seen.push_back(d);
+  }
+  const Reduced reduced =
+      evidence_.reduce(evidence_.grams(point.residual, columns), all_of(flights_.size()), discrepancy_);
+  const VectorXd prior_mean = -(point.directions.axes.transpose() * point.at);
+  const Posterior p =
+      Evidence::posterior(reduced, chosen, prior_mean(seen), VectorXd::Ones(static_cast<Index>(seen.size())));
+  Posterior all{p.log_evidence, VectorXd::Zero(k), MatrixXd::Identity(k, k)};
+  all.mean(seen) = p.mean;
+  all.covariance(seen, seen) = p.covariance;
+  return all;
+}
+
+VectorXd Fit::mean() const { return point.at + point.directions.axes * posterior.mean; }
+MatrixXd Fit::covariance() const {
+  return point.directions.axes * posterior.covariance * point.directions.axes.transpose();
 }
 
 double Fitter::cost(const Signature& residual, const VectorXd& at) const {
@@ -70,32 +95,40 @@ double Fitter::cost(const Signature& residual, const VectorXd& at) const {
   return 0.5 * (reduced.sums(0, 0) + at.squaredNorm());
 }
 
+/// The axes of what is known: parameters turned among themselves, effects as they are.
+Directions Fitter::principal(const Hypothesis& hypothesis, const Fit& fit) {
+  const Index shared = hypothesis.shared(), size = hypothesis.size();
+  const MatrixXd covariance = fit.covariance();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance.topLeftCorner(shared, shared));
+  Directions d = axes(hypothesis);
+  d.axes.topLeftCorner(shared, shared) = eigen.eigenvectors();
+  for (Index i = 0; i < size; ++i) {
+    const double variance = i < shared ? eigen.eigenvalues()[i] : covariance(i, i);
+    d.reach[i] = std::clamp(kReachSd * std::sqrt(variance), kLeastReach, kMostReach);
+  }
+  return d;
+}
+
 Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int iterations) const {
   Fit result;
-  std::vector<Index> all(static_cast<std::size_t>(hypothesis.size()));
-  std::iota(all.begin(), all.end(), Index{0});
-  result.point = linearise(hypothesis, hypothesis.bounded(std::move(start)), all);
-  if (result.point.residual.empty()) return result;  // comes apart
-  for (result.iterations = 1;; ++result.iterations) {
-    const Linearised& l = result.point;
-    std::vector<const Signature*> columns;
-    std::vector<int> chosen;
-    std::vector<Index> coordinates;
-    for (const Index i : all) {
-      if (l.columns[static_cast<std::size_t>(i)].empty()) continue;
-      chosen.push_back(static_cast<int>(columns.size()));
-      columns.push_back(&l.columns[static_cast<std::size_t>(i)]);
-      coordinates.push_back(i);
-    }
-    const Reduced reduced = evidence_.reduce(evidence_.grams(l.residual, columns), all_of(flights_.size()), discrepancy_);
-    VectorXd prior_mean(static_cast<Index>(coordinates.size()));
-    for (std::size_t i = 0; i < coordinates.size(); ++i) prior_mean[static_cast<Index>(i)] = -l.at[coordinates[i]];
-    result.posterior = Evidence::posterior(reduced, chosen, prior_mean, VectorXd::Ones(prior_mean.size()));
-    result.coordinates = coordinates;
-    if (result.iterations >= iterations) return result;
-    VectorXd step = VectorXd::Zero(l.at.size());
-    for (std::size_t i = 0; i < coordinates.size(); ++i) step[coordinates[i]] = result.posterior.mean[static_cast<Index>(i)];
-    if (step.cwiseAbs().maxCoeff() < kConverged) return result;
+  result.point = linearise(hypothesis, hypothesis.bounded(std::move(start)), axes(hypothesis));
+  return improve(hypothesis, std::move(result), iterations);
+}
+
+Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const {
+  Fit result;
+  result.point = linearise(hypothesis, before.point.at, principal(hypothesis, before));
+  return improve(hypothesis, std::move(result), iterations);
+}
+
+Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations) const {
+  if (fit.point.residual.empty()) return fit;  // comes apart
+  for (fit.iterations = 1;; ++fit.iterations) {
+    const Linearised& l = fit.point;
+    fit.posterior = solve(l);
+    if (fit.iterations >= iterations) return fit;
+    const VectorXd step = l.directions.axes * fit.posterior.mean;
+    if (step.cwiseAbs().maxCoeff() < kConverged) return fit;
     // the longest share of the step that pays, all tried at once
     constexpr double kShares[] = {1, 0.5, 0.25, 0.1, 0.03};
     std::vector<VectorXd> tries;
@@ -104,19 +137,19 @@ Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int iterations) co
       tries.push_back(hypothesis.bounded(l.at + share * step));
       candidates.push_back(hypothesis.candidate(tries.back()));
     }
-    const std::vector<Signature> residuals_there = residuals(candidates);
+    const std::vector<Signature> left = residuals(candidates);
     const double before = cost(l.residual, l.at);
     std::size_t best = tries.size();
     double best_cost = before;
     for (std::size_t i = 0; i < tries.size(); ++i) {
-      if (residuals_there[i].empty()) continue;
-      const double c = cost(residuals_there[i], tries[i]);
+      if (left[i].empty()) continue;
+      const double c = cost(left[i], tries[i]);
       if (c < best_cost) best = i, best_cost = c;
     }
-    if (best == tries.size() || before - best_cost < kWorthwhile) return result;
-    Linearised next = linearise(hypothesis, tries[best], all);
-    if (next.residual.empty()) return result;
-    result.point = std::move(next);
+    if (best == tries.size() || before - best_cost < kWorthwhile) return fit;
+    Linearised next = linearise(hypothesis, tries[best], principal(hypothesis, fit));
+    if (next.residual.empty()) return fit;
+    fit.point = std::move(next);
   }
 }
 

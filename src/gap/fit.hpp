@@ -7,18 +7,28 @@
 
 namespace flappy::gap {
 
+/// Orthonormal directions through the coordinates, and how far a difference goes along each.
+struct Directions {
+  Eigen::MatrixXd axes;  ///< a column each
+  Eigen::VectorXd reach;
+};
+
 /// A hypothesis at given coordinates, linearised: what is left of the measurement, and how it changes.
 struct Linearised {
   Eigen::VectorXd at;
+  Directions directions;
   Signature residual;
-  std::vector<Signature> columns;  ///< change of the prediction for a unit of each coordinate
+  std::vector<Signature>
+      columns;  ///< change of the prediction for a unit along each direction; empty: it comes apart there
 };
 
 struct Fit {
   Linearised point;
-  Posterior posterior;                    ///< of `coordinates`, relative to `point.at`
-  std::vector<Eigen::Index> coordinates;  ///< all but those without which the vehicle comes apart
+  Posterior posterior;  ///< along the directions, relative to `point.at`
   int iterations = 0;
+  /// Of the coordinates.
+  Eigen::VectorXd mean() const;
+  Eigen::MatrixXd covariance() const;
 };
 
 class Fitter {
@@ -28,12 +38,18 @@ class Fitter {
 
   /// Residuals under many candidates; empty signatures for vehicles that come apart.
   std::vector<Signature> residuals(const std::vector<Candidate>& candidates) const;
-  /// Derivatives for the coordinates `which`, the others' columns are empty.
-  Linearised linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, const std::vector<Eigen::Index>& which) const;
+  Linearised linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions) const;
+  /// Every coordinate.
+  static Directions axes(const Hypothesis& hypothesis);
   /// From `start` on, at most `iterations` linearisations; empty residual where the vehicle comes apart at once.
   Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int iterations) const;
+  /// The same, from where another fit ended, along its directions.
+  Fit refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const;
 
  private:
+  static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
+  Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations) const;
+  Posterior solve(const Linearised& point) const;
   double cost(const Signature& residual, const Eigen::VectorXd& at) const;
 
   const std::vector<CarriedFlight>& flights_;

@@ -13,11 +13,11 @@ namespace flappy::gap {
 
 /// One coordinate: value = centre + scale x coordinate.
 struct Unknown {
-  std::string effect;     ///< empty for a parameter of the vehicle
-  std::string name;       ///< path of the parameter, or name of the effect's
+  std::string effect;  ///< empty for a parameter of the vehicle
+  std::string name;    ///< path of the parameter, or name of the effect's
   double centre = 0, scale = 1;
   double low = -1e30, high = 1e30;  ///< of the value
-  bool size = false;      ///< the effect vanishes where all of its sizes are 0
+  bool size = false;                ///< the effect vanishes where all of its sizes are 0
   double value(double coordinate) const;
   double coordinate(double of_value) const { return (of_value - centre) / scale; }
 };

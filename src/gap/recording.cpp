@@ -28,25 +28,25 @@ TorsoAt torso_at(const flight::TorsoMotion& m) {
 
 }  // namespace
 
-Recording::Recording(const std::filesystem::path& folder, flight::FlightLog flight_log)
+Recording::Recording(const std::filesystem::path& folder, flight::FlightLog flight_log, double standing_m)
     : name(folder.filename().empty() ? folder.parent_path().filename().string() : folder.filename().string()),
       log(std::move(flight_log)),
       track(log, folder) {
   const flight::FlightHeader& h = log.header;
   world = {h.gravity_m_s2, h.ambient.ground_z_m, h.ambient.ceiling_z_m, {}};
   for (const flight::LogWall& w : h.ambient.walls) world.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
-  lay_grid();
+  lay_grid(h.ambient.ground_z_m + standing_m + kLeastClearance_m);
   if (steps.empty()) throw io::InputError(folder.string() + ": no interval of the IMU has motion capture around it");
   read_voltages();
   find_phase();
   read_regimes();
 }
 
-void Recording::lay_grid() {
+void Recording::lay_grid(double least_z_m) {
   const std::vector<double>& bounds = track.bounds_s();
   const double usual_s = 1 / log.header.imu.rate_hz;
-  const auto first = static_cast<std::size_t>(std::ranges::lower_bound(bounds, std::max(track.begin_s(), log.command.t_s.front())) -
-                                              bounds.begin());
+  const auto first = static_cast<std::size_t>(
+      std::ranges::lower_bound(bounds, std::max(track.begin_s(), log.command.t_s.front())) - bounds.begin());
   if (first >= bounds.size()) return;
   begin_s = bounds[first];
   double now_s = begin_s;
@@ -64,7 +64,8 @@ void Recording::lay_grid() {
       end_s.push_back(now_s);
       torso.push_back(torso_at(track.at(at_s)));
       force_m_s2.push_back(track.mean_force_m_s2(from_s, now_s));
-      valid.push_back(track.covers(std::max(from_s, track.begin_s()), at_s) ? 1 : 0);
+      const bool flies = torso.back().position_m[2] > least_z_m;
+      valid.push_back(flies && track.covers(std::max(from_s, track.begin_s()), at_s) ? 1 : 0);
     }
   }
 }
@@ -72,8 +73,8 @@ void Recording::lay_grid() {
 void Recording::read_voltages() {
   std::size_t total = 0;
   for (const int n : steps) total += static_cast<std::size_t>(n);
-  sim::step_voltages({log.command.t_s, log.command.left_voltage_V, log.command.right_voltage_V}, begin_s, kStep_s, total,
-                     left_V, right_V);
+  sim::step_voltages({log.command.t_s, log.command.left_voltage_V, log.command.right_voltage_V}, begin_s, kStep_s,
+                     total, left_V, right_V);
 }
 
 /// The beat's phase as the log has it, or that of the sine that fits the voltages best.
@@ -120,8 +121,8 @@ void Recording::find_phase() {
 double Recording::beat_at(double t_s) const {
   if (phase_t_s_.empty()) return phase_hz_ * (t_s - begin_s) + phase_offset_;
   const auto after = std::ranges::upper_bound(phase_t_s_, t_s);
-  const auto i = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(after - phase_t_s_.begin(), 1,
-                                                                     static_cast<std::ptrdiff_t>(phase_t_s_.size()) - 1));
+  const auto i = static_cast<std::size_t>(
+      std::clamp<std::ptrdiff_t>(after - phase_t_s_.begin(), 1, static_cast<std::ptrdiff_t>(phase_t_s_.size()) - 1));
   const double share = (t_s - phase_t_s_[i - 1]) / (phase_t_s_[i] - phase_t_s_[i - 1]);
   return phase_beats_[i - 1] + share * (phase_beats_[i] - phase_beats_[i - 1]);
 }

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
+#include "flappy/vehicle.hpp"
 #include "flight/flight_log.hpp"
 #include "flight/track.hpp"
-#include "flappy/vehicle.hpp"
 #include "gap/carry_kernel.hpp"
 
 namespace flappy::gap {
@@ -16,6 +16,8 @@ namespace flappy::gap {
 inline constexpr double kStep_s = 1e-4;
 /// Beats until wings that were at rest have forgotten it: after three, thirty times the noise remains.
 inline constexpr double kSpinUpBeats = 6;
+/// Lower than this over its stand a vehicle may still be touching the ground, which no hypothesis knows.
+inline constexpr double kLeastClearance_m = 0.01;
 
 /// Means over whole beats of what a flight did, which residuals are sorted by.
 struct Regime {
@@ -32,20 +34,21 @@ struct Recording {
 
   // the grid: intervals of the IMU on whole physics steps
   double begin_s = 0;
-  std::vector<int> steps;                ///< of each interval
-  std::vector<double> end_s;             ///< of each interval
-  std::vector<char> valid;               ///< whether all streams were there
-  std::vector<TorsoAt> torso;            ///< at every bound: one more than intervals
+  std::vector<int> steps;                   ///< of each interval
+  std::vector<double> end_s;                ///< of each interval
+  std::vector<char> valid;                  ///< whether all streams were there, and the ground was not
+  std::vector<TorsoAt> torso;               ///< at every bound: one more than intervals
   std::vector<Eigen::Vector3d> force_m_s2;  ///< measured, mean over the interval
-  std::vector<double> left_V, right_V;   ///< of every physics step
+  std::vector<double> left_V, right_V;      ///< of every physics step
 
   // the beats
-  std::vector<double> beat;              ///< at the middle of each interval: whole beats since the start, and the phase
-  std::size_t beats = 0;                 ///< whole ones
-  std::vector<Regime> regimes;           ///< of each
+  std::vector<double> beat;     ///< at the middle of each interval: whole beats since the start, and the phase
+  std::size_t beats = 0;        ///< whole ones
+  std::vector<Regime> regimes;  ///< of each
 
-  /// InputError naming `folder` where nothing of it can be replayed.
-  Recording(const std::filesystem::path& folder, flight::FlightLog flight_log);
+  /// `standing_m`: height of the origin over the ground when the vehicle stands. InputError naming `folder` where nothing
+  /// of it can be replayed.
+  Recording(const std::filesystem::path& folder, flight::FlightLog flight_log, double standing_m);
 
   double interval_s(std::size_t k) const { return steps[k] * kStep_s; }
   std::size_t intervals() const { return steps.size(); }
@@ -53,7 +56,7 @@ struct Recording {
   double beat_at(double t_s) const;
 
  private:
-  void lay_grid();
+  void lay_grid(double least_z_m);
   void read_voltages();
   void find_phase();
   void read_regimes();

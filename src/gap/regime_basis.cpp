@@ -50,15 +50,23 @@ RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
   add("rate_z", [](R, S s) { return s.rate_rad_s.z(); });
   plain_ = size();
   add("amplitude^2", [](R, S s) { return s.amplitude_V * s.amplitude_V; });
+  add("amplitude difference", [](R, S s) { return s.amplitude_V * s.difference_V; });
+  add("amplitude bias", [](R, S s) { return s.amplitude_V * s.bias_V; });
+  add("amplitude split_cycle", [](R, S s) { return s.amplitude_V * s.split_cycle; });
+  add("amplitude velocity_x", [](R, S s) { return s.amplitude_V * s.velocity_B_m_s.x(); });
+  add("amplitude velocity_z", [](R, S s) { return s.amplitude_V * s.velocity_B_m_s.z(); });
   add("|velocity| velocity_x", [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.x(); });
   add("|velocity| velocity_y", [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.y(); });
   add("|velocity| velocity_z", [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.z(); });
-  add("near ground", [](R r, S s) { return std::exp(-std::max(0.0, s.position_m.z() - r.world.ground_z_m) / kReach_m); });
-  add("near ceiling", [](R r, S s) { return std::exp(-std::max(0.0, r.world.ceiling_z_m - s.position_m.z()) / kReach_m); });
+  add("near ground",
+      [](R r, S s) { return std::exp(-std::max(0.0, s.position_m.z() - r.world.ground_z_m) / kReach_m); });
+  add("near ceiling",
+      [](R r, S s) { return std::exp(-std::max(0.0, r.world.ceiling_z_m - s.position_m.z()) / kReach_m); });
   add("near wall", [](R r, S s) {
     double near = 0;
     for (const sim::Wall& w : r.world.walls)
-      near += std::exp(-std::max(0.0, w.normal_x * (s.position_m.x() - w.x_m) + w.normal_y * (s.position_m.y() - w.y_m)) / kReach_m);
+      near += std::exp(
+          -std::max(0.0, w.normal_x * (s.position_m.x() - w.x_m) + w.normal_y * (s.position_m.y() - w.y_m)) / kReach_m);
     return near;
   });
   add("height", [](R, S s) { return s.position_m.z(); });

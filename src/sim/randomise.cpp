@@ -151,7 +151,8 @@ model::Vehicle Randomisation::at(const std::vector<double>& variates) const {
     Draw draw = draws_[d];
     if (draw.law == Law::scale_half_normal) draw.law = Law::scale_normal;
     for (const std::size_t i : draw.parameters)
-      *parameters[i].value = std::clamp(apply(draw, *parameters[i].value, variates[d]), parameters[i].low, parameters[i].high);
+      *parameters[i].value =
+          std::clamp(apply(draw, *parameters[i].value, variates[d]), parameters[i].low, parameters[i].high);
   }
   return vehicle;
 }

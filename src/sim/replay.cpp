@@ -178,8 +178,8 @@ class ReplayBlock {
 
 }  // namespace
 
-void step_voltages(const VoltageScript& script, double begin_s, double step_s, std::size_t steps, std::vector<double>& left_V,
-                   std::vector<double>& right_V) {
+void step_voltages(const VoltageScript& script, double begin_s, double step_s, std::size_t steps,
+                   std::vector<double>& left_V, std::vector<double>& right_V) {
   StepVoltages voltages(script, begin_s, step_s);
   left_V.resize(steps);
   right_V.resize(steps);

@@ -16,8 +16,8 @@ struct VoltageScript {
 };
 
 /// Means of a script over `steps` steps from a time on.
-void step_voltages(const VoltageScript& script, double begin_s, double step_s, std::size_t steps, std::vector<double>& left_V,
-                   std::vector<double>& right_V);
+void step_voltages(const VoltageScript& script, double begin_s, double step_s, std::size_t steps,
+                   std::vector<double>& left_V, std::vector<double>& right_V);
 
 struct ReplayWindow {
   double start_s = 0;
