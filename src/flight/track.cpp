@@ -340,12 +340,12 @@ double Track::imu_bound_s(double t_s) const {
   return k + 1 < bounds_s_.size() && bounds_s_[k + 1] - t_s < t_s - bounds_s_[k] ? bounds_s_[k + 1] : bounds_s_[k];
 }
 
-Vector3d Track::mean_force_m_s2(double from_s, double to_s) const {
+Vector3d Track::mean(const MeanSpline& signal, double from_s, double to_s) const {
   Vector3d sum = Vector3d::Zero();
   for (std::size_t k = index_before(bounds_s_, from_s); k + 1 < bounds_s_.size() && bounds_s_[k] < to_s; ++k) {
     const double length = bounds_s_[k + 1] - bounds_s_[k];
     const double u = std::max(0.0, (from_s - bounds_s_[k]) / length), v = std::min(1.0, (to_s - bounds_s_[k]) / length);
-    if (v > u) sum += length * accel_.integral(k, u, v);
+    if (v > u) sum += length * signal.integral(k, u, v);
   }
   return sum / (to_s - from_s);
 }

@@ -53,7 +53,9 @@ class Track {
   /// Bounds of the IMU's intervals, gaps among them.
   const std::vector<double>& bounds_s() const { return bounds_s_; }
   /// Mean specific force that the IMU showed over a time, in B as it turned.
-  Eigen::Vector3d mean_force_m_s2(double from_s, double to_s) const;
+  Eigen::Vector3d mean_force_m_s2(double from_s, double to_s) const { return mean(accel_, from_s, to_s); }
+  /// The same of the rate, bias and all.
+  Eigen::Vector3d mean_rate_rad_s(double from_s, double to_s) const { return mean(gyro_, from_s, to_s); }
 
   /// At any time from begin_s() to end_s(); std::out_of_range elsewhere.
   TorsoMotion at(double t_s) const;
@@ -92,6 +94,7 @@ class Track {
   std::vector<Covariance> filter(const std::vector<Pose>& poses, const Noise& noise);
   void smooth(std::vector<Covariance> covariance, const Noise& noise);
 
+  Eigen::Vector3d mean(const MeanSpline& signal, double from_s, double to_s) const;
   std::size_t node_before(double t_s) const;
   Reading reading(std::size_t interval, double from_s, double to_s) const;
   static Eigen::Quaterniond to_middle(const State& x, const Reading& r);

@@ -7,6 +7,7 @@
 #include <exception>
 #include <random>
 
+#include "gap/stream_rows.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::gap {
@@ -34,7 +35,11 @@ CarryBlock carry_kernel(const char* instruction_set) {
 namespace {
 
 constexpr std::size_t kVehicles = sim::kLanes<double>;
-constexpr int kSignals = kChannels;
+/// Of these, a vehicle predicts.
+constexpr std::size_t kSignals = kPathX;
+
+/// What two good streams may disagree by for reasons that no entry knows, times the share that models get wrong.
+constexpr double kStreamSignal_m_s2 = 1, kStreamSignal_rad_s = 1;
 
 /// Voltages of steps, some steps later.
 class ShiftedVoltage {
@@ -58,8 +63,9 @@ class ShiftedVoltage {
 }  // namespace
 
 const char* channel_name(int channel) {
-  static const char* const kNames[kChannels] = {"torque_x", "torque_y", "torque_z",    "force_x",
-                                                "force_y",  "force_z",  "stroke_left", "stroke_right"};
+  static const char* const kNames[kChannels] = {"torque_x", "torque_y",    "torque_z",     "force_x", "force_y",
+                                                "force_z",  "stroke_left", "stroke_right", "path_x",  "path_y",
+                                                "path_z",   "turn_x",      "turn_y",       "turn_z"};
   return kNames[channel];
 }
 
@@ -85,6 +91,31 @@ CarriedFlight::CarriedFlight(Recording recording) : recording_(std::move(recordi
       samples[k * kSignals + kTorqueX + i] =
           (r.torso[k + 1].body_rate_rad_s[i] - r.torso[k].body_rate_rad_s[i]) / r.interval_s(k);
   signal_ = rows_of(samples);
+  compare_streams();
+}
+
+namespace {
+
+void put_streams(const std::vector<StreamRow>& streams, Rows& rows) {
+  for (std::size_t j = 0; j < streams.size(); ++j)
+    for (std::size_t i = 0; i < 3; ++i) {
+      rows[j * kRowsPerBeat + (kPathX + i) * kCoefficients] = streams[j].path_m_s2[static_cast<Eigen::Index>(i)];
+      rows[j * kRowsPerBeat + (kTurnX + i) * kCoefficients] = streams[j].turn_rad_s[static_cast<Eigen::Index>(i)];
+    }
+}
+
+}  // namespace
+
+void CarriedFlight::compare_streams() {
+  const std::vector<StreamRow> streams = stream_rows(recording_);
+  put_streams(streams, measured_);
+  for (std::size_t j = 0; j < streams.size(); ++j) compared_.push_back(streams[j].valid && imu_.covers(j) ? 1 : 0);
+  // the size of what moved, for that of what models get wrong of it: as the torso's forces and rates
+  for (std::size_t j = 0; j < recording_.beats; ++j)
+    for (std::size_t i = 0; i < 3; ++i) {
+      signal_[j * kRowsPerBeat + (kPathX + i) * kCoefficients] = kStreamSignal_m_s2;
+      signal_[j * kRowsPerBeat + (kTurnX + i) * kCoefficients] = kStreamSignal_rad_s;
+    }
 }
 
 /// Of samples [interval][channel].
@@ -116,10 +147,13 @@ Rows CarriedFlight::declared_noise(std::uint64_t seed) const {
     }
     for (int i = 0; i < 2; ++i) s[kStrokeLeft + i] = h.wings ? h.wings->noise_rad * normal(random) : 0;
   }
-  return rows_of(samples);
+  Rows rows = rows_of(samples);
+  put_streams(stream_noise(recording_, seed), rows);
+  return rows;
 }
 
 bool CarriedFlight::covers(std::size_t beat, int channel) const {
+  if (channel >= kPathX) return compared_[beat] != 0;
   if (channel >= kStrokeLeft) return has_wings_ && imu_.covers(beat) && wings_.covers(beat);
   return imu_.covers(beat);
 }

@@ -22,12 +22,21 @@ enum Channel : int {
   kForceZ,  ///< specific force at the IMU, m/s^2, B
   kStrokeLeft,
   kStrokeRight,  ///< rad, where logged
+  // what motion capture says against the IMU alone, no vehicle: the mean only
+  kPathX,
+  kPathY,
+  kPathZ,  ///< acceleration of the origin, m/s^2, W
+  kTurnX,
+  kTurnY,
+  kTurnZ,  ///< rate beyond the gyro's and a constant bias, rad/s, B
   kChannels
 };
 const char* channel_name(int channel);
 
 /// Rows of one flight: [beat][channel][coefficient].
 using Rows = std::vector<double>;
+/// Whether a channel has rows of this coefficient.
+constexpr bool has_rows(int channel, int coefficient) { return channel < kPathX || coefficient == 0; }
 inline constexpr std::size_t kRowsPerBeat = static_cast<std::size_t>(kChannels) * kCoefficients;
 
 /// What flies a recording once more.
@@ -56,12 +65,17 @@ class CarriedFlight {
 
   /// Rows of the sensors' declared noise alone: one of its many courses, the same for a seed.
   Rows declared_noise(std::uint64_t seed) const;
+  /// The same beats as another log of the flight shows them.
+  CarriedFlight with_log(flight::FlightLog log) const { return CarriedFlight(Recording(recording_, std::move(log))); }
 
  private:
   Rows rows_of(const std::vector<double>& samples) const;
 
   Recording recording_;
-  BeatProjection imu_, wings_;
+  void compare_streams();
+
+  BeatProjection imu_, wings_, poses_;
+  std::vector<char> compared_;  ///< beats
   bool has_wings_ = false;
   Rows measured_, signal_;
 };

@@ -72,6 +72,7 @@ void Evidence::find_noise(const Signature& residual, Find what) {
 #pragma omp parallel for schedule(dynamic) num_threads(2)
   for (int g = 0; g < kGroups; ++g) {
     const int channel = g / kCoefficients;
+    if (!has_rows(channel, g % kCoefficients)) continue;
     MatrixXd normal = MatrixXd::Zero(q, q);
     VectorXd right = VectorXd::Zero(q);
     double n = 0;
@@ -158,6 +159,10 @@ Grams Evidence::grams(const Signature& residual, const std::vector<const Signatu
     for (int g = 0; g < kGroups; ++g) {
       const Group& group = groups_[static_cast<std::size_t>(g)];
       const int channel = g / kCoefficients;
+      if (!has_rows(channel, g % kCoefficients)) {
+        result.sums[f][static_cast<std::size_t>(g)] = MatrixXd::Zero(width, width);
+        continue;
+      }
       MatrixXd z(static_cast<Index>(flights_[f].beats()), width);
       Index n = 0;
       VectorXd now(width), past = VectorXd::Zero(width);
@@ -236,6 +241,7 @@ Signature Evidence::whitened(const Signature& residual) const {
   for (std::size_t f = 0; f < flights_.size(); ++f) {
     result.emplace_back(residual[f].size(), 0.0);
     for (int g = 0; g < kGroups; ++g) {
+      if (!has_rows(g / kCoefficients, g % kCoefficients)) continue;
       const Group& group = groups_[static_cast<std::size_t>(g)];
       for_rows(f, g / kCoefficients, [&](std::size_t j, bool before) {
         const double past = before ? group.past * residual[f][row_of(j - 1, g)] : 0;

@@ -13,6 +13,8 @@ using Eigen::Vector3d;
 constexpr double kTurn = 2 * std::numbers::pi;
 /// A frequency is looked for this far around the declared one, as a share of it.
 constexpr double kFrequencyReach = 0.02;
+/// At both ends, so that a flight whose clocks are corrected still holds it.
+constexpr double kMargin_s = 0.05;
 
 TorsoAt torso_at(const flight::TorsoMotion& m) {
   TorsoAt t;
@@ -30,28 +32,44 @@ TorsoAt torso_at(const flight::TorsoMotion& m) {
 
 Recording::Recording(const std::filesystem::path& folder, flight::FlightLog flight_log, double standing_m)
     : name(folder.filename().empty() ? folder.parent_path().filename().string() : folder.filename().string()),
+      least_z_m(flight_log.header.ambient.ground_z_m + standing_m + kLeastClearance_m),
       log(std::move(flight_log)),
-      track(log, folder) {
+      track(log, folder),
+      begin_s(std::max(track.begin_s(), log.command.t_s.front()) + kMargin_s),
+      last_s(track.end_s() - kMargin_s) {
+  prepare(folder.string());
+}
+
+Recording::Recording(const Recording& other, flight::FlightLog flight_log)
+    : name(other.name),
+      least_z_m(other.least_z_m),
+      log(std::move(flight_log)),
+      track(log, other.name),
+      begin_s(other.begin_s),
+      last_s(other.last_s) {
+  prepare(name);
+}
+
+void Recording::prepare(const std::string& place) {
   const flight::FlightHeader& h = log.header;
   world = {h.gravity_m_s2, h.ambient.ground_z_m, h.ambient.ceiling_z_m, {}};
   for (const flight::LogWall& w : h.ambient.walls) world.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
-  lay_grid(h.ambient.ground_z_m + standing_m + kLeastClearance_m);
-  if (steps.empty()) throw io::InputError(folder.string() + ": no interval of the IMU has motion capture around it");
+  lay_grid();
+  if (steps.empty()) throw io::InputError(place + ": no interval of the IMU has motion capture around it");
   read_voltages();
   find_phase();
   read_regimes();
 }
 
-void Recording::lay_grid(double least_z_m) {
+void Recording::lay_grid() {
   const std::vector<double>& bounds = track.bounds_s();
   const double usual_s = 1 / log.header.imu.rate_hz;
-  const auto first = static_cast<std::size_t>(
-      std::ranges::lower_bound(bounds, std::max(track.begin_s(), log.command.t_s.front())) - bounds.begin());
-  if (first >= bounds.size()) return;
+  const auto first = static_cast<std::size_t>(std::ranges::lower_bound(bounds, begin_s - kStep_s / 2) - bounds.begin());
+  if (first >= bounds.size() || bounds[first] >= last_s) return;
   begin_s = bounds[first];
   double now_s = begin_s;
   torso.push_back(torso_at(track.at(begin_s)));
-  for (std::size_t k = first + 1; k < bounds.size() && bounds[k] <= track.end_s(); ++k) {
+  for (std::size_t k = first + 1; k < bounds.size() && bounds[k] <= last_s + kStep_s / 2; ++k) {
     // a gap is flown in pieces, so that the torso stays on its record
     const int pieces = std::max(1, static_cast<int>(std::lround((bounds[k] - now_s) / usual_s)));
     for (int i = pieces; i > 0; --i) {

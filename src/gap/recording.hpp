@@ -28,12 +28,13 @@ struct Regime {
 
 struct Recording {
   std::string name;
+  double least_z_m = 0;  ///< lower, the ground may be touched
   flight::FlightLog log;
   flight::Track track;
   sim::World world;
 
   // the grid: intervals of the IMU on whole physics steps
-  double begin_s = 0;
+  double begin_s = 0, last_s = 0;
   std::vector<int> steps;                   ///< of each interval
   std::vector<double> end_s;                ///< of each interval
   std::vector<char> valid;                  ///< whether all streams were there, and the ground was not
@@ -49,6 +50,8 @@ struct Recording {
   /// `standing_m`: height of the origin over the ground when the vehicle stands. InputError naming `folder` where nothing
   /// of it can be replayed.
   Recording(const std::filesystem::path& folder, flight::FlightLog flight_log, double standing_m);
+  /// The same flight, from the same beat to the same beat, with another log of it: one whose sensors were corrected.
+  Recording(const Recording& other, flight::FlightLog flight_log);
 
   double interval_s(std::size_t k) const { return steps[k] * kStep_s; }
   std::size_t intervals() const { return steps.size(); }
@@ -56,7 +59,8 @@ struct Recording {
   double beat_at(double t_s) const;
 
  private:
-  void lay_grid(double least_z_m);
+  void prepare(const std::string& place);
+  void lay_grid();
   void read_voltages();
   void find_phase();
   void read_regimes();
