@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <map>
+
+#include "gap/sensor_effects.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -22,15 +26,42 @@ std::vector<char> all_of(std::size_t flights) { return std::vector<char>(flights
 }  // namespace
 
 std::vector<Signature> Fitter::residuals(const std::vector<Candidate>& candidates) const {
-  std::vector<Signature> list = predict_all(flights_, candidates, threads_);
-  for (Signature& s : list)
-    for (std::size_t f = 0; f < flights_.size(); ++f) {
-      if (s[f].empty()) {
-        s.clear();
-        break;
-      }
-      for (std::size_t i = 0; i < s[f].size(); ++i) s[f][i] = flights_[f].measured()[i] - s[f][i];
+  // candidates whose sensors agree share a log
+  std::map<EffectValues, std::vector<std::size_t>> by_sensors;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    by_sensors[sensor_effects(candidates[i].vehicle.effects)].push_back(i);
+  std::vector<Signature> list(candidates.size());
+  const auto compare = [&](const std::vector<CarriedFlight>& flights, const std::vector<std::size_t>& which, int threads) {
+    std::vector<Candidate> group;
+    for (const std::size_t i : which) group.push_back(candidates[i]);
+    std::vector<Signature> predicted = predict_all(flights, group, threads);
+    for (std::size_t g = 0; g < which.size(); ++g) {
+      Signature& s = predicted[g];
+      const bool whole = std::ranges::none_of(s, [](const Rows& rows) { return rows.empty(); });
+      for (std::size_t f = 0; whole && f < flights.size(); ++f)
+        for (std::size_t i = 0; i < s[f].size(); ++i) s[f][i] = flights[f].measured()[i] - s[f][i];
+      if (whole) list[which[g]] = std::move(s);
     }
+  };
+  std::vector<std::pair<EffectValues, std::vector<std::size_t>>> corrected;
+  for (auto& [sensors, which] : by_sensors) {
+    if (sensors.empty()) compare(flights_, which, threads_);
+    else corrected.emplace_back(sensors, which);
+  }
+  std::exception_ptr failed;
+#pragma omp parallel for schedule(dynamic) num_threads(threads_)
+  for (std::size_t k = 0; k < corrected.size(); ++k) {
+    try {
+      std::vector<CarriedFlight> flights;
+      for (const CarriedFlight& f : flights_)
+        flights.push_back(f.with_log(without(corrected[k].first, f.recording().log)));
+      compare(flights, corrected[k].second, 1);
+    } catch (...) {  // nothing may leave a parallel loop
+#pragma omp critical
+      failed = std::current_exception();
+    }
+  }
+  if (failed) std::rethrow_exception(failed);
   return list;
 }
 

@@ -24,9 +24,9 @@ std::vector<Unknown> unknowns_of(const std::string& effect) {
   std::vector<Unknown> list;
   for (std::size_t k = 0; k < entry.parameters.size(); ++k) {
     const model::EffectParameter& p = entry.parameters[k];
-    Unknown u{effect, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < 1};
-    if (u.size) u.scale = 3 * p.typical / kHalf90;
-    else u.centre = p.typical, u.scale = p.typical / (2 * kHalf90);
+    Unknown u{effect, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < entry.info.sizes};
+    if (u.size) u.scale = std::max(-p.prior_low, p.prior_high) / kHalf90;
+    else u.centre = p.typical, u.scale = (p.prior_high - p.prior_low) / (2 * kHalf90);
     list.push_back(std::move(u));
   }
   return list;
@@ -52,8 +52,7 @@ Eigen::VectorXd Hypothesis::bounded(Eigen::VectorXd coordinates) const {
 
 Candidate Hypothesis::candidate(const Eigen::VectorXd& coordinates) const {
   std::vector<double> variates(static_cast<std::size_t>(parameters()));
-  for (std::size_t d = 0; d < variates.size(); ++d)
-    variates[d] = unknowns_[d].value(coordinates[static_cast<Eigen::Index>(d)]);
+  for (std::size_t d = 0; d < variates.size(); ++d) variates[d] = unknowns_[d].value(coordinates[static_cast<Eigen::Index>(d)]);
   Candidate c{uncertain_->at(variates), unknowns_[static_cast<std::size_t>(lag())].value(coordinates[lag()])};
   for (Eigen::Index i = shared(); i < size(); ++i) {
     const Unknown& u = unknowns_[static_cast<std::size_t>(i)];

@@ -1,0 +1,39 @@
+// From flight logs to what is missing in the model: fits the uncertain parameters, then every effect of the catalogue
+// beside them, and weighs what is left.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "gap/fit.hpp"
+
+namespace flappy::gap {
+
+/// What explains the flights, one of several answers that exclude each other.
+struct Answer {
+  enum class Kind { none, parameters, effect, unknown } kind = Kind::parameters;
+  std::vector<std::string> effects;
+  double log_evidence = 0;   ///< of all flights
+  double log_held_out = 0;   ///< of every flight given the others, summed
+  double probability = 0;
+  Fit fit;                   ///< of effects and parameters
+};
+
+struct DiagnoseOptions {
+  int threads = 0;
+  int finalists = 8;    ///< effects that are fitted in full
+  int most_effects = 3;
+  std::vector<std::string> withheld;  ///< entries that the catalogue is to lack
+  std::function<void(double share, const std::string& what)> progress;
+};
+
+struct Diagnosis {
+  std::vector<Answer> answers;  ///< most probable first
+  Fit parameters;               ///< without any effect
+};
+
+Diagnosis diagnose(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
+                   const DiagnoseOptions& options);
+
+}  // namespace flappy::gap
