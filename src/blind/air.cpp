@@ -73,7 +73,7 @@ void Robot::blow() {
                 s.planform.rotational_damping_coefficient * s.fourth_m5;
     if (const double size = sizes_[Effect::wing_flexibility]; size > 0) {
       // one twist mode, linear along the span; the load bends it within a millisecond
-      constexpr double kTwist_Nm_rad = 4e-3, kTwist_s = 1e-3;
+      constexpr double kTwist_Nm_rad = 8e-3, kTwist_s = 1e-3;
       state.twist_rad += step_s_ / kTwist_s * (std::clamp(size * twisting / span / kTwist_Nm_rad, -0.6, 0.6) - twist);
     }
     const Vector3d force = p.edge * Vector3d(force_x, 0, force_z);

@@ -21,15 +21,16 @@ constexpr double kStopFrequency_rad_s = 1.1e4;
 
 }  // namespace
 
-Robot::Robot(const model::Vehicle& v, const Room& room, const Sizes& sizes, std::uint64_t seed, double step_s)
+Robot::Robot(const model::Vehicle& v, const Room& room, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight,
+             double step_s)
     : room_(room),
       sizes_(sizes),
       step_s_(step_s),
       density_kg_m3_(v.air_density_kg_m3),
       slow_steps_(std::max(1, static_cast<int>(std::lround(1e-3 / step_s)))),
-      gust_random_(seed, 1),
-      delay_random_(seed, 2),
-      brush_random_(seed, 3) {
+      gust_random_(seed, 100 * flight + 101),
+      delay_random_(seed, 100 * flight + 102),
+      brush_random_(seed, 100 * flight + 103) {
   const auto body = [](const model::RigidBody& b) {
     Body to{b.mass_kg, vector(b.com_m), Matrix3d::Zero()};
     const auto& i = b.inertia_kg_m2;

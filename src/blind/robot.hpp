@@ -70,9 +70,9 @@ struct State {
 
 class Robot {
  public:
-  /// `seed`: of what effects draw: directions, signs, gusts.
+  /// `seed`: of what effects draw once: directions, signs; `flight`: of what differs between flights: gusts, jitter.
   Robot(const model::Vehicle& vehicle, const Room& room, const Sizes& sizes, std::uint64_t seed,
-        double step_s = kStep_s);
+        std::uint64_t flight = 0, double step_s = kStep_s);
 
   /// One step under what the driver is told: volts at nominal battery.
   void step(double left_V, double right_V);
