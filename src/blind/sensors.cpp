@@ -34,7 +34,7 @@ SensorSet sensors_of(std::uint64_t seed, bool power, bool wings) {
   s.imu.latency_s = std::round((late_s - 1 / (2 * kPi * s.imu.bandwidth_hz)) * 1e7) / 1e7;
   s.imu.position_m = {2e-3, -1e-3, -4e-3};
   s.imu.gyro_noise_rad_s = 0.05;
-  s.imu.gyro_bias_sd_rad_s = {0.02, 0.03, 0.015};
+  s.imu.gyro_bias_sd_rad_s = {0.04, 0.04, 0.04};
   s.imu.accel_noise_m_s2 = 0.5;
   if (power) s.power = flight::PowerHeader{kBattery_V, 500, 1e-3, 0.02, 0.01};
   if (wings) s.wings = flight::WingsHeader{500, 0.01};
@@ -49,7 +49,9 @@ Imu::Imu(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint
       steps_(static_cast<int>(std::lround(1 / (set.imu.rate_hz * step_s)))),
       random_(seed, 100 * flight + 121),
       drift_random_(seed, 100 * flight + 122) {
-  for (int k = 0; k < 3; ++k) bias_(k) = set.imu.gyro_bias_sd_rad_s[static_cast<std::size_t>(k)] * random_.normal();
+  // a datasheet promises twice what there is
+  for (int k = 0; k < 3; ++k)
+    bias_(k) = 0.5 * set.imu.gyro_bias_sd_rad_s[static_cast<std::size_t>(k)] * std::clamp(random_.normal(), -2.0, 2.0);
   Random fixed(seed, 21);
   const Vector3d normals = fixed.normals();
   warm_up_ = normals / std::sqrt(normals.squaredNorm());
