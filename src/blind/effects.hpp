@@ -1,0 +1,78 @@
+// What may be wrong with the blind robot: the catalogue's thirty effects, each in a form of this room's own, and others
+// that no catalogue has (outside_*). An effect has one number, its size: 0 is none, 1 is typical of a 12 g vehicle.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace flappy::blind {
+
+enum class Effect : std::size_t {
+  ground_effect,
+  ceiling_effect,
+  wall_effect,
+  body_drag,
+  added_mass,
+  rotational_lift,
+  wake_capture,
+  clap_and_fling,
+  wing_flexibility,
+  wing_damage,
+  wind,
+  spring_hardening,
+  gear_backlash,
+  coulomb_friction,
+  winding_heating,
+  battery_sag,
+  driver_dead_zone,
+  driver_bandwidth,
+  command_delay,
+  stop_compliance,
+  com_offset,
+  inertia_products,
+  wing_inertia,
+  tether,
+  gyro_bias,
+  accelerometer_misalignment,
+  vibration_rectification,
+  mocap_tilt,
+  marker_offset,
+  mocap_delay,
+  outside_magnetic_torque,
+  outside_vortex_shedding,
+  outside_slosh,
+  outside_yaw_thrust_loss,
+  outside_wing_interference,
+  outside_brush_contact,
+  outside_amplitude_hysteresis,
+  outside_vortex_ring,
+  outside_humidity_front,
+  outside_mocap_lens,
+  count
+};
+inline constexpr std::size_t kEffects = static_cast<std::size_t>(Effect::count);
+
+/// Identifiers in the order of Effect.
+const std::array<std::string, kEffects>& effect_names();
+
+struct BlindEffect {
+  std::string id;
+  double size = 1;
+};
+
+/// The size of every effect.
+class Sizes {
+ public:
+  Sizes() = default;
+  /// io::InputError where an id is unknown or given twice, or a size is not within 0 and 4.
+  explicit Sizes(const std::vector<BlindEffect>& effects);
+  double operator[](Effect e) const { return size_[static_cast<std::size_t>(e)]; }
+  bool has(Effect e) const { return (*this)[e] > 0; }
+
+ private:
+  std::array<double, kEffects> size_{};
+};
+
+}  // namespace flappy::blind

@@ -1,0 +1,229 @@
+#include "blind/flights.hpp"
+
+#include <cstdio>
+
+namespace flappy::blind {
+namespace {
+
+/// Times without the last digits that products of steps leave.
+double tidy(double t_s) { return std::round(t_s * 1e9) / 1e9; }
+
+std::string crash(const Robot& robot, const Room& room) {
+  const Torso& t = robot.torso();
+  const Vector3d& p = t.position_m;
+  const double up = 1 - 2 * (t.attitude.x() * t.attitude.x() + t.attitude.y() * t.attitude.y());
+  if (!(p.squaredNorm() < 1e6) || !(t.rate_rad_s.squaredNorm() < 1e6)) return "left all bounds";
+  if (p.z() < room.ground_z_m) return "touched the ground";
+  if (p.z() > room.ceiling_z_m - 0.019) return "touched the ceiling";
+  const Wall& w = room.wall;
+  if ((p.x() - w.x_m) * w.normal_x + (p.y() - w.y_m) * w.normal_y < 0.084) return "touched the wall";
+  if (up < 0.17) return "turned over";
+  if (p.head<2>().squaredNorm() > 9) return "flew away";
+  return {};
+}
+
+void add(flight::FlightLog& log, const Imu::Sample& s) {
+  flight::ImuStream& m = log.imu;
+  m.t_s.push_back(tidy(s.arrival_s));
+  m.gyro_x_rad_s.push_back(s.gyro_rad_s.x());
+  m.gyro_y_rad_s.push_back(s.gyro_rad_s.y());
+  m.gyro_z_rad_s.push_back(s.gyro_rad_s.z());
+  m.accel_x_m_s2.push_back(s.accel_m_s2.x());
+  m.accel_y_m_s2.push_back(s.accel_m_s2.y());
+  m.accel_z_m_s2.push_back(s.accel_m_s2.z());
+}
+
+void add(flight::FlightLog& log, const Mocap::Sample& s) {
+  flight::MocapStream& m = log.mocap;
+  m.t_s.push_back(tidy(s.arrival_s));
+  m.x_m.push_back(s.position_m.x());
+  m.y_m.push_back(s.position_m.y());
+  m.z_m.push_back(s.position_m.z());
+  m.qw.push_back(s.attitude.w());
+  m.qx.push_back(s.attitude.x());
+  m.qy.push_back(s.attitude.y());
+  m.qz.push_back(s.attitude.z());
+}
+
+void add_command(flight::FlightLog& log, double t_s, const std::array<double, 2>& volts, const Inputs& u,
+                 double phase_rad) {
+  flight::CommandStream& c = log.command;
+  c.t_s.push_back(tidy(t_s));
+  c.left_voltage_V.push_back(volts[0]);
+  c.right_voltage_V.push_back(volts[1]);
+  c.inputs->amplitude_V.push_back(u.amplitude_V);
+  c.inputs->difference_V.push_back(u.difference_V);
+  c.inputs->bias_V.push_back(u.bias_V);
+  c.inputs->split_cycle.push_back(u.split_cycle);
+  c.phase_rad->push_back(phase_rad);
+}
+
+void add_truth(std::vector<flight::Column>& truth, double t_s, const Robot& robot, const Vector3d& bias) {
+  const Torso& t = robot.torso();
+  const Vector3d &p = t.position_m, &v = t.velocity_m_s, &w = t.rate_rad_s;
+  const Quaterniond& q = t.attitude;
+  const Wing &l = robot.wing(0), &r = robot.wing(1);
+  const double row[] = {tidy(t_s),      p.x(),
+                        p.y(),          p.z(),
+                        q.w(),          q.x(),
+                        q.y(),          q.z(),
+                        v.x(),          v.y(),
+                        v.z(),          w.x(),
+                        w.y(),          w.z(),
+                        l.stroke_rad,   l.rotation_rad,
+                        r.stroke_rad,   r.rotation_rad,
+                        l.stroke_rad_s, l.rotation_rad_s,
+                        r.stroke_rad_s, r.rotation_rad_s,
+                        bias.x(),       bias.y(),
+                        bias.z()};
+  for (std::size_t k = 0; k < truth.size(); ++k) truth[k].push_back(row[k]);
+}
+
+flight::FlightHeader header_of(const Case& c, const SensorSet& sensors, const Room& room) {
+  flight::FlightHeader h;
+  h.vehicle = c.vehicle_file;
+  h.vehicle_sha256 = c.vehicle_sha256;
+  h.flapping_Hz = c.vehicle.driver.flapping_Hz;
+  h.gravity_m_s2 = room.gravity_m_s2;
+  h.ambient = {c.declared_density_kg_m3,
+               room.ground_z_m,
+               room.ceiling_z_m,
+               {{room.wall.x_m, room.wall.y_m, room.wall.normal_x, room.wall.normal_y}}};
+  h.mocap = sensors.mocap;
+  h.imu = sensors.imu;
+  h.power = sensors.power;
+  h.wings = sensors.wings;
+  return h;
+}
+
+}  // namespace
+
+const std::vector<std::string>& truth_names() {
+  static const std::vector<std::string> kNames = {"t_s",
+                                                  "x_m",
+                                                  "y_m",
+                                                  "z_m",
+                                                  "qw",
+                                                  "qx",
+                                                  "qy",
+                                                  "qz",
+                                                  "velocity_x_m_s",
+                                                  "velocity_y_m_s",
+                                                  "velocity_z_m_s",
+                                                  "rate_x_rad_s",
+                                                  "rate_y_rad_s",
+                                                  "rate_z_rad_s",
+                                                  "left_stroke_rad",
+                                                  "left_rotation_rad",
+                                                  "right_stroke_rad",
+                                                  "right_rotation_rad",
+                                                  "left_stroke_rate_rad_s",
+                                                  "left_rotation_rate_rad_s",
+                                                  "right_stroke_rate_rad_s",
+                                                  "right_rotation_rate_rad_s",
+                                                  "gyro_bias_x_rad_s",
+                                                  "gyro_bias_y_rad_s",
+                                                  "gyro_bias_z_rad_s"};
+  return kNames;
+}
+
+Room flight_room() { return {}; }
+
+Flight fly(const Case& c, std::size_t flight) {
+  const Room room = flight_room();
+  const SensorSet sensors = sensors_of(c.seed, c.power, c.wings);
+  const Plan plan(c.programme, flight, room, c.seed);
+  Robot robot(c.vehicle, room, c.sizes, c.seed, flight);
+  Pilot pilot(c.vehicle.driver, c.seed, flight);
+  Imu imu(sensors, c.sizes, c.seed, flight, kStep_s);
+  Mocap mocap(sensors, c.sizes, c.seed, flight);
+  Random power_random(c.seed, 100 * flight + 161), wings_random(c.seed, 100 * flight + 162);
+  Flight f;
+  f.log.header = header_of(c, sensors, room);
+  f.log.command.inputs.emplace();
+  f.log.command.phase_rad.emplace();
+  if (sensors.power) f.log.power.emplace();
+  if (sensors.wings) f.log.wings.emplace();
+  f.truth.resize(truth_names().size());
+
+  // It learns to trim a metre up, in two fifths of the time, and goes where the log begins.
+  const Waypoint home = plan.start();
+  constexpr double kTrimHeight_m = 1;
+  Torso start;
+  start.position_m = {home.position_m.x(), home.position_m.y(), kTrimHeight_m};
+  robot.place_torso(start);
+  const auto aim_at = [&](double t_s) {
+    Aim aim = plan.at(std::max(t_s, 0.0));
+    if (t_s < 0) {
+      const double s = std::clamp((t_s + 0.6 * kTrim_s) / (0.3 * kTrim_s), 0.0, 1.0);
+      aim.position_m.z() = kTrimHeight_m + s * s * (3 - 2 * s) * (home.position_m.z() - kTrimHeight_m);
+    }
+    return aim;
+  };
+
+  const auto steps_of = [](double s) { return static_cast<std::int64_t>(std::lround(s / kStep_s)); };
+  const std::int64_t trim = steps_of(kTrim_s), end = trim + steps_of(kFlight_s), control = steps_of(kControl_s),
+                     hold = steps_of(c.vehicle.driver.hold_s);
+  std::array<double, 2> volts{};
+  Inputs inputs;
+  std::int64_t mocap_count = 0, power_count = 0, wings_count = 0;
+  const auto due = [](std::int64_t step, double rate_hz, std::int64_t& count) {
+    if (step < std::llround(static_cast<double>(count) / (rate_hz * kStep_s))) return false;
+    ++count;
+    return true;
+  };
+  for (std::int64_t n = 0; n < end; ++n) {
+    const std::int64_t step = n - trim;
+    const double t_s = static_cast<double>(step) * kStep_s;
+    const bool logged = step >= 0;
+    if (n % control == 0) {
+      const Aim aim = aim_at(t_s);
+      inputs = pilot.steer(robot.torso(), aim, plan.excitation(t_s));
+      if (logged) {
+        add_truth(f.truth, t_s, robot, imu.constant_bias_rad_s());
+        f.farthest_m = std::max(f.farthest_m, std::sqrt((robot.torso().position_m - aim.position_m).squaredNorm()));
+        f.most_tilt_rad = std::max(f.most_tilt_rad,
+                                   std::acos(std::clamp(robot.torso().attitude.toRotationMatrix()(2, 2), -1.0, 1.0)));
+      }
+      f.how = crash(robot, room);
+      if (!f.how.empty()) {
+        char text[40];
+        std::snprintf(text, sizeof text, " at %.2f s", t_s);
+        f.how += text;
+        f.crashed = true;
+        return f;
+      }
+    }
+    if (n % hold == 0) {
+      const double turns = static_cast<double>(n) * kStep_s * c.vehicle.driver.flapping_Hz,
+                   beat = turns - std::floor(turns);
+      volts = {Pilot::voltage(inputs, 0, beat, c.vehicle.left.motor.voltage_limit_V),
+               Pilot::voltage(inputs, 1, beat, c.vehicle.right.motor.voltage_limit_V)};
+      if (logged) add_command(f.log, t_s, volts, inputs, 2 * kPi * beat);
+    }
+    if (logged && due(step, sensors.mocap.rate_hz, mocap_count))
+      if (const auto s = mocap.look(robot.torso(), t_s)) add(f.log, *s);
+    if (logged && sensors.wings && due(step, sensors.wings->rate_hz, wings_count)) {
+      flight::WingsStream& w = *f.log.wings;
+      const auto seen = [&](double angle) { return angle + sensors.wings->noise_rad * wings_random.normal(); };
+      w.t_s.push_back(tidy(t_s));
+      w.left_stroke_rad.push_back(seen(robot.wing(0).stroke_rad));
+      w.left_rotation_rad.push_back(seen(robot.wing(0).rotation_rad));
+      w.right_stroke_rad.push_back(seen(robot.wing(1).stroke_rad));
+      w.right_rotation_rad.push_back(seen(robot.wing(1).rotation_rad));
+    }
+    robot.step(volts[0], volts[1]);
+    if (!logged) continue;
+    if (const auto s = imu.after_step(robot, t_s + kStep_s)) add(f.log, *s);
+    if (sensors.power && due(step, sensors.power->rate_hz, power_count)) {
+      flight::PowerStream& p = *f.log.power;  // of the instant at which the step began
+      p.t_s.push_back(tidy(t_s + sensors.power->latency_s));
+      p.battery_V.push_back(robot.battery_V() + sensors.power->voltage_noise_V * power_random.normal());
+      p.left_current_A.push_back(robot.current_A(0) + sensors.power->current_noise_A * power_random.normal());
+      p.right_current_A.push_back(robot.current_A(1) + sensors.power->current_noise_A * power_random.normal());
+    }
+  }
+  return f;
+}
+
+}  // namespace flappy::blind

@@ -1,0 +1,39 @@
+// Whole flights of the blind robot, as logs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "blind/pilot.hpp"
+#include "blind/sensors.hpp"
+
+namespace flappy::blind {
+
+/// One robot and what it flies.
+struct Case {
+  model::Vehicle vehicle;  ///< the robot's own, effects left out
+  double declared_density_kg_m3 = 0;
+  std::string vehicle_file, vehicle_sha256;  ///< as declared in the log
+  Sizes sizes;
+  std::uint64_t seed = 0;
+  Programme programme = Programme::rich;
+  bool power = false, wings = false;
+};
+
+struct Flight {
+  bool crashed = false;
+  std::string how;  ///< it crashed
+  flight::FlightLog log;
+  std::vector<flight::Column> truth;         ///< columns truth_names(), at the control rate
+  double farthest_m = 0, most_tilt_rad = 0;  ///< from where it was meant to be; of the body's z axis
+};
+
+const std::vector<std::string>& truth_names();
+
+/// The room in which they fly.
+Room flight_room();
+
+/// Flight 0, 1 or 2 of a case: it learns to trim, then the log begins. The same bytes for the same case.
+Flight fly(const Case& c, std::size_t flight);
+
+}  // namespace flappy::blind

@@ -1,0 +1,123 @@
+// Elementary functions and random numbers of the blind robot's own: the same bits on every processor, which libm does
+// not promise, and nothing in common with the simulator under test. Absolute errors below 1e-13 unless stated.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <random>
+
+namespace flappy::blind {
+
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+inline constexpr double kPi = std::numbers::pi;
+
+/// Nearest whole number, for |x| < 2^51.
+inline double nearest(double x) {
+  constexpr double kShift = 0x1.8p52;
+  return (x + kShift) - kShift;
+}
+
+struct Turn {
+  double sin, cos;
+};
+
+/// For |x| up to about 1e6.
+inline Turn turn_of(double x) {
+  const double n = nearest(x * (2 / kPi));
+  const double r = (x - n * 0x1.921fb54400000p+0) - n * 0x1.0b4611a626331p-34, y = r * r;
+  const double s =
+      r + r * y *
+              (-1.0 / 6 +
+               y * (1.0 / 120 + y * (-1.0 / 5040 + y * (1.0 / 362880 + y * (-1.0 / 39916800 + y / 6227020800.0)))));
+  const double c =
+      1 + y * (-0.5 + y * (1.0 / 24 +
+                           y * (-1.0 / 720 +
+                                y * (1.0 / 40320 + y * (-1.0 / 3628800 + y * (1.0 / 479001600 - y / 87178291200.0))))));
+  switch (static_cast<std::int64_t>(n) & 3) {
+    case 0:
+      return {s, c};
+    case 1:
+      return {c, -s};
+    case 2:
+      return {-s, -c};
+    default:
+      return {-c, s};
+  }
+}
+
+/// Relative error below 1e-13; 0 far below, for x up to 700.
+inline double exponential(double x) {
+  if (x < -700) return 0;
+  const double n = nearest(x * std::numbers::log2e);
+  const double r = (x - n * 0x1.62e42fee00000p-1) - n * 0x1.a39ef35793c76p-33;
+  double sum = 1;
+  for (int k = 12; k > 0; --k) sum = 1 + r / k * sum;
+  return sum * std::bit_cast<double>(static_cast<std::uint64_t>(1023 + static_cast<std::int64_t>(n)) << 52);
+}
+
+/// Of a positive normal number.
+inline double logarithm(double x) {
+  const auto bits = std::bit_cast<std::uint64_t>(x);
+  double exponent = static_cast<double>(static_cast<std::int64_t>(bits >> 52) - 1023);
+  double m = std::bit_cast<double>((bits & 0xfffffffffffff) | (std::uint64_t{1023} << 52));
+  if (m > std::numbers::sqrt2) m /= 2, exponent += 1;
+  const double t = (m - 1) / (m + 1), y = t * t;
+  double sum = 0;
+  for (int k = 19; k > 0; k -= 2) sum = 1.0 / k + y * sum;
+  return 2 * t * sum + exponent * std::numbers::ln2;
+}
+
+/// Of a positive base.
+inline double power(double base, double exponent) { return exponential(exponent * logarithm(base)); }
+
+inline double hyperbolic_tangent(double x) {
+  if (std::abs(x) > 20) return std::copysign(1.0, x);
+  return 1 - 2 / (exponential(2 * x) + 1);
+}
+
+/// Rotation by a rotation vector.
+inline Quaterniond turned_by(const Vector3d& angle_rad) {
+  const double a = std::sqrt(angle_rad.squaredNorm());
+  if (a < 1e-9) return Quaterniond(1, angle_rad.x() / 2, angle_rad.y() / 2, angle_rad.z() / 2).normalized();
+  const Turn half = turn_of(a / 2);
+  const Vector3d v = half.sin / a * angle_rad;
+  return {half.cos, v.x(), v.y(), v.z()};
+}
+
+/// Random numbers of one purpose: the draws of one never move those of another.
+class Random {
+ public:
+  Random(std::uint64_t seed, std::uint64_t purpose) : engine_(seed * 0x9e3779b97f4a7c15ULL + purpose) {}
+
+  /// In (0, 1).
+  double uniform() { return (static_cast<double>(engine_() >> 12) + 0.5) * 0x1p-52; }
+  double between(double low, double high) { return low + (high - low) * uniform(); }
+  /// Standard normal (Box and Muller 1958).
+  double normal() {
+    const double radius = std::sqrt(-2 * logarithm(uniform()));
+    return radius * turn_of(2 * kPi * uniform()).cos;
+  }
+  Vector3d normals() {
+    const double x = normal(), y = normal();
+    return {x, y, normal()};
+  }
+  /// A level direction.
+  Vector3d level() {
+    const Turn t = turn_of(2 * kPi * uniform());
+    return {t.cos, t.sin, 0};
+  }
+  double sign() { return uniform() < 0.5 ? -1 : 1; }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+}  // namespace flappy::blind

@@ -1,0 +1,69 @@
+// Who flies the blind robot, and where: the project's cascaded PID on an imperfect view of the state, along a programme of
+// waypoints with excitation on top.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "blind/robot.hpp"
+
+namespace flappy::blind {
+
+enum class Programme { rich, hover };
+inline constexpr std::size_t kFlights = 3;
+inline constexpr double kFlight_s = 10, kTrim_s = 5, kControl_s = 2e-3;
+
+struct Inputs {
+  double amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
+};
+
+struct Waypoint {
+  double t_s = 0;
+  Vector3d position_m = Vector3d::Zero();
+  double heading_rad = 0;
+};
+
+struct Aim {
+  Vector3d position_m, velocity_m_s, acceleration_m_s2;
+  double heading_rad, heading_rad_s;
+};
+
+/// One flight of a programme, on the clock of its log; before 0 it hovers where it begins.
+class Plan {
+ public:
+  Plan(Programme programme, std::size_t flight, const Room& room, std::uint64_t seed);
+  Aim at(double t_s) const;
+  /// To be added to the controller's output.
+  Inputs excitation(double t_s) const;
+  const Waypoint& start() const { return waypoints_.front(); }
+
+ private:
+  struct Sine {
+    int input;
+    double amplitude, Hz, phase_turns;
+  };
+  struct Step {
+    int input;
+    double begin_s, end_s, height;
+  };
+  std::vector<Waypoint> waypoints_;
+  std::vector<Sine> sines_;
+  std::vector<Step> steps_;
+};
+
+class Pilot {
+ public:
+  Pilot(const model::Driver& driver, std::uint64_t seed, std::uint64_t flight);
+  ~Pilot();
+  /// Once each control period.
+  Inputs steer(const Torso& torso, const Aim& aim, const Inputs& excitation);
+  /// Of one motor at a fraction of the beat in [0, 1).
+  static double voltage(const Inputs& inputs, std::size_t side, double beat, double limit_V);
+
+ private:
+  struct Memory;
+  std::unique_ptr<Memory> memory_;
+};
+
+}  // namespace flappy::blind
