@@ -146,6 +146,16 @@ Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int iterations) co
   return improve(hypothesis, std::move(result), iterations);
 }
 
+Fit Fitter::fit(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters, int iterations) const {
+  Directions d = axes(hypothesis);
+  const Index shared = hypothesis.shared();
+  d.axes.topLeftCorner(shared, shared) = parameters.point.directions.axes.topLeftCorner(shared, shared);
+  d.reach.head(shared) = parameters.point.directions.reach.head(shared);
+  Fit result;
+  result.point = linearise(hypothesis, hypothesis.bounded(start), std::move(d));
+  return improve(hypothesis, std::move(result), iterations);
+}
+
 Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const {
   Fit result;
   result.point = linearise(hypothesis, before.point.at, principal(hypothesis, before));

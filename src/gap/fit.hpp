@@ -43,6 +43,8 @@ class Fitter {
   static Directions axes(const Hypothesis& hypothesis);
   /// From `start` on, at most `iterations` linearisations; empty residual where the vehicle comes apart at once.
   Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int iterations) const;
+  /// From `start` on, where another fit's parameters are already at home: along their directions.
+  Fit fit(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters, int iterations) const;
   /// The same, from where another fit ended, along its directions.
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const;
 

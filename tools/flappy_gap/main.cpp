@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "diagnose.hpp"
 #include "gap/check.hpp"
 #include "io/program.hpp"
 
@@ -96,6 +97,16 @@ int main(int argc, char** argv) {
       program.app().add_subcommand("check", "axes, units, clocks and dropouts of logs, without a diagnosis");
   std::vector<std::string> folders;
   check->add_option("flight", folders, "folders of flight logs")->required();
+  CLI::App* diagnose = program.app().add_subcommand("diagnose", "what is missing in the model of a robot that flew");
+  gap::DiagnoseCommand command;
+  diagnose->add_option("--vehicle", command.vehicle, "the vehicle's file, as it was believed")->required();
+  diagnose->add_option("--flights", command.flights, "folders of flight logs")->required();
+  diagnose->add_option("--priors", command.priors, "what is uncertain of the vehicle")->capture_default_str();
+  diagnose->add_option("--withhold", command.withheld, "entries that the catalogue is to lack");
+  diagnose->add_option("--out", command.out, "folder for the result");
   program.app().require_subcommand(1);
-  return program.run(argc, argv, [&] { program.write_json(gap::check(folders)); });
+  return program.run(argc, argv, [&] {
+    if (check->parsed()) program.write_json(gap::check(folders));
+    else program.write_json(gap::run_diagnose(command));
+  });
 }

@@ -1,0 +1,19 @@
+// flappy-gap diagnose.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace flappy::gap {
+
+struct DiagnoseCommand {
+  std::string vehicle, priors = "configs/gap/priors.toml";
+  std::vector<std::string> flights, withheld;
+  std::string out;
+};
+
+/// Diagnoses, prints, writes; the machine-readable result.
+nlohmann::ordered_json run_diagnose(const DiagnoseCommand& command);
+
+}  // namespace flappy::gap
