@@ -179,7 +179,7 @@ Grams Evidence::grams(const Signature& residual, const std::vector<const Signatu
       });
       const auto used = z.topRows(n);
       MatrixXd sum = MatrixXd::Zero(width, width);
-      sum.selfadjointView<Eigen::Lower>().rankUpdate(used.transpose());
+      if (n > 0) sum.selfadjointView<Eigen::Lower>().rankUpdate(used.transpose());
       result.sums[f][static_cast<std::size_t>(g)] = sum.selfadjointView<Eigen::Lower>();
     }
     for (const double c : constants) result.constant[f] += c;
