@@ -180,7 +180,13 @@ Grams Evidence::grams(const Signature& residual, const std::vector<const Signatu
       const auto used = z.topRows(n);
       MatrixXd sum = MatrixXd::Zero(width, width);
       if (n > 0) sum.selfadjointView<Eigen::Lower>().rankUpdate(used.transpose());
-      result.sums[f][static_cast<std::size_t>(g)] = sum.selfadjointView<Eigen::Lower>();
+      sum = sum.selfadjointView<Eigen::Lower>();
+      // what is no smooth function of the regime is noise, whatever the hypothesis
+      MatrixXd smooth = sum.topLeftCorner(q, q);
+      smooth.diagonal().array() += kLooseRidge * static_cast<double>(n) + 1e-12;
+      const VectorXd right = sum.block(0, q + k, q, 1);
+      sum(q + k, q + k) = right.dot(smooth.ldlt().solve(right));
+      result.sums[f][static_cast<std::size_t>(g)] = std::move(sum);
     }
     for (const double c : constants) result.constant[f] += c;
   }
