@@ -29,10 +29,10 @@ flight::FleetOptions on_board(const flight::FlyConfig& config) {
 /// One flight, from its start on.
 class Flight {
  public:
-  explicit Flight(const flight::FlyConfig& config) : options_(on_board(config)), fleet_(1, nominal(config), options_) {
+  explicit Flight(const flight::FlyConfig& config) : options_(on_board(config)), fleet_(1, config.vehicle, options_) {
     if (options_.task.start.settled)
       fleet_.start(
-          0, 0, flight::settle<float>(options_, 1, config.settle_s, [&](std::uint32_t) { return nominal(config); })[0]);
+          0, 0, flight::settle<float>(options_, 1, config.settle_s, [&](std::uint32_t) { return config.vehicle; })[0]);
     fleet_.set_actor(config.actor);
     fleet_.record(true);
   }
@@ -47,11 +47,6 @@ class Flight {
   }
 
  private:
-  static model::Vehicle nominal(const flight::FlyConfig& config) {
-    model::Vehicle v = config.vehicle;
-    v.effects.clear();  // a settled vehicle has none
-    return v;
-  }
   flight::FleetOptions options_;
   Fleet<float> fleet_;
 };

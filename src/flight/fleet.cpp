@@ -410,8 +410,17 @@ auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
 template <class T>
 std::vector<std::span<std::byte>> Fleet<T>::memory() {
   Storage& s = *storage_;
-  return {std::as_writable_bytes(std::span(s.batch.storage().blocks)), std::as_writable_bytes(std::span(s.blocks)),
-          std::as_writable_bytes(std::span(s.ring)), std::as_writable_bytes(std::span(s.queue))};
+  auto& body = s.batch.storage();
+  std::vector<std::span<std::byte>> all{
+      std::as_writable_bytes(std::span(body.blocks)), std::as_writable_bytes(std::span(s.blocks)),
+      std::as_writable_bytes(std::span(s.ring)), std::as_writable_bytes(std::span(s.queue))};
+  if (!body.lane_effects.empty()) {
+    all.push_back(std::as_writable_bytes(std::span(body.lane_effects)));
+    all.push_back(std::as_writable_bytes(std::span(body.block_effects)));
+    all.push_back(std::as_writable_bytes(std::span(body.effect_rows)));
+    all.push_back(std::as_writable_bytes(std::span(body.effect_states)));
+  }
+  return all;
 }
 
 template <class T>

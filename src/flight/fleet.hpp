@@ -43,10 +43,12 @@ struct Target {
   double heading_cos, heading_sin, heading_rate_rad_s;
 };
 
-/// A flapper in mid-flight: its vehicle without effects, state, sensors' biases, and what estimator and controller have learnt.
+/// A flapper in mid-flight: its vehicle with its effects, state, sensors' biases, and what estimator and controller have learnt.
 template <class T>
 struct Snapshot {
   std::vector<T> body, flight;  ///< rows of Block and FlightBlock
+  std::uint64_t effects = 0;    ///< in force
+  std::vector<T> effect_rows, effect_states;
   std::uint32_t phase, phase_per_update;
   Target target;  ///< where it was meant to be
 };
@@ -70,7 +72,6 @@ class Fleet {
   void start(std::size_t i, std::uint32_t episode, const sim::FlapperState& state, sim::Start kind);
   /// Starts flapper `i` as the snapshot flew, moved and turned about z to where its task starts the episode.
   void start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot);
-  /// std::invalid_argument for a vehicle with effects.
   Snapshot<T> snapshot(std::size_t i) const;
 
   /// The actor that acts from now on, or none: then the last actions stay. std::invalid_argument unless its observation and
@@ -138,7 +139,7 @@ class Fleet {
   std::vector<MocapRecord> mocap_samples(std::size_t i) const;
 
   /// All that changes in flight, for who keeps and restores it: then restored() must follow, with the control periods
-  /// flown. Vehicles with effects keep some of it elsewhere.
+  /// flown.
   std::vector<std::span<std::byte>> memory();
   void restored(std::int64_t periods);
   std::int64_t periods() const;  ///< flown so far

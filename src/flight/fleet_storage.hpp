@@ -229,11 +229,10 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const sim::F
 template <class T>
 Snapshot<T> Fleet<T>::Storage::snapshot(std::size_t i, const Target& target) {
   auto& body = batch.storage();
-  if (!body.lane_effects.empty() && body.lane_effects[i] != 0)
-    throw std::invalid_argument("a vehicle with effects has no snapshot");
   const auto [block, lane] = body.at(i);
   const FlightBlock<T>& f = at(i).block;
-  Snapshot<T> s{{}, {}, block.phase[lane], block.phase_per_update[lane], target};
+  Snapshot<T> s{{}, {}, 0, {}, {}, block.phase[lane], block.phase_per_update[lane], target};
+  s.effects = body.get_effects(i, s.effect_rows, s.effect_states);
   for (int r = 0; r < kBodyRows; ++r) s.body.push_back(rows_of<T>(block)[r][lane]);
   for (int r = 0; r < kFlightRows<T>; ++r) s.flight.push_back(rows_of<T>(f)[r][lane]);
   return s;
@@ -245,6 +244,7 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   FlightBlock<T>& f = at(i).block;
   for (int r = 0; r < kBodyRows; ++r) rows_of<T>(block)[r][lane] = s.body[static_cast<std::size_t>(r)];
   for (int r = 0; r < kFlightRows<T>; ++r) rows_of<T>(f)[r][lane] = s.flight[static_cast<std::size_t>(r)];
+  batch.storage().put_effects(i, s.effects, s.effect_rows, s.effect_states);
   block.phase[lane] = s.phase;
   block.phase_per_update[lane] = s.phase_per_update;
   block.status[lane] = 0;

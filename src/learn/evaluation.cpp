@@ -245,8 +245,6 @@ Evaluator::Evaluator(FlyConfig config, const EvaluationOptions& options)
   if (c.duration_s < needs_s - 1e-9)
     refuse("is judged until " + io::shortest_digits(needs_s) + " s, but flown for " + io::shortest_digits(c.duration_s),
            "flight.duration_s of " + io::shortest_digits(needs_s) + " or more");
-  if (task.start.settled && !c.vehicle.effects.empty())
-    refuse("starts from settled hover, which vehicles with effects cannot", "a vehicle without [effects]");
 }
 Evaluator::~Evaluator() = default;
 Evaluator::Evaluator(Evaluator&&) noexcept = default;

@@ -42,7 +42,7 @@ struct Evaluation {
 class Evaluator {
  public:
   /// Seed, threads and precision are those of `config`, its `actor` is not used. io::InputError where its task says no
-  /// success or takes longer than duration_s, or where vehicles with effects should start settled.
+  /// success or takes longer than duration_s.
   Evaluator(flight::FlyConfig config, const EvaluationOptions& options);
   ~Evaluator();
   Evaluator(Evaluator&&) noexcept;

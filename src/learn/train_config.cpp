@@ -54,8 +54,6 @@ class Reader {
     if (c_.fly.fleet.task.constants.success.by_s <= 0)
       root_.fail("fly", "has a task that says no success", "a task with [success.capture] and [success.keep]");
     if (c_.fly.welded) root_.fail("fly", "holds its vehicle on a stand", "flight.support = \"task\"");
-    if (!c_.fly.vehicle.effects.empty() && c_.fly.fleet.task.start.settled)
-      root_.fail("fly", "starts settled with a vehicle that has effects", "a vehicle without effects");
     read_networks();
     read_collection();
     read_learning();

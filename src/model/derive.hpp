@@ -2,12 +2,15 @@
 #pragma once
 
 #include "flappy/vehicle.hpp"
-#include "model/flapper.hpp"
+#include "model/effects/effect.hpp"
 
 namespace flappy::model {
 
 /// Constants of one flapper in double precision. `step_s`: physics step, s.
 Parameters<double> derive(const Vehicle& vehicle, double step_s);
+
+/// What effects need to know besides.
+Sides<SideFigures<double>> effect_figures(const Vehicle& vehicle);
 
 /// Mass of the whole vehicle, kg.
 double total_mass_kg(const Vehicle& vehicle);

@@ -2,6 +2,7 @@
 
 #include <omp.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
@@ -39,39 +40,105 @@ void Batch<T>::Storage::put_vehicle(Block<T>& block, int lane, const model::Vehi
       static_cast<std::uint32_t>(std::llround(v.driver.flapping_Hz * v.driver.hold_s * 0x1p32));
 }
 
-/// A lane without an effect that its block has gets the value at which the effect vanishes.
+/// A lane without an effect that its block has gets the sizes at which the effect vanishes.
 template <class T>
 void Batch<T>::Storage::put_effects(std::size_t i, const model::Vehicle& v) {
   if (v.effects.empty() && lane_effects.empty()) return;
+  std::uint64_t named = 0;
+  for (const auto& [id, values] : v.effects) {
+    const int e = model::effect_index(id.c_str());
+    if (e < 0) throw std::invalid_argument("no effect \"" + id + "\"");
+    if (id == model::CommandDelay::kInfo.id) {
+      const double late_s = model::effects()[static_cast<std::size_t>(e)].values(values)[0];
+      if (late_s > (model::CommandDelay::kSlots - 2) * step_s)
+        throw std::invalid_argument("command_delay keeps " + std::to_string(model::CommandDelay::kSlots) +
+                                    " steps, too few for " + std::to_string(late_s) + " s");
+    }
+    if (model::effects()[static_cast<std::size_t>(e)].states > 0) named |= std::uint64_t{1} << e;
+  }
+  keep_effects(named);
+  put_effect_rows(i, v);
+  unite_effects(i / kLanes<T>);
+}
+
+template <class T>
+void Batch<T>::Storage::unite_effects(std::size_t b) {
+  block_effects[b] = 0;
+  for (std::size_t lane = 0; lane < kLanes<T>; ++lane) block_effects[b] |= lane_effects[b * kLanes<T> + lane];
+}
+
+template <class T>
+void Batch<T>::Storage::put_effect_rows(std::size_t i, const model::Vehicle& v) {
+  T* rows = &effect_rows[i / kLanes<T> * model::kEffectRows * kLanes<T> + i % kLanes<T>];
+  const auto put_row = [&](int row, double value) {
+    rows[static_cast<std::size_t>(row) * kLanes<T>] = static_cast<T>(value);
+  };
+  lane_effects[i] = 0;
+  for (std::size_t e = 0; e < model::effects().size(); ++e) {
+    const model::EffectEntry& entry = model::effects()[e];
+    const auto own = v.effects.find(entry.info.id);
+    std::vector<double> values = entry.values(own != v.effects.end() ? own->second : std::map<std::string, double>{});
+    if (own == v.effects.end()) std::fill_n(values.begin(), entry.info.sizes, 0.0);
+    if (entry.change == nullptr && entry.acts(values)) lane_effects[i] |= std::uint64_t{1} << e;
+    for (std::size_t k = 0; k < values.size(); ++k) put_row(entry.first_row + static_cast<int>(k), values[k]);
+  }
+  const auto figures = model::effect_figures(v);
+  const double* from = reinterpret_cast<const double*>(&figures);
+  for (int k = 0; k < 2 * model::kRows<model::SideFigures>; ++k) put_row(model::kEffectParameterRows + k, from[k]);
+}
+
+template <class T>
+std::uint64_t Batch<T>::Storage::get_effects(std::size_t i, std::vector<T>& rows, std::vector<T>& states) {
+  const std::uint64_t set = effects_of_lane(i);
+  if (set == 0) return 0;
+  const T* row = &effect_rows[i / kLanes<T> * model::kEffectRows * kLanes<T> + i % kLanes<T>];
+  for (int k = 0; k < model::kEffectRows; ++k, row += kLanes<T>) rows.push_back(*row);
+  for_states(i, set, [&](T number) { states.push_back(number); });
+  return set;
+}
+
+template <class T>
+void Batch<T>::Storage::put_effects(std::size_t i, std::uint64_t set, const std::vector<T>& rows,
+                                    const std::vector<T>& states) {
+  if (set == 0) return put_effects(i, model::Vehicle{});
+  std::uint64_t with_memory = 0;
+  for (std::size_t e = 0; e < model::effects().size(); ++e)
+    if (model::effects()[e].states > 0) with_memory |= set & std::uint64_t{1} << e;
+  keep_effects(with_memory);
+  T* row = &effect_rows[i / kLanes<T> * model::kEffectRows * kLanes<T> + i % kLanes<T>];
+  for (std::size_t k = 0; k < rows.size(); ++k) row[k * kLanes<T>] = rows[k];
+  lane_effects[i] = set;
+  for_states(i, ~std::uint64_t{0}, [](T& number) { number = 0; });
+  std::size_t next = 0;
+  for_states(i, set, [&](T& number) { number = states[next++]; });
+  unite_effects(i / kLanes<T>);
+}
+
+/// Gives effects of `set` memory; what there was of it stays.
+template <class T>
+void Batch<T>::Storage::keep_effects(std::uint64_t set) {
   if (lane_effects.empty()) {
     lane_effects.assign(blocks.size() * kLanes<T>, 0);
     block_effects.assign(blocks.size(), 0);
     effect_rows.assign(blocks.size() * model::kEffectRows * kLanes<T>, T(0));
     for (std::size_t j = 0; j < lane_effects.size(); ++j) put_effect_rows(j, model::Vehicle{});
   }
-  put_effect_rows(i, v);
-  const std::size_t b = i / kLanes<T>;
-  block_effects[b] = 0;
-  for (int lane = 0; lane < kLanes<T>; ++lane)
-    block_effects[b] |= lane_effects[b * kLanes<T> + static_cast<std::size_t>(lane)];
-}
-
-template <class T>
-void Batch<T>::Storage::put_effect_rows(std::size_t i, const model::Vehicle& v) {
-  T* rows = &effect_rows[i / kLanes<T> * model::kEffectRows * kLanes<T> + i % kLanes<T>];
-  lane_effects[i] = 0;
-  for (std::size_t e = 0; e < model::effects().size(); ++e) {
-    const model::EffectEntry& entry = model::effects()[e];
-    const auto own = v.effects.find(entry.info.id);
-    if (own != v.effects.end()) lane_effects[i] |= std::uint64_t{1} << e;
-    for (std::size_t k = 0; k < entry.parameters.size(); ++k) {
-      const model::EffectParameter& parameter = entry.parameters[k];
-      double value = static_cast<int>(k) == entry.info.vanishing ? entry.info.vanishing_value : parameter.typical;
-      if (own != v.effects.end()) {
-        const auto given = own->second.find(parameter.name);
-        value = given != own->second.end() ? given->second : parameter.typical;
+  const std::uint64_t before = effects_kept;
+  if ((set & ~before) == 0) return;
+  const std::vector<T> from = effect_states;
+  const std::size_t from_size = state_size();
+  effects_kept |= set;
+  effect_states.assign(blocks.size() * state_size(), T(0));
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const T* old = from.data() + b * from_size;
+    T* now = effect_states.data() + b * state_size();
+    for (std::size_t e = 0; e < model::effects().size(); ++e) {
+      const std::size_t size = static_cast<std::size_t>(model::effects()[e].states) * kLanes<T>;
+      if (before >> e & 1) {
+        std::copy_n(old, size, now);
+        old += size;
       }
-      rows[(static_cast<std::size_t>(entry.first_row) + k) * kLanes<T>] = static_cast<T>(value);
+      if (effects_kept >> e & 1) now += size;
     }
   }
 }
@@ -125,9 +192,10 @@ void Batch<T>::set_vehicle(std::size_t i, const model::Vehicle& vehicle) {
   storage_->put_effects(i, vehicle);
 }
 
+/// Puts flapper `i` where `state` is, held as `start` says, and clears its status: all else stays.
 template <class T>
-void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
-  const auto [block, lane] = storage_->at(i);
+void Batch<T>::Storage::put_state(std::size_t i, const FlapperState& state, Start start) {
+  const auto [block, lane] = at(i);
   State<double> x{};
   x.position_m = {state.position_m[0], state.position_m[1], state.position_m[2]};
   x.attitude = {state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3]};
@@ -139,12 +207,19 @@ void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   if (start == Start::standing) x.support = static_cast<double>(model::Support::standing);
   if (start == Start::welded) x.support = static_cast<double>(model::Support::welded);
   put(x, block.state, lane);
+  block.status[lane] = 0;
+}
+
+template <class T>
+void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
+  const auto [block, lane] = storage_->at(i);
+  storage_->put_state(i, state, start);
   auto drive = get<Drive<double>>(block.drive, lane);
   drive.input = {0, 0, 0, 0};
   drive.voltages = {0, 0};
   put(drive, block.drive, lane);
   block.phase[lane] = 0;
-  block.status[lane] = 0;
+  storage_->for_states(i, ~std::uint64_t{0}, [](T& number) { number = 0; });
 }
 
 template <class T>
@@ -221,6 +296,7 @@ std::uint64_t Batch<T>::hash(std::size_t first, std::size_t last) const {
     for (const auto& row : block.state) h = mixed(h, bits_of(row[lane]));
     for (const auto& row : block.drive) h = mixed(h, bits_of(row[lane]));
     h = mixed(mixed(h, block.phase[lane]), block.status[lane]);
+    storage_->for_states(i, storage_->effects_of_lane(i), [&](T number) { h = mixed(h, bits_of(number)); });
     all = mixed(all, h);
   }
   return all;

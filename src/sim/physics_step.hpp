@@ -5,7 +5,7 @@
 #include "model/motor.hpp"
 #include "model/vehicle_dynamics.hpp"
 #include "model/wing_aerodynamics.hpp"
-#include "sim/block.hpp"
+#include "sim/step.hpp"
 
 namespace flappy::sim {
 inline namespace FLAPPY_ISA {
@@ -21,18 +21,51 @@ struct Constants {
 /// Effects in force, with their parameters in lanes. Every lane of a block has the same set.
 template <class T>
 struct ActiveEffects {
-  std::uint64_t set = 0;
-  T parameters[kEffectRows];
+  std::uint64_t set = 0, kept = 0;  // in force; and those that have memory in the batch
+  Element<T>* states = nullptr;     // of the first lane
+  int stride = 0;
+  const Wall* walls = nullptr;
+  std::size_t wall_count = 0;
+  T rows[kEffectRows];  // parameters, then figures
 
-  /// Calls `stage(effect, its parameters)` for every effect in force.
-  template <class Stage, int I = 0>
-  FLAPPY_INLINE void apply(const Stage& stage) const {
+  const Sides<SideFigures<T>>& figures() const {
+    return *reinterpret_cast<const Sides<SideFigures<T>>*>(rows + kEffectParameterRows);
+  }
+
+  /// Lets every effect in force change what a stage hands on: `stage(effect, parameters, state, change)`.
+  template <class Change, class Stage, int I = 0>
+  FLAPPY_INLINE void apply(Change& change, const Stage& stage, int state_row = 0) const {
     if constexpr (I < kEffects) {
-      using Effect = std::tuple_element_t<I, Effects>;
+      using Effect = EffectAt<I>;
       constexpr int kCount = static_cast<int>(Effect::kParameters.size());
-      if (set >> I & 1) stage(Effect{}, *reinterpret_cast<const T(*)[kCount]>(parameters + effect_rows_before<I>()));
-      apply<Stage, I + 1>(stage);
+      const auto& q = *reinterpret_cast<const T(*)[kCount]>(rows + effect_rows_before<I>());
+      const StateRows<T> state{states + state_row * stride, stride, acts<Effect>(q)};
+      if constexpr (requires { stage(Effect{}, q, state, change); }) {
+        if (set >> I & 1) {
+          Change changed = change;
+          stage(Effect{}, q, state, changed);
+          change = chosen(state.on, changed, change);
+        }
+      }
+      apply<Change, Stage, I + 1>(change, stage, state_row + (kept >> I & 1 ? states_of<Effect>() : 0));
     }
+  }
+
+ private:
+  /// Lanes in which not all sizes are 0.
+  template <class Effect>
+  static FLAPPY_INLINE auto acts(const T (&q)[Effect::kParameters.size()]) {
+    auto none = q[0] == T(0);
+    for (int i = 1; i < Effect::kInfo.sizes; ++i) none = none & (q[i] == T(0));
+    return !none;
+  }
+  /// Member by member, for a struct whose members are all T.
+  template <class S>
+  static FLAPPY_INLINE S chosen(const auto& mask, S yes, const S& no) {
+    T* a = reinterpret_cast<T*>(&yes);
+    const T* b = reinterpret_cast<const T*>(&no);
+    for (std::size_t i = 0; i < sizeof(S) / sizeof(T); ++i) a[i] = where(mask, a[i], b[i]);
+    return yes;
   }
 };
 
@@ -65,16 +98,116 @@ FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& be
   q.rotation_rad = clamp(T(q.rotation_rad + theta), p.rotation_lower_rad, p.rotation_upper_rad);
 }
 
-/// Lets effects scale the air on the wings and load the body.
+/// Distance of a point in W to the nearest wall, and the wall's normal.
 template <class T>
-FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, const Surroundings<T>& s, Sides<WingWrench<T>>& air,
-                                 BodyLoad<T>& body) {
-  AirFactor<T> factor{T(1), T(1)};
-  effects.apply([&](auto effect, const auto& parameters) {
-    if constexpr (requires { effect.air(parameters, s, factor); }) effect.air(parameters, s, factor);
-    if constexpr (requires { effect.world(parameters, s, body); }) effect.world(parameters, s, body);
-  });
-  air = {scaled(air.left, factor.left), scaled(air.right, factor.right)};
+FLAPPY_INLINE void find_wall(const ActiveEffects<T>& effects, Surroundings<T>& s) {
+  s.wall_clearance_m = T(1e6);
+  s.wall_normal_x = T(1);
+  s.wall_normal_y = T(0);
+  for (const Wall* w = effects.walls; w != effects.walls + effects.wall_count; ++w) {
+    const T x(w->normal_x), y(w->normal_y);
+    const T clearance = x * T(s.position_m.x - T(w->x_m)) + y * T(s.position_m.y - T(w->y_m));
+    const auto nearer = clearance < s.wall_clearance_m;
+    s.wall_clearance_m = where(nearer, clearance, s.wall_clearance_m);
+    s.wall_normal_x = where(nearer, x, s.wall_normal_x);
+    s.wall_normal_y = where(nearer, y, s.wall_normal_y);
+  }
+}
+
+template <class T>
+FLAPPY_INLINE Hinges<T> hinges_of(const SideParameters<T>& p, const SideFigures<T>& figures, const T& voltage_V) {
+  const T none(-0.0);
+  return {voltage_V,
+          figures.resistance_ohm,
+          p.stroke_torque_per_V_Nm,
+          p.stroke_damping_Nm_s,
+          p.stroke_stiffening_kg_m2,
+          p.stroke_friction_Nm,
+          p.rotor_kg_m2,
+          p.spring_positive_Nm_rad,
+          p.spring_negative_Nm_rad,
+          p.rotation_lower_rad,
+          p.rotation_upper_rad,
+          none,
+          none,
+          none,
+          none};
+}
+
+/// The parameters of a side with its hinges as effects left them.
+template <class T>
+FLAPPY_INLINE void put_hinges(const Hinges<T>& h, SideParameters<T>& p) {
+  p.stroke_torque_per_V_Nm = h.torque_per_V_Nm;
+  p.stroke_damping_Nm_s = h.damping_Nm_s;
+  p.stroke_stiffening_kg_m2 = h.stiffening_kg_m2;
+  p.stroke_friction_Nm = h.friction_Nm;
+  p.rotor_kg_m2 = h.rotor_kg_m2;
+  p.spring_positive_Nm_rad = h.spring_positive_Nm_rad;
+  p.spring_negative_Nm_rad = h.spring_negative_Nm_rad;
+  p.rotation_lower_rad = h.rotation_lower_rad;
+  p.rotation_upper_rad = h.rotation_upper_rad;
+  p.rotation_stiffening_kg_m2 += h.rotation_inertia_kg_m2;
+}
+
+/// What acts on a flapper under effects beyond the base model: motors and stops, wind, air, loads on the body.
+template <class T>
+struct Acting {
+  Surroundings<T> s;
+  Sides<Hinges<T>> hinges;
+  Sides<WingWrench<T>> air;
+  BodyLoad<T> body;
+};
+
+template <class T>
+FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<T>& a) {
+  Surroundings<T>& s = a.s;
+  find_wall(effects, s);
+  effects.apply(
+      a.hinges, [&](auto effect, const auto& q, const auto& state,
+                    auto& change) requires requires { effect.hinges(q, s, state, change); } {
+        effect.hinges(q, s, state, change);
+      });
+  effects.apply(
+      s.wind_B_m_s, [&](auto effect, const auto& q, const auto& state,
+                        auto& change) requires requires { effect.wind(q, s, state, change); } {
+        effect.wind(q, s, state, change);
+      });
+  s.shoulder_B_m_s = {s.shoulder_B_m_s.left - s.wind_B_m_s, s.shoulder_B_m_s.right - s.wind_B_m_s};
+  a.air = {air_on_wing<+1>(s.p.left, s.pose.left, s.shoulder_B_m_s.left),
+           air_on_wing<-1>(s.p.right, s.pose.right, s.shoulder_B_m_s.right)};
+  effects.apply(
+      a.air.left, [&](auto effect, const auto& q, const auto& state,
+                      auto& change) requires requires { effect.template air<+1>(q, s, state, change); } {
+        effect.template air<+1>(q, s, state, change);
+      });
+  effects.apply(
+      a.air.right, [&](auto effect, const auto& q, const auto& state,
+                       auto& change) requires requires { effect.template air<-1>(q, s, state, change); } {
+        effect.template air<-1>(q, s, state, change);
+      });
+  s.lift_N = a.air.left.force_z_N + a.air.right.force_z_N;
+  effects.apply(
+      a.body, [&](auto effect, const auto& q, const auto& state,
+                  auto& change) requires requires { effect.world(q, s, state, change); } {
+        effect.world(q, s, state, change);
+      });
+}
+
+template <class T>
+FLAPPY_INLINE void add_hinges(const Hinges<T>& h, SideLoad<T>& load, WingInertia<T>& wing) {
+  load.stroke_torque_Nm += h.stroke_torque_Nm;
+  load.rotation_torque_Nm += h.rotation_torque_Nm;
+  wing.cross_inertia += h.cross_inertia_kg_m2;
+}
+
+/// Lets effects keep what they will need of this step.
+template <class T>
+FLAPPY_INLINE void remember(const ActiveEffects<T>& effects, Acting<T>& a) {
+  effects.apply(
+      a.hinges, [&](auto effect, const auto& q, const auto& state,
+                    const auto& hinges) requires requires { effect.after(q, a.s, state, hinges); } {
+        effect.after(q, a.s, state, hinges);
+      });
 }
 
 /// A held body goes where its support is. A standing one leaves when its wings carry it: true for lanes still held.
@@ -109,49 +242,101 @@ FLAPPY_INLINE void feel(const Parameters<T>& p, State<T>& x, const Sides<WingPos
   x.lift_N = where(held, T(x.lift_N + T(lift - x.lift_N) / p.beat_steps), x.lift_N);
 }
 
+template <class T>
+FLAPPY_INLINE Sides<WingInertia<T>> wing_inertias(const Parameters<T>& p, const Sides<WingPose<T>>& pose) {
+  return {wing_inertia(p.left, pose.left), wing_inertia(p.right, pose.right)};
+}
+
+/// Where everything is and how it moves.
+template <class T>
+struct Place {
+  Matrix3<T> R;  // R_WB
+  Sides<WingPose<T>> pose;
+  WholeVehicle<T> whole;
+  typename T::Mask held;
+};
+
+/// New rates, and new positions with them.
+template <class T>
+FLAPPY_INLINE void advance(const Parameters<T>& p, State<T>& x, Vec3<T>& com_m, const Place<T>& at,
+                           const Sides<WingInertia<T>>& wing, const Sides<WingWrench<T>>& air,
+                           const Sides<SideLoad<T>>& load, const BodyLoad<T>& body, const Constants<T>& k) {
+  const BodyInertia<T> inertia = body_inertia(p, x, at.pose, wing, at.whole);
+  const BodyDrive<T> drive = drive_body(p, x, at.pose, wing, at.whole, inertia, load, body, at.R.row_z, k.gravity);
+  const HingeSystem<T> hinges = eliminate_body(p, at.pose, wing, at.whole, inertia, drive, load);
+  const Motion<T> m = move(p, x, inertia, drive, hinges, k.step, k.per_step);
+  const Vec3<T> force = at.R * drive.force;
+  x.body_rate_rad_s = add_scaled(x.body_rate_rad_s, k.step, m.body_acceleration);
+  x.com_velocity_m_s = add_scaled(x.com_velocity_m_s, T(k.step * p.inverse_mass_1_kg), force);
+  x.com_velocity_m_s.z -= k.step * k.gravity;
+
+  turn<+1>(p.left, x.left, m.stroke_left, m.rotation_left, k.per_step);
+  turn<-1>(p.right, x.right, m.stroke_right, m.rotation_right, k.per_step);
+  com_m = add_scaled(com_m, k.step, x.com_velocity_m_s);
+  x.attitude = turned(x.attitude, k.half_step * x.body_rate_rad_s);
+  feel(p, x, at.pose, air, force.z, k.step, at.held);
+}
+
 /// One physics step. `com_m`: the vehicle's centre of mass in W, carried along because it is what inertia moves.
 template <bool with_effects, class T>
 FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Voltages<T>& voltages, Vec3<T>& com_m,
                                 const ActiveEffects<T>& effects, const Constants<T>& k) {
   // where everything is and how it moves
-  const Matrix3<T> R = rotation_matrix(x.attitude);
   const Vec3<T>& w = x.body_rate_rad_s;
-  const Sides<WingPose<T>> pose{place_wing<+1>(p.left, x.left, w), place_wing<-1>(p.right, x.right, w)};
-  const WholeVehicle<T> whole = whole_vehicle(p, pose);
-  const auto held = hold(p, x, whole, R, com_m, k.gravity);
+  Place<T> at;
+  at.R = rotation_matrix(x.attitude);
+  at.pose = {place_wing<+1>(p.left, x.left, w), place_wing<-1>(p.right, x.right, w)};
+  at.whole = whole_vehicle(p, at.pose);
+  at.held = hold(p, x, at.whole, at.R, com_m, k.gravity);
+  const Vec3<T> v_C = transpose_times(at.R, x.com_velocity_m_s) - at.whole.com_rate;
+  const Sides<Vec3<T>> shoulder{v_C + cross(w, at.whole.arm_left), v_C + cross(w, at.whole.arm_right)};
+  const T zero(0);
 
-  // what acts on it: air, effects beyond the base model, motors
-  const Vec3<T> v_C = transpose_times(R, x.com_velocity_m_s) - whole.com_rate;
-  Sides<WingWrench<T>> air{air_on_wing<+1>(p.left, pose.left, v_C + cross(w, whole.arm_left)),
-                           air_on_wing<-1>(p.right, pose.right, v_C + cross(w, whole.arm_right))};
-  BodyLoad<T> body{{T(0), T(0), T(0)}, {T(0), T(0), T(0)}};
+  // what acts on it, and where that takes it
   if constexpr (with_effects) {
-    const T stroke_plane = T(0.5) * T(p.left.shoulder_m.z + p.right.shoulder_m.z);
-    apply_effects(effects,
-                  {R, com_m - R * whole.com, v_C - cross(w, whole.com), w, whole.com, stroke_plane, p.air_density_kg_m3,
-                   k.ground_z, k.ceiling_z},
-                  air, body);
+    Acting<T> acting{{p,
+                      x,
+                      at.pose,
+                      effects.figures(),
+                      at.R,
+                      com_m - at.R * at.whole.com,
+                      v_C - cross(w, at.whole.com),
+                      at.whole.com,
+                      T(0.5) * T(p.left.shoulder_m.z + p.right.shoulder_m.z),
+                      k.step,
+                      k.per_step,
+                      k.gravity,
+                      k.ground_z,
+                      k.ceiling_z,
+                      zero,
+                      zero,
+                      zero,
+                      {zero, zero, zero},
+                      shoulder,
+                      zero},
+                     {hinges_of(p.left, effects.figures().left, voltages.left_V),
+                      hinges_of(p.right, effects.figures().right, voltages.right_V)},
+                     {},
+                     {{zero, zero, zero}, {zero, zero, zero}}};
+    apply_effects(effects, acting);
+    const Sides<Hinges<T>>& hinges = acting.hinges;
+    Parameters<T> own = p;
+    put_hinges(hinges.left, own.left);
+    put_hinges(hinges.right, own.right);
+    Sides<SideLoad<T>> load{load_side<+1>(own.left, x.left, acting.air.left, hinges.left.voltage_V),
+                            load_side<-1>(own.right, x.right, acting.air.right, hinges.right.voltage_V)};
+    Sides<WingInertia<T>> wing = wing_inertias(p, at.pose);
+    add_hinges(hinges.left, load.left, wing.left);
+    add_hinges(hinges.right, load.right, wing.right);
+    advance(own, x, com_m, at, wing, acting.air, load, acting.body, k);
+    remember(effects, acting);
+  } else {
+    const Sides<WingWrench<T>> air{air_on_wing<+1>(p.left, at.pose.left, shoulder.left),
+                                   air_on_wing<-1>(p.right, at.pose.right, shoulder.right)};
+    const Sides<SideLoad<T>> load{load_side<+1>(p.left, x.left, air.left, voltages.left_V),
+                                  load_side<-1>(p.right, x.right, air.right, voltages.right_V)};
+    advance(p, x, com_m, at, wing_inertias(p, at.pose), air, load, {{zero, zero, zero}, {zero, zero, zero}}, k);
   }
-  const Sides<SideLoad<T>> load{load_side<+1>(p.left, x.left, air.left, voltages.left_V),
-                                load_side<-1>(p.right, x.right, air.right, voltages.right_V)};
-
-  // new rates
-  const Sides<WingInertia<T>> wing{wing_inertia(p.left, pose.left), wing_inertia(p.right, pose.right)};
-  const BodyInertia<T> inertia = body_inertia(p, x, pose, wing, whole);
-  const BodyDrive<T> body_drive = drive_body(p, x, pose, wing, whole, inertia, load, body, R.row_z, k.gravity);
-  const HingeSystem<T> hinges = eliminate_body(p, pose, wing, whole, inertia, body_drive, load);
-  const Motion<T> m = move(p, x, inertia, body_drive, hinges, k.step, k.per_step);
-  const Vec3<T> force = R * body_drive.force;
-  x.body_rate_rad_s = add_scaled(w, k.step, m.body_acceleration);
-  x.com_velocity_m_s = add_scaled(x.com_velocity_m_s, T(k.step * p.inverse_mass_1_kg), force);
-  x.com_velocity_m_s.z -= k.step * k.gravity;
-
-  // new positions, with the new rates
-  turn<+1>(p.left, x.left, m.stroke_left, m.rotation_left, k.per_step);
-  turn<-1>(p.right, x.right, m.stroke_right, m.rotation_right, k.per_step);
-  com_m = add_scaled(com_m, k.step, x.com_velocity_m_s);
-  x.attitude = turned(x.attitude, k.half_step * x.body_rate_rad_s);
-  feel(p, x, pose, air, force.z, k.step, held);
 }
 
 }  // namespace FLAPPY_ISA

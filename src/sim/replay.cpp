@@ -98,6 +98,7 @@ class ReplayBlock {
       start_s_[i] = w.start_s;
       if (vehicles_[i] != w.vehicle) batch_.set_vehicle(i, *w.vehicle);
       vehicles_[i] = w.vehicle;
+      batch_.reset(i, {});
     }
     read_voltages(windows, checkpoints.back());
     bring_wings_into_phase(recorded);
@@ -153,7 +154,7 @@ class ReplayBlock {
           correct_strokes(seen, carried * options_.step_s, options_.stroke_share, x);
         }
       }
-      batch_.reset(i, x, start);
+      batch_.storage().put_state(i, x, start);  // what effects remember goes on
     }
   }
 

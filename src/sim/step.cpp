@@ -138,6 +138,14 @@ FLAPPY_INLINE void finish(State<L> x, const Vec3<L>& com_m, const Voltages<L>& v
   store_rows(drive, block.drive, first);
 }
 
+/// Effects remember nothing of a frozen flapper: what they saw of it last is no number that means anything.
+template <class T>
+FLAPPY_INLINE void forget_frozen(BlockEffects<T> effects, const Block<T>& block, int first) {
+  for (int i = first; i < first + kWidth<T>; ++i)
+    if (block.status[i] & kFrozen)
+      for (int row = 0; row < state_rows(effects.kept); ++row) effects.states[row * kLanes<T> + i] = T(0);
+}
+
 template <bool with_effects, class T>
 void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first_step, int steps,
                 const Block<T>* next) {
@@ -152,7 +160,12 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     ActiveEffects<L> effects;
     if constexpr (with_effects) {
       effects.set = in_force.set;
-      for (int i = 0; i < kEffectRows; ++i) effects.parameters[i] = L::load(in_force.rows + i * kLanes<T> + first);
+      effects.kept = in_force.kept;
+      effects.states = in_force.states + first;
+      effects.stride = kLanes<T>;
+      effects.walls = plan.walls;
+      effects.wall_count = plan.wall_count;
+      for (int i = 0; i < kEffectRows; ++i) effects.rows[i] = L::load(in_force.rows + i * kLanes<T> + first);
     }
 
     Vec3<L> com_m = x.position_m + rotation_matrix(x.attitude) * centre_of_mass(p, x);
@@ -168,6 +181,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
       physics_step<with_effects>(p, x, voltages, com_m, effects, k);
     }
     finish(x, com_m, voltages, p, plan, block, first);
+    if constexpr (with_effects) forget_frozen(in_force, block, first);
   }
 }
 

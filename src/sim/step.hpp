@@ -20,6 +20,8 @@ template <class T>
 struct BlockEffects {
   std::uint64_t set = 0;  // bit i: entry i of the registry
   const T* rows = nullptr;
+  std::uint64_t kept = 0;  // effects whose memory the batch keeps: its rows follow one another in the registry's order
+  T* states = nullptr;
   /// Voltages in place of the driver's, where there are any: two rows, left and right, for every update from the first on.
   const T* voltages_V = nullptr;
 };

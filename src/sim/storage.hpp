@@ -50,6 +50,8 @@ struct Batch<T>::Storage {
   std::vector<std::uint64_t> lane_effects;   // set of each lane; empty while no flapper has an effect
   std::vector<std::uint64_t> block_effects;  // their union
   std::vector<T> effect_rows;                // [block][row][lane]
+  std::uint64_t effects_kept = 0;            // effects that some vehicle has named, whose memory is
+  std::vector<T> effect_states;              // [block][row][lane]
 
   struct Place {
     Block<T>& block;
@@ -69,15 +71,35 @@ struct Batch<T>::Storage {
             world.walls.data(),
             world.walls.size()};
   }
-  BlockEffects<T> effects_of(std::size_t b) const {
+  BlockEffects<T> effects_of(std::size_t b) {
     if (block_effects.empty()) return {};
-    return {block_effects[b], &effect_rows[b * model::kEffectRows * kLanes<T>]};
+    return {block_effects[b], &effect_rows[b * model::kEffectRows * kLanes<T>], effects_kept,
+            effect_states.data() + b * state_size()};
   }
+  /// Numbers of a block that effects remember.
+  std::size_t state_size() const { return static_cast<std::size_t>(model::state_rows(effects_kept)) * kLanes<T>; }
+  /// Calls `use(number)` for each that the effects in `set` remember of flapper `i`.
+  void for_states(std::size_t i, std::uint64_t set, const auto& use) {
+    if (effect_states.empty()) return;
+    T* number = effect_states.data() + i / kLanes<T> * state_size() + i % kLanes<T>;
+    for (std::size_t e = 0; e < model::effects().size(); ++e) {
+      if (!(effects_kept >> e & 1)) continue;
+      for (int row = 0; row < model::effects()[e].states; ++row, number += kLanes<T>)
+        if (set >> e & 1) use(*number);
+    }
+  }
+  std::uint64_t effects_of_lane(std::size_t i) const { return lane_effects.empty() ? 0 : lane_effects[i]; }
   const Block<T>* block_after(std::size_t b) const { return b + 1 < blocks.size() ? &blocks[b + 1] : nullptr; }
 
   void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v);
   void put_effects(std::size_t i, const model::Vehicle& v);
   void put_effect_rows(std::size_t i, const model::Vehicle& v);
+  /// The effects of flapper `i` with their parameters and what they remember, to be put to a flapper of any batch.
+  std::uint64_t get_effects(std::size_t i, std::vector<T>& rows, std::vector<T>& states);
+  void put_effects(std::size_t i, std::uint64_t set, const std::vector<T>& rows, const std::vector<T>& states);
+  void keep_effects(std::uint64_t set);
+  void unite_effects(std::size_t b);
+  void put_state(std::size_t i, const FlapperState& state, Start start);
 };
 
 }  // namespace flappy::sim

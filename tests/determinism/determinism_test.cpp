@@ -2,7 +2,10 @@
 // instruction set and optimisation level. This file is linked twice: against the library as built, and at -O0.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "flappy/batch.hpp"
+#include "model/effects/registry.hpp"
 #include "sim/randomise.hpp"
 #include "vehicles.hpp"
 
@@ -94,6 +97,62 @@ void one_hash(std::uint64_t golden) {
 
 TEST(Determinism, Float) { one_hash<float>(kGoldenFloat); }
 TEST(Determinism, Double) { one_hash<double>(kGoldenDouble); }
+
+// ---- every effect at once
+
+constexpr std::uint64_t kGoldenEffectsFloat = 0x282684bec97709d4;
+constexpr std::uint64_t kGoldenEffectsDouble = 0xdeab13bc1a72c076;
+
+/// Every effect, each in three of four flappers and in its own size.
+model::Vehicle affected(std::size_t id) {
+  model::Vehicle v = test::identified();
+  std::size_t index = id;
+  for (const model::EffectEntry& e : model::effects()) {
+    if (++index % 4 == 0) continue;
+    for (const model::EffectParameter& p : e.parameters) v.effects[e.info.id][p.name] = p.typical;
+    const model::EffectParameter& size = e.parameters[0];
+    v.effects[e.info.id][size.name] = size.typical * 0.25 * static_cast<double>(1 + index % 5);
+  }
+  return v;
+}
+
+/// Hash of kSmall flappers that fly for most of a beat near everything there is, in batches of `size`.
+template <class T>
+std::uint64_t hash_of_affected(std::size_t size, int threads, const std::string& instruction_set) {
+  BatchOptions options;
+  options.threads = threads;
+  options.instruction_set = instruction_set;
+  options.world.ground_z_m = 0;
+  options.world.ceiling_z_m = 0.6;
+  options.world.walls = {{0.3, 0, -1, 0}, {0, -0.1, 0, 1}};
+  std::uint64_t all = 0;
+  for (std::size_t first = 0; first < kSmall; first += size) {
+    const std::size_t count = std::min(size, kSmall - first);
+    Batch<T> batch(count, test::identified(), options);
+    for (std::size_t i = 0; i < count; ++i) {
+      batch.set_vehicle(i, affected(first + i));
+      reset(batch, i, first + i, {11 + static_cast<double>((first + i) % 13) / 2, 0.3, -0.2, 0.02});
+    }
+    batch.step(100);
+    batch.step(100);
+    EXPECT_EQ(batch.count_status(kFrozen), 0u);
+    for (std::size_t i = 0; i < count; ++i) all = all * 31 + batch.hash(i, i + 1);
+  }
+  return all;
+}
+
+template <class T>
+void one_hash_of_affected(std::uint64_t golden) {
+  for (const std::string& set : instruction_sets())
+    for (const auto& [size, threads] : {std::pair<std::size_t, int>{kSmall, 3}, {17, 2}, {1, 1}}) {
+      const std::uint64_t hash = hash_of_affected<T>(size, threads, set);
+      EXPECT_EQ(hash, golden) << set << ", " << threads << " threads, batches of " << size << ": 0x" << std::hex
+                              << hash;
+    }
+}
+
+TEST(Determinism, EffectsInFloat) { one_hash_of_affected<float>(kGoldenEffectsFloat); }
+TEST(Determinism, EffectsInDouble) { one_hash_of_affected<double>(kGoldenEffectsDouble); }
 
 TEST(Determinism, HashSeesEveryNumber) {
   Batch<float> a = fly<float>(0, 2, 1, ""), b = fly<float>(0, 2, 1, "");

@@ -5,7 +5,6 @@
 
 #include <cmath>
 
-#include "model/effects/registry.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::sim {
@@ -187,17 +186,6 @@ double height_after(const model::Vehicle& v, double seconds, double start_z) {
   b.set_input(0, {10, 0, 0, 0});
   b.step(static_cast<int>(seconds / kStep));
   return b.state(0).position_m[2];
-}
-
-TEST(Effects, VanishExactlyAtTheirVanishingValue) {
-  for (const model::EffectEntry& e : model::effects()) {
-    model::Vehicle v = test::nominal();
-    for (const model::EffectParameter& p : e.parameters) v.effects[e.info.id][p.name] = p.typical;
-    v.effects[e.info.id][e.parameters[static_cast<std::size_t>(e.info.vanishing)].name] = e.info.vanishing_value;
-    EXPECT_EQ(height_after(v, 0.2, 0.1), height_after(test::nominal(), 0.2, 0.1)) << e.info.id;
-    v.effects[e.info.id].clear();  // typical size
-    EXPECT_NE(height_after(v, 0.2, 0.1), height_after(test::nominal(), 0.2, 0.1)) << e.info.id;
-  }
 }
 
 TEST(Effects, OfOneFlapperLeaveItsBlockAlone) {

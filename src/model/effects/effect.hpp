@@ -1,56 +1,131 @@
 // An effect beyond the base model is one file in this folder: a struct with
-//   kInfo                what it is called, where it acts, where it vanishes, its source
-//   kParameters          their names, units and ranges
-//   one or more stages   static templates over the scalar type that change what the stage hands on
+//   kInfo                what it is called, where it acts, which parameters are its sizes, its source
+//   kParameters          their names, units and ranges: sizes first, then shapes
+//   kStates              rows of memory that it keeps from step to step, 0 at a reset; none where it is missing
+//   one or more stages   static templates that change what the stage hands on
 // and one line in registry.hpp. Simulation, randomisation, the vehicle file and diagnosis read that one
-// description. A stage is found by its name; an effect without it costs nothing there:
-//   air(parameters, surroundings, AirFactor&)     scales what the air does to the wings
-//   world(parameters, surroundings, BodyLoad&)    loads the body besides its wings
+// description. A stage is found by its name; an effect without it costs nothing there. In the order of a step:
+//   vehicle(parameters, Vehicle&)                            the vehicle as it is built, before anything is derived
+//   hinges(parameters, surroundings, state, Sides<Hinges>&)  motors, springs and stops of both sides
+//   wind(parameters, surroundings, state, Vec3&)             velocity of the air, in B
+//   air<side>(parameters, surroundings, state, WingWrench&)  what the air does to a wing
+//   world(parameters, surroundings, state, BodyLoad&)        loads on the body besides its wings
+//   after(parameters, surroundings, state, Sides<Hinges>)    what to remember of the step
+// A lane in which all sizes of an effect are 0 gets back, to the bit, what the stage was handed.
 #pragma once
 
 #include <array>
 
 #include "model/vehicle_dynamics.hpp"
+#include "model/wing_aerodynamics.hpp"
 
 namespace flappy::model {
 
-/// The stage of the step that an effect acts on.
-enum class Stage { air, wing, drive, world, sensor };
+struct Vehicle;
+
+/// The stage of the step that an effect acts on; of body: the vehicle itself, which costs the step nothing.
+enum class Stage { body, drive, wing, air, world, sensor };
 
 struct EffectParameter {
-  const char* name;  ///< with its unit as suffix
-  double low, high;  ///< accepted in a vehicle file
-  double typical;    ///< when switched on without a figure of its own
+  const char* name;   ///< with its unit as suffix
+  double low, high;   ///< accepted in a vehicle file
+  double typical;     ///< when switched on without a figure of its own
+  double prior_low;   ///< 90 % of what is plausible lies
+  double prior_high;  ///<   between these
 };
 
 struct EffectInfo {
   const char* id;
   Stage stage;
-  int vanishing;           ///< index of the parameter that switches the effect off,
-  double vanishing_value;  ///< exactly, at this value
+  int sizes;          ///< so many leading parameters are sizes: the effect vanishes, to the bit, when all of them are 0
+  const char* group;  ///< of effects that short or gentle flights cannot tell apart, or ""
   const char* source;
 };
 
 inline namespace FLAPPY_ISA {
 
+/// Figures of one side that the base model has no use for.
+template <class T>
+struct SideFigures {
+  T resistance_ohm, back_emf_V_s;  // of the motor, the latter per stroke rate
+  T electric_damping_Nm_s;         // back-EMF's share of the stroke damping
+  T wing_length_m, mean_chord_m;
+  // added mass of strips, rho pi/4 c^2 each: its integral, and those of c/2, r, c^2/4 + c^2/32, r^2, r c/2 times it
+  T added_kg, added_chord_kg_m, added_span_kg_m, added_chord2_kg_m2, added_span2_kg_m2, added_cross_kg_m2;
+};
+
+/// How motor, gear, spring and stops of one side act in a step. Torques are about beta and theta.
+template <class T>
+struct Hinges {
+  T voltage_V;                                                                                  // at the motor
+  T resistance_ohm, torque_per_V_Nm, damping_Nm_s, stiffening_kg_m2, friction_Nm, rotor_kg_m2;  // as in SideParameters
+  T spring_positive_Nm_rad, spring_negative_Nm_rad;
+  T rotation_lower_rad, rotation_upper_rad;
+  // besides: -0 where there is none, which changes no sum
+  T stroke_torque_Nm, rotation_torque_Nm, rotation_inertia_kg_m2, cross_inertia_kg_m2;
+};
+
 /// What effects may look at.
 template <class T>
 struct Surroundings {
-  Matrix3<T> attitude;      // R_WB
-  Vec3<T> position_m;       // torso origin, in W
-  Vec3<T> velocity_B_m_s;   // of the torso origin, in B
-  Vec3<T> body_rate_rad_s;  // in B
-  Vec3<T> com_m;            // vehicle's centre of mass from the torso origin, in B
-  T stroke_plane_m;         // height of the shoulders above the torso origin along z of B
-  T air_density_kg_m3;
+  const Parameters<T>& p;
+  const State<T>& x;  // in after(): at the end of the step, all else at its start
+  const Sides<WingPose<T>>& pose;
+  const Sides<SideFigures<T>>& figures;
+  Matrix3<T> attitude;     // R_WB
+  Vec3<T> position_m;      // torso origin, in W
+  Vec3<T> velocity_B_m_s;  // of the torso origin, in B
+  Vec3<T> com_m;           // vehicle's centre of mass from the torso origin, in B
+  T stroke_plane_m;        // height of the shoulders above the torso origin along z of B
+  T step_s, per_step, gravity;
   T ground_z_m, ceiling_z_m;
+  T wall_clearance_m, wall_normal_x, wall_normal_y;  // of the torso origin to the nearest wall
+  Vec3<T> wind_B_m_s;                                // velocity of the air; known from air() on
+  Sides<Vec3<T>> shoulder_B_m_s;                     // of the shoulders in that air, in B; known from air() on
+  T lift_N;                                          // of both wings along z of B; known to world()
 };
 
-/// Factor on the aerodynamic force and moment of each wing.
+/// An effect's rows of memory. Lanes in which its sizes are 0 keep theirs.
 template <class T>
-struct AirFactor {
-  T left, right;
+struct StateRows {
+  Element<T>* rows;
+  int stride;
+  typename T::Mask on;
+
+  FLAPPY_INLINE T get(int row) const { return T::load(rows + row * stride); }
+  FLAPPY_INLINE void set(int row, const T& value) const { where(on, value, get(row)).store(rows + row * stride); }
+  /// Adds to a slow sum that begins at `row` what single precision would lose (Kahan 1965).
+  FLAPPY_INLINE void add(int row, const T& increment) const {
+    const T sum = get(row), more = increment - get(row + 1);
+    const T next = sum + more;
+    set(row, next);
+    set(row + 1, T(next - sum) - more);
+  }
 };
+
+template <int side, class S>
+FLAPPY_INLINE auto& of_side(S& s) {
+  if constexpr (side > 0) return s.left;
+  else return s.right;
+}
+
+/// The air that a wing meets: velocity of its shoulder and angular velocity of its leading edge's frame E, both in E.
+template <class T>
+struct WingFlow {
+  Vec3<T> v, w;
+};
+template <int side, class T>
+FLAPPY_INLINE WingFlow<T> flow(const Surroundings<T>& s) {
+  const WingPose<T>& g = of_side<side>(s.pose);
+  return {turn_back_z(g.beta.sin, g.beta.cos, of_side<side>(s.shoulder_B_m_s)),
+          {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate}};
+}
+
+/// Height of the stroke plane in W.
+template <class T>
+FLAPPY_INLINE T stroke_plane_z(const Surroundings<T>& s) {
+  return s.position_m.z + s.attitude.row_z.z * s.stroke_plane_m;
+}
 
 }  // namespace FLAPPY_ISA
 }  // namespace flappy::model

@@ -7,22 +7,19 @@
 #pragma once
 
 #include "model/effects/effect.hpp"
-#include "model/math.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
 struct GroundEffect {
-  static constexpr EffectInfo kInfo{"ground_effect", Stage::air, 0, 0.0, "He, Leang et al. 2019"};
-  static constexpr std::array<EffectParameter, 2> kParameters{{{"gain", 0, 1, 0.15}, {"length_m", 0.005, 0.5, 0.06}}};
+  static constexpr EffectInfo kInfo{"ground_effect", Stage::air, 1, "thrust_loss", "He, Leang et al. 2019"};
+  static constexpr std::array<EffectParameter, 2> kParameters{
+      {{"gain", 0, 1, 0.15, 0, 0.45}, {"length_m", 0.005, 0.5, 0.06, 0.03, 0.09}}};
 
-  template <class T>
-  static FLAPPY_INLINE void air(const T (&parameter)[2], const Surroundings<T>& s, AirFactor<T>& factor) {
-    const T plane_z = s.position_m.z + s.attitude.row_z.z * s.stroke_plane_m;
-    const T height = max(T(plane_z - s.ground_z_m), T(0));
-    const T k = T(1) + parameter[0] * exp_negative(T(height / parameter[1]));
-    factor.left *= k;
-    factor.right *= k;
+  template <int side, class T>
+  static FLAPPY_INLINE void air(const T (&q)[2], const Surroundings<T>& s, const StateRows<T>&, WingWrench<T>& air) {
+    const T height = max(T(stroke_plane_z(s) - s.ground_z_m), T(0));
+    air = scaled(air, T(T(1) + q[0] * exp_negative(T(height / q[1]))));
   }
 };
 

@@ -1,19 +1,50 @@
 #include "model/effects/registry.hpp"
 
+#include <algorithm>
 #include <cstring>
+
+#include "flappy/vehicle.hpp"
 
 namespace flappy::model {
 namespace {
 
+template <int I>
+void change(const double* parameters, Vehicle& v) {
+  constexpr std::size_t kCount = EffectAt<I>::kParameters.size();
+  EffectAt<I>::vehicle(*reinterpret_cast<const double(*)[kCount]>(parameters), v);
+}
+
+template <int I>
+EffectEntry entry() {
+  using Effect = EffectAt<I>;
+  EffectEntry e{Effect::kInfo,
+                {Effect::kParameters.begin(), Effect::kParameters.end()},
+                effect_rows_before<I>(),
+                states_of<Effect>(),
+                nullptr};
+  if constexpr (Effect::kInfo.stage == Stage::body) e.change = change<I>;
+  return e;
+}
+
 template <int... I>
 std::vector<EffectEntry> list(std::integer_sequence<int, I...>) {
-  return {EffectEntry{
-      std::tuple_element_t<I, Effects>::kInfo,
-      {std::tuple_element_t<I, Effects>::kParameters.begin(), std::tuple_element_t<I, Effects>::kParameters.end()},
-      effect_rows_before<I>()}...};
+  return {entry<I>()...};
 }
 
 }  // namespace
+
+std::vector<double> EffectEntry::values(const std::map<std::string, double>& given) const {
+  std::vector<double> list;
+  for (const EffectParameter& p : parameters) {
+    const auto own = given.find(p.name);
+    list.push_back(own != given.end() ? own->second : p.typical);
+  }
+  return list;
+}
+
+bool EffectEntry::acts(const std::vector<double>& values) const {
+  return std::any_of(values.begin(), values.begin() + info.sizes, [](double size) { return size != 0; });
+}
 
 const std::vector<EffectEntry>& effects() {
   static const std::vector<EffectEntry> all = list(std::make_integer_sequence<int, kEffects>());

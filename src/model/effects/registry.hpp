@@ -2,26 +2,74 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <string>
 #include <tuple>
 #include <vector>
 
+#include "model/effects/added_mass.hpp"
+#include "model/effects/battery_sag.hpp"
 #include "model/effects/body_drag.hpp"
+#include "model/effects/ceiling_effect.hpp"
+#include "model/effects/clap_and_fling.hpp"
+#include "model/effects/com_offset.hpp"
+#include "model/effects/command_delay.hpp"
+#include "model/effects/coulomb_friction.hpp"
+#include "model/effects/driver_bandwidth.hpp"
+#include "model/effects/driver_dead_zone.hpp"
+#include "model/effects/gear_backlash.hpp"
 #include "model/effects/ground_effect.hpp"
+#include "model/effects/inertia_products.hpp"
+#include "model/effects/rotational_lift.hpp"
+#include "model/effects/spring_hardening.hpp"
+#include "model/effects/stop_compliance.hpp"
+#include "model/effects/tether.hpp"
+#include "model/effects/wake_capture.hpp"
+#include "model/effects/wall_effect.hpp"
+#include "model/effects/wind.hpp"
+#include "model/effects/winding_heating.hpp"
+#include "model/effects/wing_damage.hpp"
+#include "model/effects/wing_flexibility.hpp"
+#include "model/effects/wing_inertia.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
-using Effects = std::tuple<BodyDrag, GroundEffect>;
+/// Within a stage they act in this order: the vehicle; the voltage from the command to the motor; stroke and stops; the air,
+/// first what makes the wing's force, then what scales it; loads on the body.
+using Effects = std::tuple<ComOffset, InertiaProducts, WingInertiaShape, WingDamage, CommandDelay, DriverDeadZone,
+                           DriverBandwidth, WindingHeating, BatterySag, CoulombFriction, SpringHardening,
+                           StopCompliance, GearBacklash, Wind, WingFlexibility, RotationalLift, WakeCapture,
+                           ClapAndFling, GroundEffect, CeilingEffect, AddedMass, WallEffect, BodyDrag, Tether>;
 
 inline constexpr int kEffects = std::tuple_size_v<Effects>;
+static_assert(kEffects <= 64, "a set of effects is a word");
+
+template <int I>
+using EffectAt = std::tuple_element_t<I, Effects>;
+
+template <class Effect>
+constexpr int states_of() {
+  if constexpr (requires { Effect::kStates; }) return Effect::kStates;
+  else return 0;
+}
 
 /// Rows of parameters before those of effect `I`; of all effects for I = kEffects.
 template <int I>
 constexpr int effect_rows_before() {
   if constexpr (I == 0) return 0;
-  else return effect_rows_before<I - 1>() + static_cast<int>(std::tuple_element_t<I - 1, Effects>::kParameters.size());
+  else return effect_rows_before<I - 1>() + static_cast<int>(EffectAt<I - 1>::kParameters.size());
 }
-inline constexpr int kEffectRows = effect_rows_before<kEffects>();
+inline constexpr int kEffectParameterRows = effect_rows_before<kEffects>();
+/// Rows that effects read: their parameters, then the figures of the left and of the right side.
+inline constexpr int kEffectRows = kEffectParameterRows + 2 * kRows<SideFigures>;
+
+/// Rows of memory of the effects in `set`.
+template <int I = 0>
+constexpr int state_rows(std::uint64_t set) {
+  if constexpr (I == kEffects) return 0;
+  else return (set >> I & 1 ? states_of<EffectAt<I>>() : 0) + state_rows<I + 1>(set);
+}
 
 }  // namespace FLAPPY_ISA
 
@@ -29,7 +77,14 @@ inline constexpr int kEffectRows = effect_rows_before<kEffects>();
 struct EffectEntry {
   EffectInfo info;
   std::vector<EffectParameter> parameters;
-  int first_row;  ///< of its parameters in a block's effect rows
+  int first_row;                                       ///< of its parameters in a block's effect rows
+  int states;                                          ///< rows of memory
+  void (*change)(const double* parameters, Vehicle&);  ///< its stage `vehicle`, or null
+
+  /// Its parameters: those given, typical ones for the others.
+  std::vector<double> values(const std::map<std::string, double>& given) const;
+  /// Whether it does anything with these parameters.
+  bool acts(const std::vector<double>& values) const;
 };
 
 /// The registry by index, which is also the bit of an effect in a block's set.

@@ -1,0 +1,32 @@
+// Dry friction of motor and stroke joint that is larger at rest than in motion (Stribeck):
+//   f (1 + extra exp(-|psi'| / stribeck))      f: friction of the base model
+// [1] Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and compensation methods for the control
+//     of machines with friction, Automatica 30(7), 1994, sec. 2: stiction, and friction falling with speed.
+// No memory of the contact (presliding, rising static friction). The larger friction sticks as the base model's does.
+#pragma once
+
+#include "model/effects/effect.hpp"
+#include "model/math.hpp"
+
+namespace flappy::model {
+inline namespace FLAPPY_ISA {
+
+struct CoulombFriction {
+  static constexpr EffectInfo kInfo{"coulomb_friction", Stage::drive, 1, "low_voltage",
+                                    "Armstrong-Helouvry et al. 1994"};
+  static constexpr std::array<EffectParameter, 2> kParameters{
+      {{"extra", 0, 20, 1, 0, 3}, {"stribeck_rad_s", 0.1, 10000, 100, 30, 170}}};
+
+  template <class T>
+  static FLAPPY_INLINE void hinges(const T (&q)[2], const Surroundings<T>& s, const StateRows<T>&,
+                                   Sides<Hinges<T>>& h) {
+    const auto stick = [&](Hinges<T>& side, const SideState<T>& x) {
+      side.friction_Nm *= T(T(1) + q[0] * exp_negative(T(abs(x.stroke_rate_rad_s) / q[1])));
+    };
+    stick(h.left, s.x.left);
+    stick(h.right, s.x.right);
+  }
+};
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::model

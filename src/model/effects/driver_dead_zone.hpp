@@ -1,0 +1,23 @@
+// A driver whose output starts at a voltage: V - dead sgn V beyond it, none within.
+// [1] Tao, Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996, ch. 2: dead zone.
+// The form of a half bridge's dead time and of the drop of its switches: what is lost is lost at every voltage.
+#pragma once
+
+#include "model/effects/effect.hpp"
+
+namespace flappy::model {
+inline namespace FLAPPY_ISA {
+
+struct DriverDeadZone {
+  static constexpr EffectInfo kInfo{"driver_dead_zone", Stage::drive, 1, "low_voltage", "Tao, Kokotovic 1996"};
+  static constexpr std::array<EffectParameter, 1> kParameters{{{"dead_V", 0, 5, 0.4, 0, 1.2}}};
+
+  template <class T>
+  static FLAPPY_INLINE void hinges(const T (&q)[1], const Surroundings<T>&, const StateRows<T>&, Sides<Hinges<T>>& h) {
+    h.left.voltage_V -= clamp(h.left.voltage_V, T(-q[0]), q[0]);
+    h.right.voltage_V -= clamp(h.right.voltage_V, T(-q[0]), q[0]);
+  }
+};
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::model

@@ -1,0 +1,32 @@
+// A wing that its load twists: the rotation angle falls behind linearly along the span, in proportion to the normal force,
+//   theta(r) = theta - twist F_N r / R
+// felt by the air at the centre of pressure r_cp, where the force of the whole wing is taken: effect on the mean. F_N > 0
+// pushes the trailing edge towards +x, which is to smaller theta on both sides. F_N is that of the untwisted wing: one step
+// of the fixed point, whose next is smaller by twist dF_N/dtheta, 0.05 at the typical size.
+// [1] Zheng, Hedrick, Mittal, A multi-fidelity modelling approach for evaluation and optimization of wing stroke aerodynamics
+//     in flapping flight, J. Fluid Mech. 721, 2013: spanwise twist by load, and what it does to lift and drag.
+// Static deflection (the wing's own modes are far above the beat); turned by no more than 0.5 rad.
+#pragma once
+
+#include "model/effects/effect.hpp"
+
+namespace flappy::model {
+inline namespace FLAPPY_ISA {
+
+struct WingFlexibility {
+  static constexpr EffectInfo kInfo{"wing_flexibility", Stage::air, 1, "", "Zheng, Hedrick, Mittal 2013"};
+  static constexpr std::array<EffectParameter, 1> kParameters{{{"twist_rad_N", 0, 10, 0.5, 0, 1.5}}};
+
+  template <int side, class T>
+  static FLAPPY_INLINE void air(const T (&q)[1], const Surroundings<T>& s, const StateRows<T>&, WingWrench<T>& air) {
+    const SideParameters<T>& p = of_side<side>(s.p);
+    const T at = p.span_to_pressure_m / of_side<side>(s.figures).wing_length_m;
+    const T twist = clamp(T(q[0] * T(air.normal_force_N * at)), T(-0.5), T(0.5));
+    const T theta = clamp(T(of_side<side>(s.x).rotation_rad - twist), T(-kLargestAngle_rad), T(kLargestAngle_rad));
+    const WingFlow<T> f = flow<side>(s);
+    air = blade_element<side>(p, sin_cos(theta), of_side<side>(s.pose).theta_rate, f.v, f.w);
+  }
+};
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::model

@@ -1,0 +1,233 @@
+// Every effect of the registry in flight: exactly off at size 0, at work at its typical size, alike in every place.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <string_view>
+
+#include "model/effects/registry.hpp"
+#include "sim/replay.hpp"
+#include "sim/storage.hpp"
+#include "vehicles.hpp"
+
+namespace flappy::sim {
+namespace {
+
+using model::EffectEntry;
+using model::EffectParameter;
+using model::effects;
+
+/// All sizes of an effect at `scale` times their typical values, its shapes typical.
+model::Vehicle with(const EffectEntry& e, double scale) {
+  model::Vehicle v = test::identified();
+  for (std::size_t k = 0; k < e.parameters.size(); ++k) {
+    const EffectParameter& p = e.parameters[k];
+    v.effects[e.info.id][p.name] = static_cast<int>(k) < e.info.sizes ? scale * p.typical : p.typical;
+  }
+  return v;
+}
+
+/// Near the ground, a ceiling and a wall, and drifting.
+BatchOptions room() {
+  BatchOptions o;
+  o.threads = 1;
+  o.world.ground_z_m = 0;
+  o.world.ceiling_z_m = 0.35;
+  o.world.walls = {{0.5, 0, -1, 0}, {0, -0.2, 0, 1}};
+  return o;
+}
+
+FlapperState start() {
+  FlapperState s;
+  s.position_m[2] = 0.15;
+  s.velocity_m_s[0] = 0.2;
+  s.body_rate_rad_s[1] = 0.5;
+  return s;
+}
+
+constexpr Input kHard{17.5, 0.4, -0.3, 0.02};  // strokes beyond 80 degrees
+
+template <class T>
+void begin(Batch<T>& b) {
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    b.reset(i, start());
+    b.set_input(i, kHard);
+  }
+}
+
+/// Largest change of a flight of `steps` steps by an effect, over place and wings (m, rad).
+double change(const model::Vehicle& v, int steps) {
+  Batch<double> b(2, test::identified(), room());
+  b.set_vehicle(1, v);
+  begin(b);
+  double most = 0;
+  for (int i = 0; i < steps; i += 10) {
+    b.step(10);
+    const FlapperState p = b.state(0), q = b.state(1);
+    for (int k = 0; k < 3; ++k) most = std::max(most, std::abs(p.position_m[k] - q.position_m[k]));
+    for (int k = 0; k < 4; ++k) most = std::max(most, std::abs(p.attitude[k] - q.attitude[k]));
+    for (int k = 0; k < 2; ++k) most = std::max(most, std::abs(p.stroke_rad[k] - q.stroke_rad[k]));
+  }
+  return most;
+}
+
+TEST(Effects, AreTheCatalogue) {
+  std::set<std::string_view> ids, groups;
+  for (const EffectEntry& e : effects()) {
+    EXPECT_TRUE(ids.insert(e.info.id).second) << e.info.id;
+    EXPECT_EQ(model::effect_index(e.info.id), static_cast<int>(ids.size()) - 1);
+    if (*e.info.group) groups.insert(e.info.group);
+  }
+  EXPECT_EQ(ids.size(), 24u);
+  EXPECT_EQ(groups, (std::set<std::string_view>{"wing_inertia", "unsteady_lift", "low_voltage", "asymmetry",
+                                                "thrust_loss", "world_force", "drive_lag"}));
+}
+
+TEST(Effects, StateTheirParameters) {
+  const std::set<std::string_view> units = {"m", "m2", "s", "V", "ohm", "rad"},
+                                   ratios = {"gain", "factor", "decay", "left_area", "right_area", "extra",
+                                             "xy",   "xz",     "yz",    "product",   "side_gain",  "damping_ratio"};
+  const std::set<std::string_view> compound = {
+      "roll_gain_m",       "twist_rad_N", "x_m_s",          "y_m_s",    "z_m_s",
+      "gust_m_s",          "per_rad2",    "stribeck_rad_s", "rise_K_W", "fade_V_C",
+      "compliance_rad_Nm", "line_kg_m",   "stiffness_N_m"};
+  for (const EffectEntry& e : effects()) {
+    EXPECT_GE(e.info.sizes, 1) << e.info.id;
+    EXPECT_LE(e.info.sizes, static_cast<int>(e.parameters.size())) << e.info.id;
+    EXPECT_TRUE(e.acts(e.values({}))) << e.info.id;
+    for (std::size_t k = 0; k < e.parameters.size(); ++k) {
+      const EffectParameter& p = e.parameters[k];
+      const std::string_view name = p.name;
+      EXPECT_TRUE(ratios.contains(name) || compound.contains(name) || units.contains(name.substr(name.rfind('_') + 1)))
+          << e.info.id << "." << name;
+      EXPECT_LE(p.low, p.prior_low) << e.info.id << "." << name;
+      EXPECT_LE(p.prior_low, p.typical) << e.info.id << "." << name;
+      EXPECT_LE(p.typical, p.prior_high) << e.info.id << "." << name;
+      EXPECT_LE(p.prior_high, p.high) << e.info.id << "." << name;
+      if (static_cast<int>(k) >= e.info.sizes)  // a shape: the middle
+        EXPECT_NEAR(p.typical, (p.prior_low + p.prior_high) / 2, 1e-12) << e.info.id << "." << name;
+      else if (p.low < 0) EXPECT_EQ(p.prior_low, -p.prior_high) << e.info.id << "." << name;
+      else EXPECT_EQ(p.prior_low, 0) << e.info.id << "." << name;
+    }
+  }
+}
+
+TEST(Effects, VanishExactlyAtSizeZero) {
+  // alone, beside a lane that has the effect, and beside one that has all of them
+  constexpr int kSteps = 10000;
+  Batch<float> plain(1, test::identified(), room());
+  begin(plain);
+  plain.step(kSteps);
+  ASSERT_EQ(plain.status(0) & kFrozen, 0u);
+  model::Vehicle all = test::identified(), none = test::identified();
+  for (const EffectEntry& e : effects()) {
+    all.effects[e.info.id] = {};
+    none.effects[e.info.id] = with(e, 0).effects[e.info.id];
+    Batch<float> alone(1, with(e, 0), room());
+    Batch<float> beside(3, with(e, 0), room());
+    beside.set_vehicle(1, with(e, 1));
+    beside.set_vehicle(2, test::identified());
+    begin(alone);
+    begin(beside);
+    alone.step(kSteps);
+    beside.step(kSteps);
+    EXPECT_EQ(alone.hash(), plain.hash()) << e.info.id;
+    EXPECT_EQ(beside.hash(0, 1), plain.hash()) << e.info.id;
+    EXPECT_EQ(beside.hash(2, 3), plain.hash()) << e.info.id;
+    EXPECT_NE(beside.hash(1, 2), plain.hash()) << e.info.id;
+  }
+  Batch<float> full(4, all, room());
+  full.set_vehicle(1, none);
+  full.set_vehicle(3, test::identified());
+  begin(full);
+  full.step(kSteps);
+  EXPECT_EQ(full.hash(1, 2), plain.hash());
+  EXPECT_EQ(full.hash(3, 4), plain.hash());
+  EXPECT_EQ(full.hash(0, 1), full.hash(2, 3));
+}
+
+TEST(Effects, DoMoreAtALargerSize) {
+  // One beat, in which most effects are linear in their sizes: 2. Thresholds (stops, play, contact of the wings) make some
+  // grow faster, time (delay) slower. The least is 1.46, of the play: a motor reaches the end of a gap of twice the size
+  // after sqrt(2) times the time.
+  for (const EffectEntry& e : effects()) {
+    const double half = change(with(e, 0.5), 300), typical = change(with(e, 1), 300);
+    EXPECT_GT(typical, 1e-6) << e.info.id;
+    EXPECT_GT(typical, 1.4 * half) << e.info.id << ": " << half << ", " << typical;
+  }
+}
+
+TEST(Effects, KeepTheirMemoryFromCallToCallAndForgetItAtAReset) {
+  model::Vehicle all = test::identified();
+  for (const EffectEntry& e : effects()) all.effects[e.info.id] = {};
+  Batch<float> once(2, all, room()), often(2, all, room()), again(2, all, room());
+  begin(once);
+  begin(often);
+  once.step(2000);
+  for (int i = 0; i < 2000; i += 500) often.step(500);
+  // calls round where the torso is: what the effects remember of voltages is the same to the bit, of motion nearly
+  EXPECT_NEAR(once.state(0).position_m[2], often.state(0).position_m[2], 1e-3);
+  begin(again);
+  again.step(777);
+  begin(again);
+  again.storage().steps = 0;
+  again.step(2000);
+  EXPECT_EQ(once.hash(), again.hash());
+}
+
+TEST(Effects, OfAFrozenFlapperForgetWithIt) {
+  model::Vehicle all = test::identified();
+  for (const EffectEntry& e : effects()) all.effects[e.info.id] = {};
+  Batch<float> b(1, all, room());
+  FlapperState s = start();
+  s.velocity_m_s[0] = 1e6;
+  b.reset(0, s);
+  b.set_input(0, kHard);
+  b.step(20);
+  EXPECT_EQ(b.status(0) & kFrozen, static_cast<std::uint32_t>(kFrozen));
+  b.storage().for_states(0, ~std::uint64_t{0}, [](float number) { EXPECT_EQ(number, 0); });
+}
+
+TEST(Effects, AreNotToBeMadeUp) {
+  model::Vehicle v = test::identified();
+  v.effects["wing_flutter"] = {};
+  EXPECT_THROW(Batch<float>(1, v, room()), std::invalid_argument);
+  v.effects = {{"command_delay", {{"delay_s", 0.02}}}};
+  BatchOptions fine = room();
+  fine.step_s = 5e-5;  // 400 steps, of which 254 are kept
+  EXPECT_THROW(Batch<float>(1, v, fine), std::invalid_argument);
+}
+
+TEST(Effects, RememberThroughAReplaysSpinUp) {
+  // a delay of 5 ms is longer than the millisecond after which a replay puts the torso back: with a memory that each
+  // putting back cleared, no voltage would ever arrive
+  model::Vehicle late = test::identified();
+  late.effects["command_delay"] = {{"delay_s", 0.005}};
+  Batch<double> b(1, late, room());
+  b.reset(0, start());
+  b.set_input(0, {10, 0, 0, 0});
+  VoltageScript voltages;
+  std::vector<FlapperState> flown;
+  for (int i = 0; i < 2000; ++i) {
+    flown.push_back(b.state(0));
+    b.step(1);
+    const auto [block, lane] = b.storage().at(0);
+    const auto drive = get<Drive<double>>(block.drive, lane);
+    voltages.t_s.push_back(i * 1e-4);
+    voltages.left_V.push_back(drive.voltages.left_V);
+    voltages.right_V.push_back(drive.voltages.right_V);
+  }
+  ReplayOptions o;
+  o.threads = 1;
+  o.spin_up_steps = 1200;
+  const auto recorded = [&](std::size_t, double t_s) {
+    return flown[static_cast<std::size_t>(std::lround(t_s * 1e4))];
+  };
+  const auto result = replay({{0.15, &late, &voltages}}, {100}, recorded, o);
+  // strokes reach 1 rad; the wings have four beats to come into phase
+  EXPECT_NEAR(result[0].states[0].stroke_rad[0], flown[1600].stroke_rad[0], 0.05);
+  EXPECT_GT(std::abs(flown[1600].stroke_rad[0] - flown[1550].stroke_rad[0]), 0.3);
+}
+
+}  // namespace
+}  // namespace flappy::sim
