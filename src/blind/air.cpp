@@ -13,10 +13,11 @@ void Robot::blow() {
   air_ = {};
   const Vector3d &w = x_.torso.rate_rad_s, through_air = R_.transpose() * (x_.torso.velocity_m_s - x_.wind_m_s);
 
-  double fling = 1;  // wings that meet behind or before the body squeeze the air between them
   if (const double size = sizes_[Effect::clap_and_fling]; size > 0) {
+    // wings that all but meet, behind or before the body, part with a circulation that they keep for some milliseconds
     const double gap_rad = kPi - std::abs(x_.side[0].wing.stroke_rad + x_.side[1].wing.stroke_rad);
-    fling += 0.3 * size / (1 + exponential((gap_rad - 0.45) / 0.1));
+    const double met = 0.5 * size / (1 + exponential((gap_rad - 0.4) / 0.07));
+    x_.fling = std::max(met, x_.fling * (1 - step_s_ / 4e-3));
   }
 
   for (const std::size_t k : {0u, 1u}) {
@@ -36,7 +37,8 @@ void Robot::blow() {
     }
     const double twist = state.twist_rad, span = s.planform.wing_length_m;
     const double rotational = sizes_[Effect::rotational_lift] * 0.75 * kPi * rho * q.rotation_rad_s;
-    const double gain = state.air_gain * fling * motion_gain_ * 0.5 * rho * s.strips.width_m;
+    const double pressure = 0.5 * rho * s.strips.width_m;
+    const double lift_gain = state.air_gain * (1 + x_.fling) * motion_gain_;  // of the lift alone: less is induced
 
     double force_x = 0, force_z = 0, moment_x = 0, moment_y = 0, moment_z = 0, twisting = 0;
     for (std::size_t i = 0; i < kStrips; ++i) {
@@ -53,7 +55,7 @@ void Robot::blow() {
       const double c2 = ca * ca;
       const double normal = sa * (3.6 * c2 + 1.95 - 1.5 * (2 * c2 - 1));
       const double centre = 0.46 - ca * (0.332 + 0.037 * (4 * c2 - 3) + 0.013 * (16 * c2 * c2 - 20 * c2 + 5));
-      double f = gain * s.kept[i] * c * normal * speed2;
+      double f = pressure * s.kept[i] * c * normal * speed2;
       double arm = centre * c;
       if (rotational != 0) {
         // circulation of the pitching strip, which a gust of its own edges limits; at half chord
@@ -69,6 +71,8 @@ void Robot::blow() {
       moment_z -= r * f * cos_t;
       twisting -= arm * f * r;
     }
+    force_z *= lift_gain;
+    moment_x *= lift_gain;
     moment_y -= 0.125 * rho * std::abs(q.rotation_rad_s) * q.rotation_rad_s *
                 s.planform.rotational_damping_coefficient * s.fourth_m5;
     if (const double size = sizes_[Effect::wing_flexibility]; size > 0) {

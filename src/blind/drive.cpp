@@ -64,7 +64,7 @@ double Robot::motor_torque(std::size_t k) {
     return torque;
   }
   // The rotor turns by itself between two flanks; each is a stiff spring with a damper that only pushes.
-  constexpr double kFlank_Nm_rad = 10, kFlank_Nm_s = 2.5e-4;
+  constexpr double kFlank_Nm_rad = 40, kFlank_Nm_s = 2.7e-3;
   const double half_gap = 0.5 * kPi / 180 * sizes_[Effect::gear_backlash];
   const double ahead = s.rotor_rad - s.wing.stroke_rad;
   const double pressed = ahead > half_gap ? ahead - half_gap : ahead < -half_gap ? ahead + half_gap : 0;

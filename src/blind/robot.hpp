@@ -63,7 +63,7 @@ struct State {
   Vector3d slosh_m = Vector3d::Zero(), slosh_m_s = Vector3d::Zero();
   double yaw_rate_rad_s = 0, sink_m_s = 0;  ///< low-passed
   double shedding_turns = 0, brush_left_s = 0;
-  double density_gain = 1;
+  double density_gain = 1, fling = 0;
   Vector3d acceleration_m_s2 = Vector3d::Zero();  ///< of the torso origin, in B, not counting gravity; last step
   Vector3d turning_rad_s2 = Vector3d::Zero();
 };

@@ -120,7 +120,7 @@ std::optional<Mocap::Sample> Mocap::look(const Torso& torso, double t_s) {
   s.position_m = torso.position_m + torso.attitude * marker_m_;
   if (const double size = sizes_[Effect::outside_mocap_lens]; size > 0)
     // the volume is calibrated worse towards its edges
-    s.position_m += 0.02 * size * s.position_m * s.position_m.head<2>().squaredNorm();
+    s.position_m += 0.05 * size * s.position_m * s.position_m.head<2>().squaredNorm();
   s.position_m = tilt_ * s.position_m + noise_m;
   s.attitude = (tilt_ * torso.attitude * turned_by(noise_rad)).normalized();
   s.arrival_s = t_s + set_.mocap.latency_s + jitter_s;

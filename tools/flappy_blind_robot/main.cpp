@@ -45,6 +45,9 @@ Json fly_case(const Options& o) {
   sim::Randomisation randomisation(declared);
   if (o.randomise != "none") randomisation = sim::read_randomisation(declared, io::Config::load(o.randomise).root());
   const std::filesystem::path vehicle_path(o.vehicle), folder(o.out);
+  std::error_code error;
+  if (std::filesystem::exists(folder, error) && !std::filesystem::is_directory(folder, error))
+    throw io::InputError(o.out + ": is a file; accepted: a folder, or a name for a new one");
   Case c{.vehicle = declared,
          .declared_density_kg_m3 = declared.air_density_kg_m3,
          .vehicle_file = vehicle_path.filename().string(),
@@ -67,8 +70,10 @@ Json fly_case(const Options& o) {
       continue;
     }
     Json list = Json::array();
-    std::error_code error;
     std::filesystem::create_directories(folder, error);
+    if (error)
+      throw io::InputError(o.out + ": cannot be made: " + error.message() +
+                           "; accepted: a folder, or a name for a new one");
     for (std::size_t k = 0; k < kFlights; ++k) {
       const std::filesystem::path to = folder / ("flight_" + std::to_string(k + 1));
       flight::write_flight_log(to, flights[k].log);

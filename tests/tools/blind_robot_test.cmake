@@ -1,0 +1,46 @@
+# flappy-blind-robot as a person meets it: what it prints, writes and refuses, and its exit codes.
+#   cmake -DPROGRAM=flappy-blind-robot -DSOURCE=the project -DWORK=a folder to use -P blind_robot_test.cmake
+cmake_minimum_required(VERSION 3.25)
+include(${CMAKE_CURRENT_LIST_DIR}/program.cmake)
+
+set(vehicle ${SOURCE}/configs/vehicles/hummingbird_identified.toml)
+set(fly fly --vehicle ${vehicle} --seed 1 --programme hover)
+
+run(effects)
+expect_equal("exit code of effects" "${code}" 0)
+expect_match("effects" "${out}" "^ground_effect\n.*\nmocap_delay\noutside_")
+
+run(${fly} --randomise ${SOURCE}/configs/randomisation/published.toml --effect wind=0.5 --power --out ${WORK}/a
+  --json ${WORK}/a.json)
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "flight_1: 10 s, up to [0-9]+ mm off, tilted up to [0-9]+ deg\n.*flight_3: ")
+expect_keys(${WORK}/a.json seed=NUMBER draw=NUMBER crashes=ARRAY flights=ARRAY)
+foreach(k RANGE 1 3)
+  foreach(file flight.toml command.csv mocap.csv imu.csv power.csv truth.csv)
+    if(NOT EXISTS ${WORK}/a/flight_${k}/${file})
+      message(SEND_ERROR "no flight_${k}/${file}")
+    endif()
+  endforeach()
+endforeach()
+if(EXISTS ${WORK}/a/flight_1/wings.csv)
+  message(SEND_ERROR "wings.csv, not asked for")
+endif()
+
+# The same seed, the same bytes; without truth, there is none.
+run(${fly} --randomise ${SOURCE}/configs/randomisation/published.toml --effect wind=0.5 --power --no-truth --out ${WORK}/b)
+foreach(file flight.toml command.csv mocap.csv imu.csv power.csv)
+  file(SHA256 ${WORK}/a/flight_2/${file} first)
+  file(SHA256 ${WORK}/b/flight_2/${file} second)
+  expect_equal("flight_2/${file}" "${second}" "${first}")
+endforeach()
+if(EXISTS ${WORK}/b/flight_1/truth.csv)
+  message(SEND_ERROR "truth.csv in spite of --no-truth")
+endif()
+
+expect_refused("--effect wnd: no such effect; accepted: what `flappy-blind-robot effects` lists; did you mean \"wind\"?"
+  ${fly} --effect wnd=1 --out ${WORK}/c)
+expect_refused("--effect wind: no size; accepted: ID=SIZE, as ground_effect=1" ${fly} --effect wind --out ${WORK}/c)
+file(GLOB left ${WORK}/c*)
+expect_equal("files left by a refusal" "${left}" "")
+file(WRITE ${WORK}/note.txt "")
+expect_refused("${WORK}/note.txt: is a file; accepted: a folder, or a name for a new one" ${fly} --out ${WORK}/note.txt)
