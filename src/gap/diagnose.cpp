@@ -26,7 +26,8 @@ constexpr double kUnknownSizes[] = {0.02, 0.05, 0.15};
 
 class Diagnoser {
  public:
-  Diagnoser(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain, const DiagnoseOptions& options)
+  Diagnoser(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
+            const DiagnoseOptions& options)
       : flights_(flights),
         uncertain_(uncertain),
         options_(options),
@@ -55,7 +56,8 @@ class Diagnoser {
   }
 
   Fit fit_parameters(const Hypothesis& plain) {
-    const Linearised nominal = fitter_.linearise(plain, plain.start(), Directions{MatrixXd(plain.size(), 0), VectorXd(0)});
+    const Linearised nominal =
+        fitter_.linearise(plain, plain.start(), Directions{MatrixXd(plain.size(), 0), VectorXd(0)});
     evidence_.learn_weights(nominal.residual);
     Fit fit = fitter_.fit(plain, plain.start(), 3);
     for (int i = 0; i < 2; ++i) {
@@ -69,8 +71,8 @@ class Diagnoser {
  private:
   struct Screened {
     std::string effect;
-    double gain = 0;          ///< nats over the fit it was screened beside
-    VectorXd coordinates;     ///< of the effect's unknowns, as far as a linear model sees them
+    double gain = 0;       ///< nats over the fit it was screened beside
+    VectorXd coordinates;  ///< of the effect's unknowns, as far as a linear model sees them
   };
 
   std::vector<char> all_flights() const { return std::vector<char>(flights_.size(), 1); }
@@ -107,12 +109,13 @@ class Diagnoser {
       const Grams grams = evidence_.grams(l.residual, columns);
       Answer a;
       a.kind = kind;
-      std::tie(a.log_evidence, a.log_held_out) =
-          weigh_point(l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), discrepancy);
+      std::tie(a.log_evidence, a.log_held_out) = weigh_point(
+          l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), discrepancy);
       a.log_evidence += log_prior;
       d.answers.push_back(std::move(a));
     };
-    const Linearised nominal = fitter_.linearise(plain, plain.start(), Directions{MatrixXd(plain.size(), 0), VectorXd(0)});
+    const Linearised nominal =
+        fitter_.linearise(plain, plain.start(), Directions{MatrixXd(plain.size(), 0), VectorXd(0)});
     add(Answer::Kind::none, nominal, false, {kFloor, 0}, 0);
     add(Answer::Kind::parameters, d.parameters.point, true, {kFloor, 0}, 0);
     for (const double size : kUnknownSizes)
@@ -160,7 +163,8 @@ class Diagnoser {
     for (std::size_t c = 0; c < columns.size(); ++c) {
       if (rows[c].empty()) continue;
       for (std::size_t f = 0; f < rows[c].size(); ++f)
-        for (std::size_t i = 0; i < rows[c][f].size(); ++i) rows[c][f][i] = (l.residual[f][i] - rows[c][f][i]) / kEffectReach;
+        for (std::size_t i = 0; i < rows[c][f].size(); ++i)
+          rows[c][f][i] = (l.residual[f][i] - rows[c][f][i]) / kEffectReach;
       evidence_.smooth(rows[c]);
       column_of[c] = static_cast<int>(used.size());
       used.push_back(&rows[c]);
@@ -170,7 +174,8 @@ class Diagnoser {
       std::vector<int> chosen = shared;
       std::vector<double> mean = shared_mean;
       for (const int c : more) chosen.push_back(c), mean.push_back(0);
-      return Evidence::posterior(reduced, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())),
+      return Evidence::posterior(reduced, chosen,
+                                 Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())),
                                  VectorXd::Ones(static_cast<Index>(mean.size())));
     };
     const double without = solve({}).log_evidence;
@@ -241,8 +246,8 @@ class Diagnoser {
       mean.push_back(-l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
     }
     const Grams grams = evidence_.grams(l.residual, columns);
-    std::tie(a.log_evidence, a.log_held_out) =
-        weigh_point(l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), {kFloor, 0});
+    std::tie(a.log_evidence, a.log_held_out) = weigh_point(
+        l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), {kFloor, 0});
     return a;
   }
 

@@ -14,15 +14,15 @@ namespace flappy::gap {
 struct Answer {
   enum class Kind { none, parameters, effect, unknown } kind = Kind::parameters;
   std::vector<std::string> effects;
-  double log_evidence = 0;   ///< of all flights
-  double log_held_out = 0;   ///< of every flight given the others, summed
+  double log_evidence = 0;  ///< of all flights
+  double log_held_out = 0;  ///< of every flight given the others, summed
   double probability = 0;
-  Fit fit;                   ///< of effects and parameters
+  Fit fit;  ///< of effects and parameters
 };
 
 struct DiagnoseOptions {
   int threads = 0;
-  int finalists = 8;    ///< effects that are fitted in full
+  int finalists = 8;  ///< effects that are fitted in full
   int most_effects = 3;
   std::vector<std::string> withheld;  ///< entries that the catalogue is to lack
   std::function<void(double share, const std::string& what)> progress;

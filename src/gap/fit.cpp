@@ -31,7 +31,8 @@ std::vector<Signature> Fitter::residuals(const std::vector<Candidate>& candidate
   for (std::size_t i = 0; i < candidates.size(); ++i)
     by_sensors[sensor_effects(candidates[i].vehicle.effects)].push_back(i);
   std::vector<Signature> list(candidates.size());
-  const auto compare = [&](const std::vector<CarriedFlight>& flights, const std::vector<std::size_t>& which, int threads) {
+  const auto compare = [&](const std::vector<CarriedFlight>& flights, const std::vector<std::size_t>& which,
+                           int threads) {
     std::vector<Candidate> group;
     for (const std::size_t i : which) group.push_back(candidates[i]);
     std::vector<Signature> predicted = predict_all(flights, group, threads);

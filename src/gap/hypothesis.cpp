@@ -52,7 +52,8 @@ Eigen::VectorXd Hypothesis::bounded(Eigen::VectorXd coordinates) const {
 
 Candidate Hypothesis::candidate(const Eigen::VectorXd& coordinates) const {
   std::vector<double> variates(static_cast<std::size_t>(parameters()));
-  for (std::size_t d = 0; d < variates.size(); ++d) variates[d] = unknowns_[d].value(coordinates[static_cast<Eigen::Index>(d)]);
+  for (std::size_t d = 0; d < variates.size(); ++d)
+    variates[d] = unknowns_[d].value(coordinates[static_cast<Eigen::Index>(d)]);
   Candidate c{uncertain_->at(variates), unknowns_[static_cast<std::size_t>(lag())].value(coordinates[lag()])};
   for (Eigen::Index i = shared(); i < size(); ++i) {
     const Unknown& u = unknowns_[static_cast<std::size_t>(i)];

@@ -13,7 +13,9 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using Values = std::map<std::string, double>;
 
-Vector3d vector(const Values& v, const char* x, const char* y, const char* z) { return {v.at(x), v.at(y), z ? v.at(z) : 0}; }
+Vector3d vector(const Values& v, const char* x, const char* y, const char* z) {
+  return {v.at(x), v.at(y), z ? v.at(z) : 0};
+}
 
 Quaterniond turned_by(const Vector3d& turn) {
   const double angle = turn.norm();

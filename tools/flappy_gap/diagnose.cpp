@@ -27,8 +27,7 @@ const char* kind_name(Answer::Kind kind) {
 
 nlohmann::ordered_json run_diagnose(const DiagnoseCommand& command) {
   const model::Vehicle vehicle = model::read_vehicle(command.vehicle);
-  const sim::Randomisation uncertain =
-      sim::read_randomisation(vehicle, io::Config::load(command.priors, {}).root());
+  const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors, {}).root());
   std::vector<CarriedFlight> flights;
   for (const std::string& folder : command.flights)
     flights.emplace_back(Recording(folder, flight::read_flight_log(folder), vehicle.extent.below_m));

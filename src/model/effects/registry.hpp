@@ -7,6 +7,7 @@
 #include <tuple>
 #include <vector>
 
+#include "model/effects/accelerometer_misalignment.hpp"
 #include "model/effects/added_mass.hpp"
 #include "model/effects/battery_sag.hpp"
 #include "model/effects/body_drag.hpp"
@@ -19,11 +20,16 @@
 #include "model/effects/driver_dead_zone.hpp"
 #include "model/effects/gear_backlash.hpp"
 #include "model/effects/ground_effect.hpp"
+#include "model/effects/gyro_bias.hpp"
 #include "model/effects/inertia_products.hpp"
+#include "model/effects/marker_offset.hpp"
+#include "model/effects/mocap_delay.hpp"
+#include "model/effects/mocap_tilt.hpp"
 #include "model/effects/rotational_lift.hpp"
 #include "model/effects/spring_hardening.hpp"
 #include "model/effects/stop_compliance.hpp"
 #include "model/effects/tether.hpp"
+#include "model/effects/vibration_rectification.hpp"
 #include "model/effects/wake_capture.hpp"
 #include "model/effects/wall_effect.hpp"
 #include "model/effects/wind.hpp"
@@ -36,11 +42,12 @@ namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
 /// Within a stage they act in this order: the vehicle; the voltage from the command to the motor; stroke and stops; the air,
-/// first what makes the wing's force, then what scales it; loads on the body.
+/// first what makes the wing's force, then what scales it; loads on the body. Sensors last.
 using Effects = std::tuple<ComOffset, InertiaProducts, WingInertiaShape, WingDamage, CommandDelay, DriverDeadZone,
                            DriverBandwidth, WindingHeating, BatterySag, CoulombFriction, SpringHardening,
                            StopCompliance, GearBacklash, Wind, WingFlexibility, RotationalLift, WakeCapture,
-                           ClapAndFling, GroundEffect, CeilingEffect, AddedMass, WallEffect, BodyDrag, Tether>;
+                           ClapAndFling, GroundEffect, CeilingEffect, AddedMass, WallEffect, BodyDrag, Tether, GyroBias,
+                           AccelerometerMisalignment, VibrationRectification, MocapTilt, MarkerOffset, MocapDelay>;
 
 inline constexpr int kEffects = std::tuple_size_v<Effects>;
 static_assert(kEffects <= 64, "a set of effects is a word");

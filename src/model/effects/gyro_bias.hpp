@@ -1,0 +1,23 @@
+// Drift of a gyro's bias beyond the constant one of the sensor model: the part is warmed by its own current,
+//   b(t) = drift (1 - exp(-t / warm_up))      t since the flight's start
+// [1] El-Sheimy, Hou and Niu, Analysis and modeling of inertial sensors using Allan variance, IEEE Trans. Instrum. Meas.
+//     57(1), 140-149, 2008: slow errors of MEMS gyros. First-order warm-up: data sheets of consumer parts give seconds to
+//     minutes. A random walk beside it is left to the filters' own process noise.
+#pragma once
+
+#include "model/effects/effect.hpp"
+
+namespace flappy::model {
+inline namespace FLAPPY_ISA {
+
+struct GyroBias {
+  static constexpr EffectInfo kInfo{"gyro_bias", Stage::sensor, 3, "",
+                                    "El-Sheimy, Hou, Niu, IEEE Trans. Instrum. Meas. 57(1), 2008"};
+  static constexpr std::array<EffectParameter, 4> kParameters{{{"x_rad_s", -0.5, 0.5, 0.03, -0.09, 0.09},
+                                                               {"y_rad_s", -0.5, 0.5, 0.03, -0.09, 0.09},
+                                                               {"z_rad_s", -0.5, 0.5, 0.03, -0.09, 0.09},
+                                                               {"warm_up_s", 0.5, 600, 10, 3, 60}}};
+};
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::model

@@ -1,0 +1,17 @@
+// Poses arrive later, by a constant, than their declared latency says.
+// [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013: the
+//     time offset between sensors.
+#pragma once
+
+#include "model/effects/effect.hpp"
+
+namespace flappy::model {
+inline namespace FLAPPY_ISA {
+
+struct MocapDelay {
+  static constexpr EffectInfo kInfo{"mocap_delay", Stage::sensor, 1, "", "Furgale, Rehder, Siegwart, IROS 2013"};
+  static constexpr std::array<EffectParameter, 1> kParameters{{{"delay_s", -0.02, 0.02, 0.005, -0.012, 0.012}}};
+};
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::model

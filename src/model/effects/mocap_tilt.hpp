@@ -1,0 +1,20 @@
+// The world frame of motion capture leans against the vertical by a small rotation vector e about its x and y:
+//   seen position = R(e) p, seen attitude = R(e) q
+// [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013: the
+//     direction of gravity as an unknown of calibration.
+#pragma once
+
+#include "model/effects/effect.hpp"
+
+namespace flappy::model {
+inline namespace FLAPPY_ISA {
+
+struct MocapTilt {
+  static constexpr EffectInfo kInfo{"mocap_tilt", Stage::sensor, 2, "world_force",
+                                    "Furgale, Rehder, Siegwart, IROS 2013"};
+  static constexpr std::array<EffectParameter, 2> kParameters{
+      {{"x_rad", -0.3, 0.3, 0.01, -0.03, 0.03}, {"y_rad", -0.3, 0.3, 0.01, -0.03, 0.03}}};
+};
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::model
