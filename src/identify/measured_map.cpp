@@ -137,13 +137,14 @@ void write_measured_map(const std::filesystem::path& path, const MeasuredMap& ma
   file.close();
 }
 
-std::array<double, 4> numbers_of(const sim::Input& u) {
-  return {u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle};
+std::array<double, 4> numbers_of(const sim::Input& input) {
+  return {input.amplitude_V, input.difference_V, input.bias_V, input.split_cycle};
 }
 
-std::string text_of(const sim::Input& u) {
+std::string text_of(const sim::Input& input) {
   char text[96];
-  std::snprintf(text, sizeof text, "%g V, %g V, %g V, %g", u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle);
+  std::snprintf(text, sizeof text, "%g V, %g V, %g V, %g", input.amplitude_V, input.difference_V, input.bias_V,
+                input.split_cycle);
   return text;
 }
 

@@ -1,12 +1,12 @@
 // Whether a measured map has its axes as the vehicle's: what answers an input with the opposite sign, beyond noise and
 // beyond what a wrong model can do, is a mistake of the table and no property of a robot.
 //
-//   - thrust, roll, pitch and yaw answer amplitude, difference, bias and split cycle; force x answers bias, and force y
-//     difference, less surely: their opposite must be half as steep as the vehicle's answer. Slopes over all rows, or where rows are too few for them,
-//     any two rows that differ in that input alone;
+//   - thrust, roll, pitch and yaw answer amplitude, difference, bias and split cycle. Force x answers bias and force y
+//     difference, less surely: their opposite must be half as steep as the vehicle's answer, and twice as clear. Slopes
+//     are over all rows; where rows are too few for them, between any two that differ in that input alone;
 //   - a single row: thrust against its own sign; a torque against the vehicle's plus the offset of the whole map, where it
-//     stands out of what the other rows leave.
-// Force x and y of single rows have no reliable sign: asymmetry of the wings moves them more than any input does.
+//     stands out of what the other rows leave. Force x and y of single rows have no reliable sign: asymmetry of the wings
+//     moves them more than any input does.
 #pragma once
 
 #include <string>

@@ -31,9 +31,13 @@ if(lines GREATER 40)
 endif()
 file(SHA256 ${WORK}/map.csv sha256)
 expect_match("the fitted vehicle" "${fitted1}" "^# Fitted to a measured force map by flappy-identify, commit [0-9a-z-]+, method gn\n# from vehicle hummingbird_nominal\n# measured file's sha256 ${sha256}\n# total error 33")
+file(SHA256 ${SOURCE}/configs/identify/forces.toml sha256)
+expect_match("the fitted vehicle" "${fitted1}" "\n# torques about 0,0,0, 0 rows held out, 0 left out for jumps\n# configuration's sha256 ${sha256}\n# seed 1, 1 of 1 starts agree\n# parameters fitted:\n#   left.motor.resistance_ohm\n")
+expect_match("one start alone" "${out}" "95 % interval, of one optimum: no second start found it\n")
 expect_keys(${WORK}/fit1.json total_error_before=NUMBER total_error_after=NUMBER heldout_error=NUMBER parameters=ARRAY
   parameters.0.name=STRING parameters.0.value=NUMBER parameters.0.low=NUMBER parameters.0.high=NUMBER
-  parameters.0.seen=BOOLEAN parameters.11.name=STRING wall_s=NUMBER)
+  parameters.0.seen=BOOLEAN parameters.11.name=STRING wall_s=NUMBER
+  left_out=ARRAY jumping_kept=ARRAY signs_unchecked=ARRAY intervals_confirmed=BOOLEAN ends.0.cost=NUMBER)
 run(simulate-forces --vehicle ${WORK}/fitted1.toml --out ${WORK}/again.csv --noise none)
 expect_equal("measuring the fitted vehicle" "${code}" 0)
 
@@ -79,6 +83,11 @@ list(LENGTH rows count)
 expect_equal("points of the beat" "${count}" 201)
 
 # ---- refusals
+
+expect_refused("${WORK}/map.csv:2: is line 2 of ${WORK}/map.csv; accepted: measurements that are not fitted"
+  forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/out.toml --held-out ${WORK}/map.csv)
+expect_refused("flappy-identify: --seed: Value -1 not in range 0 to 9223372036854775807; see flappy-identify --help"
+  simulate-forces --vehicle ${identified} --out ${WORK}/out.csv --seed -1)
 
 expect_refused("${WORK}/gone.csv: cannot be read: No such file or directory"
   forces ${WORK}/gone.csv --vehicle ${nominal} --out ${WORK}/out.toml)

@@ -2,7 +2,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 
 #include "command.hpp"
@@ -163,14 +162,16 @@ std::string vehicle_file(const Settings& s, const ForceFit& f, const std::string
     else if (!p.seen) fitted += ": unseen alone";
     if (p.at_bound) fitted += p.seen ? ": at its bound" : ", at its bound";
   }
+  const std::string search =
+      f.ends.empty()
+          ? "population " + std::to_string(s.fit.population) + ", generations " + std::to_string(s.fit.generations)
+          : std::to_string(f.starts_agreed) + " of " + std::to_string(f.ends.size()) + " starts agree";
   return "# Fitted to a measured force map by flappy-identify, commit " + io::commit() + ", method " + s.fit.method +
          "\n# from vehicle " + from + "\n# measured file's sha256 " + measured_sha256 + "\n" + line +
-         "# torques about " + s.source.moment_point + ", " + std::to_string(s.hold_out) +
-         " rows held out, left out for jumps " + std::to_string(f.left_out.size()) + "\n# configuration " +
-         std::filesystem::path(s.fit.config).filename().string() + ", sha256 " +
-         io::sha256(io::read_text(s.fit.config)) + "\n# seed " + std::to_string(s.fit.seed) + ", " +
-         std::to_string(f.starts_agreed) + " of " + std::to_string(f.ends.size()) +
-         " starts agree\n# parameters fitted:" + fitted + "\n" + model::vehicle_text(f.vehicle);
+         "# torques about " + s.source.moment_point + ", " + std::to_string(s.hold_out) + " rows held out, " +
+         std::to_string(f.left_out.size()) + " left out for jumps\n# configuration's sha256 " +
+         io::sha256(io::read_text(s.fit.config)) + "\n# seed " + std::to_string(s.fit.seed) + ", " + search +
+         "\n# parameters fitted:" + fitted + "\n" + model::vehicle_text(f.vehicle);
 }
 
 Json run(const Settings& s) {
