@@ -149,21 +149,6 @@ std::vector<Eigen::Index> put_back(const Problem& problem, const FitOptions& opt
   return back;
 }
 
-/// Ends whose cost over what is fitted in the end is as low as noise allows above the lowest.
-std::vector<End> likely_ends(const Problem& problem, std::vector<End> ends, const VectorXd& point) {
-  std::vector<VectorXd> points = {point};
-  for (const End& end : ends) points.push_back(end.point);
-  const std::vector<VectorXd> r = problem(points);
-  double lowest = r[0].squaredNorm();
-  for (std::size_t i = 0; i < ends.size(); ++i) {
-    ends[i].cost = r[i + 1].squaredNorm();
-    lowest = std::min(lowest, ends[i].cost);
-  }
-  const double noise = std::max(1.0, lowest / std::max(1.0, static_cast<double>(r[0].size() - point.size())));
-  std::erase_if(ends, [&](const End& e) { return !(e.cost <= lowest + explained_by_noise(problem.size(), noise)); });
-  return ends;
-}
-
 void check_inputs(const MeasuredMap& measured, std::size_t parameters) {
   const std::size_t distinct = distinct_inputs(measured.inputs);
   if (distinct >= parameters) return;

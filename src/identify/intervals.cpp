@@ -66,6 +66,20 @@ int count_agreed(const std::vector<double>& costs, std::size_t residuals, std::s
   return static_cast<int>(std::ranges::count_if(costs, [&](double c) { return c <= most; }));
 }
 
+std::vector<End> likely_ends(const Problem& problem, std::vector<End> ends, const VectorXd& point) {
+  std::vector<VectorXd> points = {point};
+  for (const End& end : ends) points.push_back(end.point);
+  const std::vector<VectorXd> r = problem(points);
+  double lowest = r[0].squaredNorm();
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    ends[i].cost = r[i + 1].squaredNorm();
+    lowest = std::min(lowest, ends[i].cost);
+  }
+  const double noise = std::max(1.0, lowest / std::max(1.0, static_cast<double>(r[0].size() - point.size())));
+  std::erase_if(ends, [&](const End& e) { return !(e.cost <= lowest + explained_by_noise(problem.size(), noise)); });
+  return ends;
+}
+
 Intervals describe(const Problem& problem, const VectorXd& point, const VectorXd& nominal,
                    const std::vector<End>& ends) {
   const FitConfig& config = problem.config();

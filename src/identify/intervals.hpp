@@ -48,6 +48,9 @@ double explained_by_noise(std::size_t parameters, double noise);
 /// units of the map itself.
 int count_agreed(const std::vector<double>& costs, std::size_t residuals, std::size_t parameters, bool declared);
 
+/// Those `ends` whose cost, over what is fitted in the end, noise allows above the lowest of them and of `point`.
+std::vector<End> likely_ends(const Problem& problem, std::vector<End> ends, const Eigen::VectorXd& point);
+
 struct Intervals {
   std::vector<FittedParameter> parameters;
   std::vector<Confounded> confounded;  ///< beyond +-0.9

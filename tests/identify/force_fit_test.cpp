@@ -318,6 +318,13 @@ TEST(Intervals, HoldTheEndsThatNoiseDoesNotTellApart) {
   const Problem problem(nominal, c, m, {});
   const Eigen::VectorXd point = problem.point(changed(two)), start = problem.point(nominal);
   const Intervals alone = describe(problem, point, start, {});
+  // costs as the starts had them do not count: one end is at the optimum, one not 21 above it, one by thousands
+  const double far = 3 * (alone.parameters[0].high - alone.parameters[0].low) /
+                     (alone.parameters[0].upper_bound - alone.parameters[0].lower_bound);
+  const std::vector<End> likely =
+      likely_ends(problem, {{1e9, point}, {0, point + Eigen::Vector2d(far, 0)}, {0, start}}, point);
+  ASSERT_EQ(likely.size(), 1u);
+  EXPECT_EQ(likely[0].point, point);
   const Eigen::VectorXd low = point + Eigen::Vector2d(-0.2, 0.1), high = point + Eigen::Vector2d(0.1, 0.6);
   const Intervals wide = describe(problem, point, start, {{1, low}, {1, high}});
   const auto share = [&](const FittedParameter& p, double value) {

@@ -163,5 +163,22 @@ TEST(Signs, GoodMapsAreNeverRefused) {
     }
 }
 
+TEST(Signs, ARowIsNotRefusedForAModelThatFitsNoRow) {
+  const model::Vehicle start = test::nominal();
+  const std::vector<sim::Input> inputs = default_inputs();
+  const std::vector<Wrench> simulated = force_map<double>(std::span(&start, 1), inputs);
+  MeasuredMap rough{"m.csv", inputs, simulated};
+  for (std::size_t i = 0; i < rough.size(); ++i) {
+    constexpr std::array<double, 3> kErrors = {0, 3.2e-3, -3.2e-3};  // roll is 2.1e-3 at most
+    rough.wrenches[i][3] += kErrors[i / 3 % 3];
+  }
+  ASSERT_LT(rough.wrenches[34][3], -0.5 * simulated[34][3]);
+  EXPECT_EQ(refusal_of(rough), "accepted");
+  // a torque that no input of the map moves has the sign of its offset, and that may change
+  MeasuredMap amplitudes{"m.csv", {inputs.begin(), inputs.begin() + 13}, {simulated.begin(), simulated.begin() + 13}};
+  for (std::size_t i = 0; i < amplitudes.size(); ++i) amplitudes.wrenches[i][5] = i < 10 ? 1e-4 : -2e-4;
+  EXPECT_EQ(refusal_of(amplitudes), "accepted");
+}
+
 }  // namespace
 }  // namespace flappy::identify
