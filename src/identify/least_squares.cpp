@@ -34,20 +34,44 @@ Eigen::VectorXd stepped(const Eigen::MatrixXd& normal, const Eigen::VectorXd& gr
 
 }  // namespace
 
-Eigen::MatrixXd jacobian(const Residuals& residuals, const Eigen::VectorXd& point, double difference) {
-  std::vector<Eigen::VectorXd> points;
+Eigen::MatrixXd first_steps(Eigen::Index size) { return kDifference * Eigen::MatrixXd::Identity(size, size); }
+
+Eigen::MatrixXd steps_along(const Eigen::MatrixXd& slopes, const Eigen::VectorXd& point, double noise) {
+  Eigen::MatrixXd steps = first_steps(point.size());
+  std::vector<Eigen::Index> inner;  // those at a bound keep a step of their own: it is one-sided
   for (Eigen::Index i = 0; i < point.size(); ++i)
-    for (const double way : {-difference, difference}) {
-      points.push_back(point);
-      points.back()[i] = std::clamp(point[i] + way, 0.0, 1.0);
+    if (point[i] >= kDifference && point[i] <= 1 - kDifference) inner.push_back(i);
+  if (inner.empty()) return steps;
+  const Eigen::MatrixXd among = slopes(Eigen::all, inner);
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(among, Eigen::ComputeThinV);
+  if (svd.matrixV().cols() < among.cols()) return steps;
+  for (std::size_t k = 0; k < inner.size(); ++k) {
+    const auto column = static_cast<Eigen::Index>(k);
+    const Eigen::VectorXd way = svd.matrixV().col(column);
+    double far = std::clamp(noise / std::max(svd.singularValues()[column], 1e-300), kDifference, kFarthest);
+    for (std::size_t i = 0; i < inner.size(); ++i) {
+      const double room = std::min(point[inner[i]], 1 - point[inner[i]]);
+      far = std::min(far, room / std::max(std::abs(way[static_cast<Eigen::Index>(i)]), 1e-300));
     }
-  const std::vector<Eigen::VectorXd> r = residuals(points);
-  Eigen::MatrixXd slopes(r.front().size(), point.size());
-  for (Eigen::Index i = 0; i < point.size(); ++i) {
-    const auto low = static_cast<std::size_t>(2 * i);
-    slopes.col(i) = (r[low + 1] - r[low]) / (points[low + 1][i] - points[low][i]);
+    steps(inner, inner[k]) = far * way;
   }
-  return slopes;
+  return steps;
+}
+
+Eigen::MatrixXd jacobian(const Residuals& residuals, const Eigen::VectorXd& point, const Eigen::MatrixXd& steps) {
+  std::vector<Eigen::VectorXd> points;
+  Eigen::MatrixXd apart(point.size(), steps.cols());
+  for (Eigen::Index i = 0; i < steps.cols(); ++i) {
+    for (const double way : {-1.0, 1.0}) points.emplace_back((point + way * steps.col(i)).cwiseMax(0).cwiseMin(1));
+    apart.col(i) = points.back() - points[points.size() - 2];
+  }
+  const std::vector<Eigen::VectorXd> r = residuals(points);
+  Eigen::MatrixXd differences(r.front().size(), steps.cols());
+  for (Eigen::Index i = 0; i < steps.cols(); ++i) {
+    const auto low = static_cast<std::size_t>(2 * i);
+    differences.col(i) = r[low + 1] - r[low];
+  }
+  return apart.transpose().partialPivLu().solve(differences.transpose()).transpose();
 }
 
 LeastSquares minimise(const Residuals& residuals, const Eigen::VectorXd& start,
@@ -56,12 +80,14 @@ LeastSquares minimise(const Residuals& residuals, const Eigen::VectorXd& start,
   LeastSquares best{start, cost_of(r), 0, 1};
   const double enough = kLeastCost * best.cost;
   double damping = 1e-3;
+  Eigen::MatrixXd steps = first_steps(start.size());
   int without_gain = 0;
   while (best.cost > enough && best.iterations < kMostIterations && without_gain < 2 && (!more || more(best))) {
     ++best.iterations;
-    const Eigen::MatrixXd j = jacobian(residuals, best.point);
+    const Eigen::MatrixXd j = jacobian(residuals, best.point, steps);
     best.evaluations += 2 * static_cast<std::size_t>(start.size());
     if (!j.allFinite()) break;
+    steps = steps_along(j, best.point, std::sqrt(best.cost / static_cast<double>(r.size())));
     const Eigen::MatrixXd normal = j.transpose() * j;
     const Eigen::VectorXd gradient = j.transpose() * r;
     const std::vector<double> factors = {0, 1e-2, 1, 1e1, 1e2, 1e4};

@@ -1,28 +1,30 @@
 #include "identify/measured_map.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
+#include <cstdio>
+#include <set>
 
 namespace flappy::identify {
 namespace {
 
 using Names = std::vector<std::string>;
 
-std::array<double, 4> numbers_of(const sim::Input& u) {
-  return {u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle};
-}
-
-std::string in_short(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
-
 std::string joined(const Names& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
+}
+
+std::string unit_of(const std::string& name) { return name.substr(name.rfind('_') + 1); }
+
+/// The column that differs from `wrong` in nothing but its unit, whatever that of `wrong` is; empty when there is none.
+std::string but_for_its_unit(const std::string& wrong, const Names& known) {
+  static const std::set<std::string> kUnits = {"V", "N", "Nm", "rad", "s"};
+  const std::string stem = wrong.substr(0, wrong.size() - unit_of(wrong).size());
+  if (std::ranges::any_of(known, [&](const std::string& name) { return name.starts_with(wrong + "_"); })) return "";
+  for (const std::string& name : known)
+    if (kUnits.contains(unit_of(name)) && name == stem + unit_of(name)) return name;
+  return "";
 }
 
 std::string at(const io::CsvTable& table, std::size_t row, const std::string& column) {
@@ -46,7 +48,7 @@ MeasuredMap map_of(const io::CsvTable& table, const model::Driver& driver) {
   required.insert(required.end(), channel_names().begin(), channel_names().end());
   const Names optional(sd_names().begin(), sd_names().end());
   check_columns(table, required, optional);
-  MeasuredMap map{table.name, inputs_of(table, driver), {}, {}};
+  MeasuredMap map{table.name, inputs_of(table, driver), {}};
   map.wrenches.resize(map.size());
   const bool declared =
       std::ranges::any_of(optional, [&](const auto& n) { return std::ranges::count(table.names, n); });
@@ -74,10 +76,11 @@ void check_columns(const io::CsvTable& table, const Names& required, const Names
   known.insert(known.end(), optional.begin(), optional.end());
   for (const std::string& name : table.names) {
     if (std::ranges::count(known, name) > 0) continue;
-    const std::string unit = io::in_another_unit(name, known);
-    throw io::InputError(table.name + ":1: " + name + ": " +
-                         (unit.empty() ? "unknown column; accepted: " + joined(known) + io::did_you_mean(name, known)
-                                       : "wrong unit; accepted: " + unit));
+    const std::string meant = but_for_its_unit(name, known);
+    throw io::InputError(
+        table.name + ":1: " + name + ": " +
+        (meant.empty() ? "unknown column; accepted: " + joined(known) + io::did_you_mean(name, known)
+                       : "wrong unit " + unit_of(name) + ", expected " + unit_of(meant) + "; accepted: " + meant));
   }
   for (const std::string& name : required)
     if (std::ranges::count(table.names, name) == 0)
@@ -139,79 +142,64 @@ void write_measured_map(const std::filesystem::path& path, const MeasuredMap& ma
   file.close();
 }
 
-std::array<std::array<Slope, kChannels>, 4> slopes(const std::vector<sim::Input>& inputs,
-                                                   const std::vector<Wrench>& wrenches) {
-  const auto n = static_cast<Eigen::Index>(inputs.size());
-  std::vector<Eigen::Index> varied;
-  Eigen::MatrixXd all(n, 4);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const auto u = numbers_of(inputs[static_cast<std::size_t>(i)]);
-    for (Eigen::Index k = 0; k < 4; ++k) all(i, k) = u[static_cast<std::size_t>(k)];
-  }
-  for (Eigen::Index k = 0; k < 4; ++k)
-    if (all.col(k).maxCoeff() > all.col(k).minCoeff()) varied.push_back(k);
-  std::array<std::array<Slope, kChannels>, 4> result{};
-  const auto columns = static_cast<Eigen::Index>(varied.size()) + 1;
-  if (n <= columns) return result;
-  Eigen::MatrixXd design(n, columns);
-  design.col(0).setOnes();
-  for (Eigen::Index k = 1; k < columns; ++k) design.col(k) = all.col(varied[static_cast<std::size_t>(k - 1)]);
-  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(design);
-  if (solver.rank() < columns) return result;  // inputs that only ever move together
-  const Eigen::MatrixXd inverse = (design.transpose() * design).inverse();
-  for (std::size_t c = 0; c < kChannels; ++c) {
-    Eigen::VectorXd y(n);
-    for (Eigen::Index i = 0; i < n; ++i) y[i] = wrenches[static_cast<std::size_t>(i)][c];
-    const Eigen::VectorXd x = solver.solve(y);
-    const double variance = (y - design * x).squaredNorm() / static_cast<double>(n - columns);
-    for (Eigen::Index k = 1; k < columns; ++k)
-      result[static_cast<std::size_t>(varied[static_cast<std::size_t>(k - 1)])][c] = {
-          x[k], std::sqrt(variance * inverse(k, k))};
-  }
-  return result;
+std::array<double, 4> numbers_of(const sim::Input& input) {
+  return {input.amplitude_V, input.difference_V, input.bias_V, input.split_cycle};
 }
 
-void check_signs(const MeasuredMap& measured, const std::vector<Wrench>& simulated) {
-  constexpr double kSignificant = 4;
-  struct Answer {
-    std::size_t input, channel;
-    const char* what;
-  };
-  constexpr std::array<Answer, 4> kAnswers{{{0, 2, "thrust"}, {1, 3, "roll"}, {2, 4, "pitch"}, {3, 5, "yaw"}}};
-  const auto m = slopes(measured.inputs, measured.wrenches), s = slopes(measured.inputs, simulated);
-  const auto clear = [](const Slope& slope) { return std::abs(slope.value) > kSignificant * slope.sd; };
-  for (const Answer& a : kAnswers) {
-    const Slope &is = m[a.input][a.channel], &expected = s[a.input][a.channel];
-    if (!clear(expected)) continue;
-    // a torque that answers in another column's place, where the vehicle's does not answer at all
-    std::string elsewhere;
-    for (const Answer& b : kAnswers) {
-      const double ratio = m[a.input][b.channel].value / expected.value;
-      if (a.channel > 2 && b.channel > 2 && b.channel != a.channel && std::abs(ratio) > 0.5 && std::abs(ratio) < 2 &&
-          clear(m[a.input][b.channel]) && std::abs(s[a.input][b.channel].value) < 0.1 * std::abs(expected.value))
-        elsewhere = "columns " + channel_names()[a.channel] + " and " + channel_names()[b.channel] + " look swapped";
-    }
-    const bool opposite = clear(is) && is.value * expected.value < 0;
-    const bool missing = !elsewhere.empty() && std::abs(is.value) < 0.1 * std::abs(expected.value);
-    if (!opposite && !missing) continue;
-    throw io::InputError(measured.name + ":1: " + channel_names()[a.channel] + ": " + a.what + " against " +
-                         kInputNames[a.input] + " has slope " + in_short(is.value) + " +- " + in_short(is.sd) +
-                         ", the vehicle's is " + in_short(expected.value) + "; " +
-                         (elsewhere.empty() ? "likely a flipped axis" : elsewhere) +
-                         "; accepted: frame B, x forward, y left, z up");
+std::string text_of(const sim::Input& input) {
+  char text[96];
+  std::snprintf(text, sizeof text, "%g V, %g V, %g V, %g", input.amplitude_V, input.difference_V, input.bias_V,
+                input.split_cycle);
+  return text;
+}
+
+std::size_t distinct_inputs(const std::vector<sim::Input>& inputs) {
+  std::set<std::array<double, 4>> all;
+  for (const sim::Input& u : inputs) all.insert(numbers_of(u));
+  return all.size();
+}
+
+MeasuredMap selected(const MeasuredMap& map, const std::vector<std::size_t>& rows) {
+  MeasuredMap some{map.name, {}, {}};
+  for (const std::size_t i : rows) {
+    some.inputs.push_back(map.inputs[i]);
+    some.wrenches.push_back(map.wrenches[i]);
+    if (!map.sd.empty()) some.sd.push_back(map.sd[i]);
+    some.lines.push_back(map.line(i));
   }
+  return some;
 }
 
 MeasuredMap hold_out(MeasuredMap& map, std::size_t count) {
-  MeasuredMap kept{map.name, {}, {}, {}}, held = kept;
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    MeasuredMap& to = (i + 1) * count / map.size() > i * count / map.size() ? held : kept;
-    to.inputs.push_back(map.inputs[i]);
-    to.wrenches.push_back(map.wrenches[i]);
-    if (!map.sd.empty()) to.sd.push_back(map.sd[i]);
-  }
-  map = std::move(kept);
-  return held;
+  std::vector<std::size_t> kept, held;
+  for (std::size_t i = 0; i < map.size(); ++i)
+    ((i + 1) * count / map.size() > i * count / map.size() ? held : kept).push_back(i);
+  MeasuredMap out = selected(map, held);
+  map = selected(map, kept);
+  return out;
+}
+
+void check_held_out(const MeasuredMap& fitted, const MeasuredMap& held) {
+  for (std::size_t i = 0; i < held.size(); ++i)
+    for (std::size_t k = 0; k < fitted.size(); ++k)
+      if (numbers_of(held.inputs[i]) == numbers_of(fitted.inputs[k]) && held.wrenches[i] == fitted.wrenches[k])
+        throw io::InputError(held.name + ":" + std::to_string(held.line(i)) + ": is line " +
+                             std::to_string(fitted.line(k)) + " of " + fitted.name +
+                             "; accepted: measurements that are not fitted");
+}
+
+void check_scales(const MeasuredMap& map) {
+  for (const std::size_t group : {std::size_t{0}, std::size_t{3}})
+    if (std::ranges::all_of(map.wrenches,
+                            [&](const Wrench& w) { return w[group] == 0 && w[group + 1] == 0 && w[group + 2] == 0; }))
+      throw io::InputError(map.name + ": all " + (group == 0 ? "forces" : "torques") +
+                           " are zero; accepted: measured forces and torques");
+}
+
+std::string in_short(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
 }
 
 }  // namespace flappy::identify

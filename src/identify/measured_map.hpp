@@ -18,12 +18,17 @@ namespace flappy::identify {
 struct MeasuredMap {
   std::string name;  ///< the file, for messages
   std::vector<sim::Input> inputs;
-  std::vector<Wrench> wrenches;  ///< one for each input
-  std::vector<Wrench> sd;        ///< the same, or empty where none is declared
+  std::vector<Wrench> wrenches;      ///< one for each input
+  std::vector<Wrench> sd{};          ///< the same, or empty where none is declared
+  std::vector<std::size_t> lines{};  ///< of the file, one for each input; empty where all of them follow the header
 
   std::size_t size() const { return inputs.size(); }
+  std::size_t line(std::size_t row) const { return lines.empty() ? row + 2 : lines[row]; }
 };
 
+std::array<double, 4> numbers_of(const sim::Input& input);
+/// "10 V, 0 V, 0 V, 0.03"
+std::string text_of(const sim::Input& input);
 /// The columns of an input.
 inline const std::array<std::string, 4> kInputNames = {"amplitude_V", "difference_V", "bias_V", "split_cycle"};
 /// InputError "file:1: column: what is wrong; what is accepted" for a column that is missing, unknown or in another unit.
@@ -48,20 +53,22 @@ std::vector<sim::Input> read_inputs(const std::filesystem::path& path, const mod
 
 void write_measured_map(const std::filesystem::path& path, const MeasuredMap& map);
 
-/// Slope of a channel against an input, the other inputs held.
-struct Slope {
-  double value = 0, sd = 0;
-};
-/// Least squares of each channel on the four inputs and a constant: [input][channel]. Inputs that do not vary have slope
-/// 0, sd 0.
-std::array<std::array<Slope, kChannels>, 4> slopes(const std::vector<sim::Input>& inputs,
-                                                   const std::vector<Wrench>& wrenches);
+/// Inputs that differ from each other.
+std::size_t distinct_inputs(const std::vector<sim::Input>& inputs);
 
-/// InputError where thrust, roll, pitch or yaw answers its input with the sign opposite to the simulated map's, by more
-/// than 4 standard deviations on both sides, or where another torque answers in its place.
-void check_signs(const MeasuredMap& measured, const std::vector<Wrench>& simulated);
+/// Those rows alone.
+MeasuredMap selected(const MeasuredMap& map, const std::vector<std::size_t>& rows);
 
 /// `count` of the rows, evenly spread, leave `map` for the map returned.
 MeasuredMap hold_out(MeasuredMap& map, std::size_t count);
+
+/// InputError where a row of `held` is one of those `fitted`: it would judge nothing.
+void check_held_out(const MeasuredMap& fitted, const MeasuredMap& held);
+
+/// InputError where forces or torques are zero in every row.
+void check_scales(const MeasuredMap& map);
+
+/// Three significant digits, shorter where that says as much.
+std::string in_short(double value);
 
 }  // namespace flappy::identify

@@ -44,7 +44,13 @@ TEST(MeasuredMap, SaysWhatIsWrongAndWhere) {
   EXPECT_EQ(refused(replaced(kHeader, ",torque_z_Nm", "") + "\n10,1,-2,0.1,1,2,3,4,5\n").substr(0, 45),
             "m.csv:1: torque_z_Nm: column is missing; acce");
   EXPECT_EQ(refused(replaced(kHeader, "torque_x_Nm", "torque_x_mNm") + row),
-            "m.csv:1: torque_x_mNm: wrong unit; accepted: torque_x_Nm");
+            "m.csv:1: torque_x_mNm: wrong unit mNm, expected Nm; accepted: torque_x_Nm");
+  EXPECT_EQ(refused(replaced(kHeader, "torque_x_Nm", "torque_x_Nmm") + row),
+            "m.csv:1: torque_x_Nmm: wrong unit Nmm, expected Nm; accepted: torque_x_Nm");
+  EXPECT_EQ(refused(replaced(kHeader, "force_z_N", "force_z_gf") + row),
+            "m.csv:1: force_z_gf: wrong unit gf, expected N; accepted: force_z_N");
+  const std::string none = refused(kHeader + ",force_x_sd\n10,1,-2,0.1,1,2,3,4,5,6,7\n");
+  EXPECT_TRUE(none.starts_with("m.csv:1: force_x_sd: unknown column; accepted: ")) << none;
   const std::string unknown = refused(replaced(kHeader, "force_z_N", "force_zz_N") + row);
   EXPECT_TRUE(unknown.starts_with("m.csv:1: force_zz_N: unknown column; accepted: amplitude_V, ")) << unknown;
   EXPECT_TRUE(unknown.ends_with("; did you mean \"force_z_N\"?")) << unknown;
@@ -65,50 +71,6 @@ TEST(MeasuredMap, SaysWhatIsWrongAndWhere) {
             "m.csv:1: force_y_sd_N: column is missing; acc");
 }
 
-TEST(MeasuredMap, SlopesAreThoseOfAPlane) {
-  std::vector<sim::Input> inputs;
-  std::vector<Wrench> wrenches;
-  for (const auto& u : default_inputs()) {
-    inputs.push_back({u.amplitude_V, u.difference_V, 0, u.split_cycle});
-    wrenches.push_back({0, 0, 1 + 2 * u.amplitude_V, 3 * u.difference_V - 4 * u.split_cycle, 0, 0});
-  }
-  const auto s = slopes(inputs, wrenches);
-  EXPECT_NEAR(s[0][2].value, 2, 1e-12);
-  EXPECT_NEAR(s[1][3].value, 3, 1e-12);
-  EXPECT_NEAR(s[3][3].value, -4, 1e-10);
-  EXPECT_EQ(s[2][4].value, 0);  // the bias never moved
-  EXPECT_LT(s[1][3].sd, 1e-12);
-}
-
-TEST(MeasuredMap, OppositeSignsAreRefused) {
-  const model::Vehicle v = test::identified(), start = test::nominal();
-  const std::vector<sim::Input> inputs = default_inputs();
-  const MeasuredMap good = simulate_forces(v, inputs, {}, 3);
-  const auto simulated = force_map<double>(std::span(&start, 1), inputs);
-  const auto refused = [&](const std::function<void(Wrench&)>& change) {
-    MeasuredMap bad = good;
-    bad.name = "m.csv";
-    for (Wrench& w : bad.wrenches) change(w);
-    return test::refusal([&] { check_signs(bad, simulated); });
-  };
-  EXPECT_EQ(refused([](Wrench&) {}), "accepted");
-  const std::array<std::string, 4> starts = {"m.csv:1: force_z_N: thrust against amplitude_V has slope -0.01",
-                                             "m.csv:1: torque_x_Nm: roll against difference_V has slope -0.001",
-                                             "m.csv:1: torque_y_Nm: pitch against bias_V has slope -0.0004",
-                                             "m.csv:1: torque_z_Nm: yaw against split_cycle has slope -0.003"};
-  for (std::size_t k = 2; k < kChannels; ++k) {
-    const std::string line = refused([&](Wrench& w) { w[k] = -w[k]; });
-    EXPECT_TRUE(line.starts_with(starts[k - 2])) << line;
-    EXPECT_TRUE(line.ends_with("; likely a flipped axis; accepted: frame B, x forward, y left, z up")) << line;
-  }
-  // turned by a quarter about z, and two columns swapped
-  for (const double sign : {-1.0, 1.0}) {
-    const std::string line = refused([&](Wrench& w) { w = {w[1], sign * w[0], w[2], w[4], sign * w[3], w[5]}; });
-    EXPECT_TRUE(line.starts_with("m.csv:1: torque_x_Nm: roll against difference_V has slope ")) << line;
-    EXPECT_NE(line.find("; columns torque_x_Nm and torque_y_Nm look swapped; "), std::string::npos) << line;
-  }
-}
-
 TEST(MeasuredMap, HoldsOutEvenly) {
   MeasuredMap map{"m", {}, {}, {}};
   for (int i = 0; i < 10; ++i) map.inputs.push_back({static_cast<double>(i), 0, 0, 0}), map.wrenches.push_back({});
@@ -117,6 +79,20 @@ TEST(MeasuredMap, HoldsOutEvenly) {
   EXPECT_EQ(map.size(), 7u);
   EXPECT_EQ(held.inputs[0].amplitude_V, 3);
   EXPECT_EQ(held.inputs[2].amplitude_V, 9);
+  EXPECT_EQ(held.line(0), 5u);
+  EXPECT_EQ(map.line(6), 10u);
+}
+
+TEST(MeasuredMap, NoRowIsBothFittedAndHeldOut) {
+  const std::string rows = kHeader + "\n10,0,0,0,1,2,3,4,5,6\n11,0,0,0,1,2,3,4,5,6\n12,0,0,0,1,2,3,4,5,6\n";
+  const MeasuredMap fitted = parse(rows);
+  const auto refused_beside = [&](const std::string& text) {
+    return test::refusal(
+        [&] { check_held_out(fitted, parse_measured_map(kHeader + text, "h.csv", test::nominal().driver)); });
+  };
+  EXPECT_EQ(refused_beside("\n10,0,0,0,1,2,3,4,5,6.1\n9,0,0,0,1,2,3,4,5,6\n"), "accepted");
+  EXPECT_EQ(refused_beside("\n9,0,0,0,1,2,3,4,5,6\n12,0,0,0,1,2,3,4,5,6\n"),
+            "h.csv:3: is line 4 of m.csv; accepted: measurements that are not fitted");
 }
 
 }  // namespace

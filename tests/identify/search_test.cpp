@@ -41,8 +41,45 @@ TEST(LeastSquares, SlopesAreCentral) {
     return all;
   };
   const VectorXd p = VectorXd::Constant(1, 0.5);
-  EXPECT_NEAR(jacobian(cube, p)(0, 0), 0.75 + kDifference * kDifference, 1e-9);  // h^2 f''' / 6
-  EXPECT_NEAR(jacobian(cube, VectorXd::Ones(1))(0, 0), 3, 3.1 * kDifference);    // one-sided at a bound
+  const Eigen::MatrixXd steps = first_steps(1);
+  EXPECT_NEAR(jacobian(cube, p, steps)(0, 0), 0.75 + kDifference * kDifference, 1e-9);  // h^2 f''' / 6
+  EXPECT_NEAR(jacobian(cube, VectorXd::Ones(1), steps)(0, 0), 3, 3.1 * kDifference);    // one-sided at a bound
+}
+
+TEST(LeastSquares, KinksAreNoKnowledge) {
+  // a steep sum and a shallow difference, under ripples of 0.02 with slopes of up to 20
+  const Residuals rough = [](const std::vector<VectorXd>& points) {
+    std::vector<VectorXd> all;
+    for (const VectorXd& p : points) {
+      VectorXd r(40);
+      for (Eigen::Index i = 0; i < r.size(); ++i) {
+        const double phase = static_cast<double>(i);
+        r[i] = (i % 2 == 0 ? 1000 * (p[0] + p[1]) : 2 * (p[0] - p[1])) + 0.02 * std::sin(1e3 * p[0] + phase * phase);
+      }
+      all.push_back(r);
+    }
+    return all;
+  };
+  const VectorXd p = (VectorXd(2) << 0.5, 0.4).finished();
+  const auto least = [](const Eigen::MatrixXd& j) { return Eigen::JacobiSVD<Eigen::MatrixXd>(j).singularValues()[1]; };
+  const double exact = 2 * std::sqrt(2 * 20);
+  Eigen::MatrixXd j = jacobian(rough, p, first_steps(2));
+  EXPECT_GT(least(j), 3 * exact);
+  for (int i = 0; i < 2; ++i) j = jacobian(rough, p, steps_along(j, p, 1));
+  EXPECT_NEAR(least(j), exact,
+              0.05 * exact);  // 40 ripples of 0.02 over two steps of 0.05 leave 1.3 at most, about square
+}
+
+TEST(LeastSquares, StepsStayInside) {
+  const Eigen::MatrixXd slopes = (Eigen::MatrixXd(3, 3) << 1, 1, 0, 1, 1.1, 0, 0, 0, 1e3).finished();
+  const VectorXd p = (VectorXd(3) << 0.02, 1, 0.5).finished();
+  const Eigen::MatrixXd steps = steps_along(slopes, p, 10);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    EXPECT_EQ(steps(1, i), i == 1 ? kDifference : 0) << "at a bound: a step of its own";
+    EXPECT_LE(std::abs(steps(0, i)), 0.02 + 1e-12);
+  }
+  EXPECT_NEAR(steps.col(2).norm(), 0.02, 1e-12);  // as far as there is room
+  EXPECT_NEAR(steps.col(0).norm(), 0.01, 1e-12);  // as far as the noise: 10 of 1e3
 }
 
 TEST(LeastSquares, AvoidsWhatCannotBeEvaluated) {

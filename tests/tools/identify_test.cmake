@@ -31,9 +31,13 @@ if(lines GREATER 40)
 endif()
 file(SHA256 ${WORK}/map.csv sha256)
 expect_match("the fitted vehicle" "${fitted1}" "^# Fitted to a measured force map by flappy-identify, commit [0-9a-z-]+, method gn\n# from vehicle hummingbird_nominal\n# measured file's sha256 ${sha256}\n# total error 33")
+file(SHA256 ${SOURCE}/configs/identify/forces.toml sha256)
+expect_match("the fitted vehicle" "${fitted1}" "\n# torques about 0,0,0, 0 rows held out, 0 left out for jumps\n# configuration's sha256 ${sha256}\n# seed 1, 1 of 1 starts agree\n# parameters fitted:\n#   left.motor.resistance_ohm\n")
+expect_match("one start alone" "${out}" "95 % interval, of one optimum: no second start found it\n")
 expect_keys(${WORK}/fit1.json total_error_before=NUMBER total_error_after=NUMBER heldout_error=NUMBER parameters=ARRAY
   parameters.0.name=STRING parameters.0.value=NUMBER parameters.0.low=NUMBER parameters.0.high=NUMBER
-  parameters.0.seen=BOOLEAN parameters.11.name=STRING wall_s=NUMBER)
+  parameters.0.seen=BOOLEAN parameters.11.name=STRING wall_s=NUMBER
+  left_out=ARRAY jumping_kept=ARRAY signs_unchecked=ARRAY intervals_confirmed=BOOLEAN ends.0.cost=NUMBER)
 run(simulate-forces --vehicle ${WORK}/fitted1.toml --out ${WORK}/again.csv --noise none)
 expect_equal("measuring the fitted vehicle" "${code}" 0)
 
@@ -53,7 +57,7 @@ expect_equal("exit code" "${code}" 0)
 expect_match("stdout" "${out}" "CMA-ES +32 maps.*\n32 inputs, total error 0\\.[0-9]+ % before, 0\\.[0-9]+ % after, 0\\.[0-9]+ % on 5 held-out inputs\nmisfit [0-9.]+ of the estimated noise\n")
 
 run(calibrate --vehicle ${nominal} --truth ${identified} --seeds 1 --json ${WORK}/calibration.json)
-expect_match("calibration" "${out}" "\n1 noise seeds: [0-9]+ of 12 inside their 95 % intervals, ")
+expect_match("calibration" "${out}" "\n1 noise seeds: 11 of 12 inside their 95 % intervals, ")
 expect_keys(${WORK}/calibration.json coverage_percent=NUMBER parameters=ARRAY)
 
 # ---- compare-map
@@ -80,12 +84,17 @@ expect_equal("points of the beat" "${count}" 201)
 
 # ---- refusals
 
+expect_refused("${WORK}/map.csv:2: is line 2 of ${WORK}/map.csv; accepted: measurements that are not fitted"
+  forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/out.toml --held-out ${WORK}/map.csv)
+expect_refused("flappy-identify: --seed: Value -1 not in range 0 to 9223372036854775807; see flappy-identify --help"
+  simulate-forces --vehicle ${identified} --out ${WORK}/out.csv --seed -1)
+
 expect_refused("${WORK}/gone.csv: cannot be read: No such file or directory"
   forces ${WORK}/gone.csv --vehicle ${nominal} --out ${WORK}/out.toml)
 file(READ ${WORK}/map.csv map)
 string(REPLACE "torque_y_Nm" "torque_y_mNm" wrong "${map}")
 file(WRITE ${WORK}/wrong.csv "${wrong}")
-expect_refused("${WORK}/wrong.csv:1: torque_y_mNm: wrong unit; accepted: torque_y_Nm"
+expect_refused("${WORK}/wrong.csv:1: torque_y_mNm: wrong unit mNm, expected Nm; accepted: torque_y_Nm"
   forces ${WORK}/wrong.csv --vehicle ${nominal} --out ${WORK}/out.toml)
 file(STRINGS ${WORK}/plain.csv rows LIMIT_COUNT 11)
 string(REPLACE ";" "\n" few "${rows}")

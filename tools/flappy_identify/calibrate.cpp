@@ -51,7 +51,7 @@ Json run(const Settings& s) {
                    map_error(other.wrenches, force_map<double>(std::span(&fit.vehicle, 1), held, options.map)).total);
     }
     for (std::size_t i = 0; i < counts.size(); ++i) {
-      const FittedParameter& p = fit.parameters[i];
+      const FittedParameter& p = fit.known.parameters[i];
       if (!p.seen) continue;
       ++counts[i].seen;
       if (p.low <= *true_values[i] && *true_values[i] <= p.high) ++counts[i].inside;

@@ -1,5 +1,7 @@
 #include "fit_options.hpp"
 
+#include "shared_options.hpp"
+
 namespace flappy::identify {
 
 void FitSettings::add(CLI::App& app) {
@@ -12,7 +14,7 @@ void FitSettings::add(CLI::App& app) {
   app.add_option("--starts", starts, "of gn: the vehicle as it is, then random ones")->check(CLI::Range(1, 1000));
   app.add_option("--population", population, "of ga and cmaes")->check(CLI::Range(8, 100000))->capture_default_str();
   app.add_option("--generations", generations, "of ga and cmaes")->check(CLI::Range(1, 100000))->capture_default_str();
-  app.add_option("--fit-seed", seed, "of random starts and populations")->capture_default_str();
+  app.add_option("--fit-seed", seed, "of random starts and populations")->check(seeds())->capture_default_str();
 }
 
 FitConfig FitSettings::read_config(const model::Vehicle& vehicle) const {

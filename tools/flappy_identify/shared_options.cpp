@@ -1,6 +1,7 @@
 #include "shared_options.hpp"
 
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 
 #include "flappy/vehicle_file.hpp"
@@ -36,10 +37,6 @@ MapOptions MapSource::options(const model::Vehicle& v) const {
   return o;
 }
 
-std::string in_short(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+CLI::Range seeds() { return {std::uint64_t{0}, std::uint64_t{INT64_MAX}}; }
 
 }  // namespace flappy::identify

@@ -19,7 +19,7 @@ struct MapSource {
   MapOptions options(const model::Vehicle& vehicle) const;
 };
 
-/// Three significant digits, shorter where that says as much.
-std::string in_short(double value);
+/// What any seed is checked by: no negative number, which would wrap.
+CLI::Range seeds();
 
 }  // namespace flappy::identify

@@ -20,7 +20,7 @@ Command add_simulate_forces(CLI::App& program) {
   s->source.add(*app, "vehicle to measure");
   app->add_option("--out", s->out, "table to write")->required();
   app->add_option("--inputs", s->inputs, "table of inputs; without it, 37 about hover");
-  app->add_option("--seed", s->seed, "of the noise")->capture_default_str();
+  app->add_option("--seed", s->seed, "of the noise")->check(seeds())->capture_default_str();
   app->add_option("--noise", s->noise, "sensor: nano17 or none")->check(CLI::IsMember({"nano17", "none"}));
   return {app, [s] {
             const model::Vehicle vehicle = s->source.read_vehicle();
