@@ -18,7 +18,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// What every model gets wrong, as a share of the signal.
-constexpr double kFloor = 0.01;
+constexpr Discrepancy kFloor{0.015, 0.003, 0.001};
 /// Reach of the first difference along a size or a shape.
 constexpr double kEffectReach = 0.4;
 /// What no entry explains may be as large as these shares of the signal.
@@ -33,7 +33,7 @@ class Diagnoser {
         options_(options),
         threads_(options.threads > 0 ? options.threads : omp_get_num_procs()),
         evidence_(flights),
-        fitter_(flights, evidence_, {kFloor, 0}, threads_) {}
+        fitter_(flights, evidence_, kFloor, threads_) {}
 
   Diagnosis run() {
     Diagnosis d;
@@ -116,10 +116,10 @@ class Diagnoser {
     };
     const Linearised nominal =
         fitter_.linearise(plain, plain.start(), Directions{MatrixXd(plain.size(), 0), VectorXd(0)});
-    add(Answer::Kind::none, nominal, false, {kFloor, 0}, 0);
-    add(Answer::Kind::parameters, d.parameters.point, true, {kFloor, 0}, 0);
+    add(Answer::Kind::none, nominal, false, kFloor, 0);
+    add(Answer::Kind::parameters, d.parameters.point, true, kFloor, 0);
     for (const double size : kUnknownSizes)
-      add(Answer::Kind::unknown, d.parameters.point, true, {std::max(kFloor, size), size}, 0);
+      add(Answer::Kind::unknown, d.parameters.point, true, {std::max(kFloor.constant, size), size, size}, 0);
   }
 
   /// What every effect would gain beside a fit, as far as a linear model sees: sizes step from 0, shapes stay where they are.
@@ -169,7 +169,7 @@ class Diagnoser {
       column_of[c] = static_cast<int>(used.size());
       used.push_back(&rows[c]);
     }
-    const Reduced reduced = evidence_.reduce(evidence_.grams(l.residual, used), all_flights(), {kFloor, 0});
+    const Reduced reduced = evidence_.reduce(evidence_.grams(l.residual, used), all_flights(), kFloor);
     const auto solve = [&](const std::vector<int>& more) {
       std::vector<int> chosen = shared;
       std::vector<double> mean = shared_mean;
@@ -247,7 +247,7 @@ class Diagnoser {
     }
     const Grams grams = evidence_.grams(l.residual, columns);
     std::tie(a.log_evidence, a.log_held_out) = weigh_point(
-        l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), {kFloor, 0});
+        l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), kFloor);
     return a;
   }
 

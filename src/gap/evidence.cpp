@@ -207,7 +207,8 @@ Reduced Evidence::reduce(const Grams& grams, const std::vector<char>& use, Discr
     // precision of eta given the rest, in units of its prior's sd
     const double signal = groups_[static_cast<std::size_t>(g)].signal;
     VectorXd sd(kept);
-    for (Index i = 0; i < kept; ++i) sd[i] = signal * (i < plain ? discrepancy.plain : discrepancy.other);
+    for (Index i = 0; i < kept; ++i)
+      sd[i] = signal * (i == 0 ? discrepancy.constant : i < plain ? discrepancy.plain : discrepancy.other);
     MatrixXd precision = sd.asDiagonal() * sum.topLeftCorner(kept, kept) * sd.asDiagonal();
     precision.diagonal().array() += 1;
     const Eigen::LLT<MatrixXd> llt(precision);

@@ -52,7 +52,7 @@ struct Grams {
 
 /// What eta may be: sd of each of the basis' coefficients, as a share of the signal's size.
 struct Discrepancy {
-  double plain = 0, other = 0;
+  double constant = 0, plain = 0, other = 0;
 };
 
 /// Grams with eta integrated out.

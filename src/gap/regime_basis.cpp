@@ -7,6 +7,8 @@ namespace {
 
 /// How far what is near a surface reaches: a wing's length.
 constexpr double kReach_m = 0.07;
+/// Where some of the plain functions stand, when a set of flights has them all.
+constexpr int kAmplitude = 1, kDifference = 2, kBias = 3, kSplitCycle = 4, kVelocityX = 5, kVelocityZ = 7, kPlain = 11;
 
 }  // namespace
 
@@ -49,12 +51,23 @@ RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
   add("rate_y", [](R, S s) { return s.rate_rad_s.y(); });
   add("rate_z", [](R, S s) { return s.rate_rad_s.z(); });
   plain_ = size();
-  add("amplitude^2", [](R, S s) { return s.amplitude_V * s.amplitude_V; });
-  add("amplitude difference", [](R, S s) { return s.amplitude_V * s.difference_V; });
-  add("amplitude bias", [](R, S s) { return s.amplitude_V * s.bias_V; });
-  add("amplitude split_cycle", [](R, S s) { return s.amplitude_V * s.split_cycle; });
-  add("amplitude velocity_x", [](R, S s) { return s.amplitude_V * s.velocity_B_m_s.x(); });
-  add("amplitude velocity_z", [](R, S s) { return s.amplitude_V * s.velocity_B_m_s.z(); });
+  // of what is already centred, so that a product says what its factors do not
+  const auto multiply = [&](int a, int b) {
+    double sum = 0, squares = 0, n = 0;
+    std::vector<Eigen::VectorXd> column;
+    for (const Eigen::MatrixXd& v : values_) {
+      column.push_back(v.col(a).cwiseProduct(v.col(b)));
+      sum += column.back().sum(), squares += column.back().squaredNorm(), n += static_cast<double>(v.rows());
+    }
+    const double mean = sum / n, sd = std::sqrt(std::max(1e-12, squares / n - mean * mean));
+    for (std::size_t f = 0; f < values_.size(); ++f) {
+      values_[f].conservativeResize(Eigen::NoChange, values_[f].cols() + 1);
+      values_[f].rightCols(1) = (column[f].array() - mean) / sd;
+    }
+    names_.push_back(names_[static_cast<std::size_t>(a)] + " " + names_[static_cast<std::size_t>(b)]);
+  };
+  if (plain_ == kPlain)
+    for (const int b : {kAmplitude, kDifference, kBias, kSplitCycle, kVelocityX, kVelocityZ}) multiply(kAmplitude, b);
   add("|velocity| velocity_x", [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.x(); });
   add("|velocity| velocity_y", [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.y(); });
   add("|velocity| velocity_z", [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.z(); });
