@@ -21,6 +21,8 @@ using Eigen::VectorXd;
 constexpr Discrepancy kFloor{0.015, 0.003, 0.001};
 /// Reach of the first difference along a size or a shape.
 constexpr double kEffectReach = 0.4;
+/// An effect that gains less in the linear screening is not fitted.
+constexpr double kLeastGain = 0;
 /// What no entry explains may be as large as these shares of the signal.
 constexpr double kUnknownSizes[] = {0.02, 0.05, 0.15};
 
@@ -45,7 +47,7 @@ class Diagnoser {
     const std::vector<Screened> ranking = screen(plain, d.parameters, {});
     std::vector<std::vector<std::string>> finalists;
     for (const Screened& s : ranking)
-      if (static_cast<int>(finalists.size()) < options_.finalists) finalists.push_back({s.effect});
+      if (static_cast<int>(finalists.size()) < options_.finalists && s.gain > kLeastGain) finalists.push_back({s.effect});
     double done = 0;
     for (const auto& effects : finalists) {
       progress(0.4 + 0.4 * done++ / static_cast<double>(finalists.size()), "fitting " + effects.front());
@@ -101,9 +103,9 @@ class Diagnoser {
       std::vector<int> chosen;
       std::vector<double> mean;
       for (std::size_t k = 0; free && k < l.columns.size(); ++k) {
-        if (l.columns[k].empty()) continue;
+        if (l.columns[k] == nullptr) continue;
         chosen.push_back(static_cast<int>(columns.size()));
-        columns.push_back(&l.columns[k]);
+        columns.push_back(l.columns[k].get());
         mean.push_back(-l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
       }
       const Grams grams = evidence_.grams(l.residual, columns);
@@ -154,9 +156,9 @@ class Diagnoser {
     std::vector<double> shared_mean;
     const Linearised& l = fit.point;
     for (std::size_t k = 0; k < l.columns.size(); ++k) {
-      if (l.columns[k].empty()) continue;
+      if (l.columns[k] == nullptr) continue;
       shared.push_back(static_cast<int>(used.size()));
-      used.push_back(&l.columns[k]);
+      used.push_back(l.columns[k].get());
       shared_mean.push_back(-l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
     }
     std::vector<int> column_of(columns.size(), -1);
@@ -240,9 +242,9 @@ class Diagnoser {
     std::vector<int> chosen;
     std::vector<double> mean;
     for (std::size_t k = 0; k < l.columns.size(); ++k) {
-      if (l.columns[k].empty()) continue;
+      if (l.columns[k] == nullptr) continue;
       chosen.push_back(static_cast<int>(columns.size()));
-      columns.push_back(&l.columns[k]);
+      columns.push_back(l.columns[k].get());
       mean.push_back(-l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
     }
     const Grams grams = evidence_.grams(l.residual, columns);

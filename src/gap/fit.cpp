@@ -17,6 +17,9 @@ using Eigen::VectorXd;
 /// Reach of the first differences, and bounds of the later ones: so many standard deviations of what is known then, for a
 /// step has to be long where little is known and short where much is.
 constexpr double kFirstReach = 0.3, kLeastReach = 0.1, kMostReach = 1, kReachSd = 3;
+/// Points around another, and their share of the reach of its differences.
+constexpr int kAround = 8;
+constexpr double kAroundReach = 0.2;
 constexpr double kConverged = 0.02;
 /// Nats that another linearisation has to bring.
 constexpr double kWorthwhile = 0.05;
@@ -70,10 +73,12 @@ Directions Fitter::axes(const Hypothesis& hypothesis) {
   return {MatrixXd::Identity(hypothesis.size(), hypothesis.size()), VectorXd::Constant(hypothesis.size(), kFirstReach)};
 }
 
-Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions) const {
+Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions,
+                             const std::vector<std::shared_ptr<const Signature>>& known) const {
   std::vector<Candidate> candidates = {hypothesis.candidate(at)};
   std::vector<double> spans;
-  for (Index d = 0; d < directions.reach.size(); ++d) {
+  const auto first = static_cast<Index>(known.size());
+  for (Index d = first; d < directions.reach.size(); ++d) {
     const VectorXd axis = directions.axes.col(d);
     const VectorXd up = hypothesis.bounded(at + directions.reach[d] * axis);
     const VectorXd down = hypothesis.bounded(at - directions.reach[d] * axis);
@@ -82,7 +87,7 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
     candidates.push_back(hypothesis.candidate(down));
   }
   std::vector<Signature> rows = residuals(candidates);
-  Linearised l{at, std::move(directions), std::move(rows[0]), {}};
+  Linearised l{at, std::move(directions), std::move(rows[0]), known};
   for (std::size_t d = 0; d < spans.size(); ++d) {
     Signature &up = rows[1 + 2 * d], &down = rows[2 + 2 * d];
     l.columns.emplace_back();
@@ -90,9 +95,49 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
     for (std::size_t f = 0; f < up.size(); ++f)
       for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / spans[d];
     evidence_.smooth(up);
-    l.columns.back() = std::move(up);
+    l.columns.back() = std::make_shared<Signature>(std::move(up));
   }
+  if (!l.residual.empty()) average(hypothesis, l);
   return l;
+}
+
+/// The residual at a point is as rough as the columns were: its mean over points around, each brought back by the columns,
+/// is less so.
+void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
+  const Index k = l.directions.reach.size();
+  if (k == 0) return;
+  std::vector<VectorXd> shifts;
+  std::vector<Candidate> candidates;
+  for (int i = 0; i < kAround; ++i) {
+    VectorXd shift = VectorXd::Zero(k);
+    for (Index d = 0; d < k; ++d) {
+      if (l.columns[static_cast<std::size_t>(d)] == nullptr) continue;
+      // rows of a Hadamard matrix: every direction goes as often up as down, and no two together
+      const int sign = __builtin_popcount(static_cast<unsigned>((d + 1) & i)) % 2 ? -1 : 1;
+      shift[d] = kAroundReach * sign * l.directions.reach[d];
+    }
+    const VectorXd there = hypothesis.bounded(l.at + l.directions.axes * shift);
+    shifts.push_back(l.directions.axes.transpose() * (there - l.at));
+    candidates.push_back(hypothesis.candidate(there));
+  }
+  const std::vector<Signature> rows = residuals(candidates);
+  double n = 1;
+  for (int i = 0; i < kAround; ++i) {
+    const Signature& r = rows[static_cast<std::size_t>(i)];
+    if (r.empty()) continue;
+    n += 1;
+    for (std::size_t f = 0; f < r.size(); ++f) {
+      for (std::size_t j = 0; j < r[f].size(); ++j) l.residual[f][j] += r[f][j];
+      for (Index d = 0; d < k; ++d) {
+        const double shift = shifts[static_cast<std::size_t>(i)][d];
+        if (shift == 0 || l.columns[static_cast<std::size_t>(d)] == nullptr) continue;
+        const Rows& column = (*l.columns[static_cast<std::size_t>(d)])[f];
+        for (std::size_t j = 0; j < column.size(); ++j) l.residual[f][j] += shift * column[j];
+      }
+    }
+  }
+  for (Rows& rows_of_flight : l.residual)
+    for (double& x : rows_of_flight) x /= n;
 }
 
 Posterior Fitter::solve(const Linearised& point) const {
@@ -101,9 +146,9 @@ Posterior Fitter::solve(const Linearised& point) const {
   std::vector<int> chosen;
   std::vector<Index> seen;
   for (Index d = 0; d < k; ++d) {
-    if (point.columns[static_cast<std::size_t>(d)].empty()) continue;
+    if (point.columns[static_cast<std::size_t>(d)] == nullptr) continue;
     chosen.push_back(static_cast<int>(columns.size()));
-    columns.push_back(&point.columns[static_cast<std::size_t>(d)]);
+    columns.push_back(point.columns[static_cast<std::size_t>(d)].get());
     seen.push_back(d);
   }
   const Reduced reduced =
@@ -127,6 +172,20 @@ double Fitter::cost(const Signature& residual, const VectorXd& at) const {
   return 0.5 * (reduced.sums(0, 0) + at.squaredNorm());
 }
 
+/// Those of the parameters' fit, and the effects' own.
+Directions Fitter::beside(const Hypothesis& hypothesis, const Fit& parameters) {
+  Directions d = axes(hypothesis);
+  const Index shared = hypothesis.shared();
+  d.axes.topLeftCorner(shared, shared) = parameters.point.directions.axes.topLeftCorner(shared, shared);
+  d.reach.head(shared) = parameters.point.directions.reach.head(shared);
+  return d;
+}
+
+std::vector<std::shared_ptr<const Signature>> Fitter::known(const Hypothesis& hypothesis, const Fit& parameters) {
+  const auto& columns = parameters.point.columns;
+  return {columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(hypothesis.shared())};
+}
+
 /// The axes of what is known: parameters turned among themselves, effects as they are.
 Directions Fitter::principal(const Hypothesis& hypothesis, const Fit& fit) {
   const Index shared = hypothesis.shared(), size = hypothesis.size();
@@ -144,26 +203,22 @@ Directions Fitter::principal(const Hypothesis& hypothesis, const Fit& fit) {
 Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int iterations) const {
   Fit result;
   result.point = linearise(hypothesis, hypothesis.bounded(std::move(start)), axes(hypothesis));
-  return improve(hypothesis, std::move(result), iterations);
+  return improve(hypothesis, std::move(result), iterations, nullptr);
 }
 
 Fit Fitter::fit(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters, int iterations) const {
-  Directions d = axes(hypothesis);
-  const Index shared = hypothesis.shared();
-  d.axes.topLeftCorner(shared, shared) = parameters.point.directions.axes.topLeftCorner(shared, shared);
-  d.reach.head(shared) = parameters.point.directions.reach.head(shared);
   Fit result;
-  result.point = linearise(hypothesis, hypothesis.bounded(start), std::move(d));
-  return improve(hypothesis, std::move(result), iterations);
+  result.point = linearise(hypothesis, hypothesis.bounded(start), beside(hypothesis, parameters), known(hypothesis, parameters));
+  return improve(hypothesis, std::move(result), iterations, &parameters);
 }
 
 Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const {
   Fit result;
   result.point = linearise(hypothesis, before.point.at, principal(hypothesis, before));
-  return improve(hypothesis, std::move(result), iterations);
+  return improve(hypothesis, std::move(result), iterations, nullptr);
 }
 
-Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations) const {
+Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const {
   if (fit.point.residual.empty()) return fit;  // comes apart
   for (fit.iterations = 1;; ++fit.iterations) {
     const Linearised& l = fit.point;
@@ -189,7 +244,8 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations) const
       if (c < best_cost) best = i, best_cost = c;
     }
     if (best == tries.size() || before - best_cost < kWorthwhile) return fit;
-    Linearised next = linearise(hypothesis, tries[best], principal(hypothesis, fit));
+    Linearised next = parameters == nullptr ? linearise(hypothesis, tries[best], principal(hypothesis, fit))
+                                            : linearise(hypothesis, tries[best], l.directions, known(hypothesis, *parameters));
     if (next.residual.empty()) return fit;
     fit.point = std::move(next);
   }

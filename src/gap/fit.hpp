@@ -2,6 +2,8 @@
 // differences between vehicles that fly side by side as lanes.
 #pragma once
 
+#include <memory>
+
 #include "gap/evidence.hpp"
 #include "gap/hypothesis.hpp"
 
@@ -38,19 +40,24 @@ class Fitter {
 
   /// Residuals under many candidates; empty signatures for vehicles that come apart.
   std::vector<Signature> residuals(const std::vector<Candidate>& candidates) const;
-  Linearised linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions) const;
+  /// `known`: columns of the first directions, which need not be found again.
+  Linearised linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
+                       const std::vector<std::shared_ptr<const Signature>>& known = {}) const;
   /// Every coordinate.
   static Directions axes(const Hypothesis& hypothesis);
   /// From `start` on, at most `iterations` linearisations; empty residual where the vehicle comes apart at once.
   Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int iterations) const;
-  /// From `start` on, where another fit's parameters are already at home: along their directions.
+  /// From `start` on, beside another fit: its parameters keep their directions and derivatives.
   Fit fit(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters, int iterations) const;
   /// The same, from where another fit ended, along its directions.
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const;
 
  private:
+  static Directions beside(const Hypothesis& hypothesis, const Fit& parameters);
+  static std::vector<std::shared_ptr<const Signature>> known(const Hypothesis& hypothesis, const Fit& parameters);
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
-  Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations) const;
+  Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* beside) const;
+  void average(const Hypothesis& hypothesis, Linearised& point) const;
   Posterior solve(const Linearised& point) const;
   double cost(const Signature& residual, const Eigen::VectorXd& at) const;
 
