@@ -20,8 +20,8 @@ struct Linearised {
   Eigen::VectorXd at;
   Directions directions;
   Signature residual;
-  std::vector<Signature>
-      columns;  ///< change of the prediction for a unit along each direction; empty: it comes apart there
+  /// Change of the prediction for a unit along each direction; null where it comes apart.
+  std::vector<std::shared_ptr<const Signature>> columns;
 };
 
 struct Fit {
