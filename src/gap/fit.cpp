@@ -104,7 +104,7 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
 /// The residual at a point is as rough as the columns were: its mean over points around, each brought back by the columns,
 /// is less so.
 void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
-  const Index k = l.directions.reach.size();
+  const Index k = std::min(l.directions.reach.size(), hypothesis.shared());
   if (k == 0) return;
   std::vector<VectorXd> shifts;
   std::vector<Candidate> candidates;
@@ -116,8 +116,8 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
       const int sign = __builtin_popcount(static_cast<unsigned>((d + 1) & i)) % 2 ? -1 : 1;
       shift[d] = kAroundReach * sign * l.directions.reach[d];
     }
-    const VectorXd there = hypothesis.bounded(l.at + l.directions.axes * shift);
-    shifts.push_back(l.directions.axes.transpose() * (there - l.at));
+    const VectorXd there = hypothesis.bounded(l.at + l.directions.axes.leftCols(k) * shift);
+    shifts.push_back(l.directions.axes.leftCols(k).transpose() * (there - l.at));
     candidates.push_back(hypothesis.candidate(there));
   }
   const std::vector<Signature> rows = residuals(candidates);
