@@ -17,8 +17,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What every model gets wrong, as a share of the signal.
-constexpr Discrepancy kFloor{0.015, 0.003, 0.001};
 /// Reach of the first difference along a size or a shape.
 constexpr double kEffectReach = 0.4;
 /// An effect that gains less in the linear screening is not fitted.
@@ -35,7 +33,7 @@ class Diagnoser {
         options_(options),
         threads_(options.threads > 0 ? options.threads : omp_get_num_procs()),
         evidence_(flights),
-        fitter_(flights, evidence_, kFloor, threads_) {}
+        fitter_(flights, evidence_, threads_) {}
 
   Diagnosis run() {
     Diagnosis d;
@@ -47,7 +45,8 @@ class Diagnoser {
     const std::vector<Screened> ranking = screen(plain, d.parameters, {});
     std::vector<std::vector<std::string>> finalists;
     for (const Screened& s : ranking)
-      if (static_cast<int>(finalists.size()) < options_.finalists && s.gain > kLeastGain) finalists.push_back({s.effect});
+      if (static_cast<int>(finalists.size()) < options_.finalists && s.gain > kLeastGain)
+        finalists.push_back({s.effect});
     double done = 0;
     for (const auto& effects : finalists) {
       progress(0.4 + 0.4 * done++ / static_cast<double>(finalists.size()), "fitting " + effects.front());
@@ -81,11 +80,11 @@ class Diagnoser {
 
   /// Log probability of all flights, and of every flight given the others.
   std::pair<double, double> weigh_point(const Linearised& l, const Grams& grams, const std::vector<int>& columns,
-                                        const VectorXd& prior_mean, Discrepancy discrepancy) const {
+                                        const VectorXd& prior_mean, double unexplained) const {
     const VectorXd sd = VectorXd::Ones(prior_mean.size());
     (void)l;
     const auto of = [&](const std::vector<char>& use) {
-      return Evidence::posterior(evidence_.reduce(grams, use, discrepancy), columns, prior_mean, sd).log_evidence;
+      return Evidence::posterior(evidence_.reduce(grams, use, unexplained), columns, prior_mean, sd).log_evidence;
     };
     const double all = of(all_flights());
     double held_out = 0;
@@ -98,7 +97,7 @@ class Diagnoser {
   }
 
   void add_plain_answers(const Hypothesis& plain, Diagnosis& d) const {
-    const auto add = [&](Answer::Kind kind, const Linearised& l, bool free, Discrepancy discrepancy, double log_prior) {
+    const auto add = [&](Answer::Kind kind, const Linearised& l, bool free, double unexplained, double log_prior) {
       std::vector<const Signature*> columns;
       std::vector<int> chosen;
       std::vector<double> mean;
@@ -112,16 +111,15 @@ class Diagnoser {
       Answer a;
       a.kind = kind;
       std::tie(a.log_evidence, a.log_held_out) = weigh_point(
-          l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), discrepancy);
+          l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), unexplained);
       a.log_evidence += log_prior;
       d.answers.push_back(std::move(a));
     };
     const Linearised nominal =
         fitter_.linearise(plain, plain.start(), Directions{MatrixXd(plain.size(), 0), VectorXd(0)});
-    add(Answer::Kind::none, nominal, false, kFloor, 0);
-    add(Answer::Kind::parameters, d.parameters.point, true, kFloor, 0);
-    for (const double size : kUnknownSizes)
-      add(Answer::Kind::unknown, d.parameters.point, true, {std::max(kFloor.constant, size), size, size}, 0);
+    add(Answer::Kind::none, nominal, false, 0, 0);
+    add(Answer::Kind::parameters, d.parameters.point, true, 0, 0);
+    for (const double size : kUnknownSizes) add(Answer::Kind::unknown, d.parameters.point, true, size, 0);
   }
 
   /// What every effect would gain beside a fit, as far as a linear model sees: sizes step from 0, shapes stay where they are.
@@ -171,7 +169,7 @@ class Diagnoser {
       column_of[c] = static_cast<int>(used.size());
       used.push_back(&rows[c]);
     }
-    const Reduced reduced = evidence_.reduce(evidence_.grams(l.residual, used), all_flights(), kFloor);
+    const Reduced reduced = evidence_.reduce(evidence_.grams(l.residual, used), all_flights(), 0);
     const auto solve = [&](const std::vector<int>& more) {
       std::vector<int> chosen = shared;
       std::vector<double> mean = shared_mean;
@@ -248,8 +246,8 @@ class Diagnoser {
       mean.push_back(-l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
     }
     const Grams grams = evidence_.grams(l.residual, columns);
-    std::tie(a.log_evidence, a.log_held_out) = weigh_point(
-        l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), kFloor);
+    std::tie(a.log_evidence, a.log_held_out) =
+        weigh_point(l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), 0);
     return a;
   }
 

@@ -193,9 +193,8 @@ Grams Evidence::grams(const Signature& residual, const std::vector<const Signatu
   return result;
 }
 
-Reduced Evidence::reduce(const Grams& grams, const std::vector<char>& use, Discrepancy discrepancy) const {
-  const Index q = grams.basis, k = grams.columns + 1, plain = basis_.plain();
-  const Index kept = discrepancy.other > 0 ? q : plain;
+Reduced Evidence::reduce(const Grams& grams, const std::vector<char>& use, double unexplained) const {
+  const Index q = grams.basis, k = grams.columns + 1;
   Reduced result{MatrixXd::Zero(k, k), 0};
   for (std::size_t f = 0; f < use.size(); ++f)
     if (use[f]) result.log_scale += grams.constant[f];
@@ -206,13 +205,12 @@ Reduced Evidence::reduce(const Grams& grams, const std::vector<char>& use, Discr
     if (sum(0, 0) == 0) continue;  // nothing was seen
     // precision of eta given the rest, in units of its prior's sd
     const double signal = groups_[static_cast<std::size_t>(g)].signal;
-    VectorXd sd(kept);
-    for (Index i = 0; i < kept; ++i)
-      sd[i] = signal * (i == 0 ? discrepancy.constant : i < plain ? discrepancy.plain : discrepancy.other);
-    MatrixXd precision = sd.asDiagonal() * sum.topLeftCorner(kept, kept) * sd.asDiagonal();
+    VectorXd sd(q);
+    for (Index i = 0; i < q; ++i) sd[i] = signal * std::hypot(basis_.floor(static_cast<int>(i)), unexplained);
+    MatrixXd precision = sd.asDiagonal() * sum.topLeftCorner(q, q) * sd.asDiagonal();
     precision.diagonal().array() += 1;
     const Eigen::LLT<MatrixXd> llt(precision);
-    const MatrixXd cross = llt.matrixL().solve(sd.asDiagonal() * sum.block(0, q, kept, k));
+    const MatrixXd cross = llt.matrixL().solve(sd.asDiagonal() * sum.block(0, q, q, k));
     result.sums += sum.bottomRightCorner(k, k) - cross.transpose() * cross;
     result.log_scale -= llt.matrixLLT().diagonal().array().log().sum();
   }

@@ -4,7 +4,7 @@
 //   residual = columns theta + basis eta + noise
 //   theta    what the hypothesis leaves free, standard normal a priori: shared by all groups
 //   eta      what every model of a flapping wing gets wrong: a smooth function of input and motion (RegimeBasis) in every
-//            group, N(0, (floor x size of the signal)^2). An effect must explain more than this.
+//            group, N(0, (its floor x size of the signal)^2). An effect must explain more than this.
 //   noise    first-order autoregressive from beat to beat, with a scale and an autocorrelation of its own in every group,
 //            found from what even the whole basis does not explain; heavy-tailed: rows far off count less (Student t)
 // theta and eta are integrated out (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 2.7), so
@@ -28,17 +28,16 @@ inline constexpr int kGroups = kChannels * kCoefficients;
 class RegimeBasis {
  public:
   explicit RegimeBasis(const std::vector<CarriedFlight>& flights);
-  /// The first `plain()` are in every hypothesis: constant, inputs, motion. The others (places, heading, time, powers) only
-  /// describe what no entry explains.
   int size() const { return static_cast<int>(names_.size()); }
-  int plain() const { return plain_; }
   const std::string& name(int i) const { return names_[static_cast<std::size_t>(i)]; }
+  /// How large its coefficient is in every model, as a share of the signal.
+  double floor(int i) const { return floors_[static_cast<std::size_t>(i)]; }
   /// [beat][size()].
   const Eigen::MatrixXd& values(std::size_t flight) const { return values_[flight]; }
 
  private:
   std::vector<std::string> names_;
-  int plain_ = 0;
+  std::vector<double> floors_;
   std::vector<Eigen::MatrixXd> values_;
 };
 
@@ -48,11 +47,6 @@ struct Grams {
   std::vector<std::vector<Eigen::MatrixXd>> sums;
   /// Terms of log p that no hypothesis changes: [flight].
   std::vector<double> constant;
-};
-
-/// What eta may be: sd of each of the basis' coefficients, as a share of the signal's size.
-struct Discrepancy {
-  double constant = 0, plain = 0, other = 0;
 };
 
 /// Grams with eta integrated out.
@@ -80,8 +74,8 @@ class Evidence {
   /// wing meets its stop decides on more than the parameter that was moved.
   void smooth(Signature& rows) const;
   Grams grams(const Signature& residual, const std::vector<const Signature*>& columns) const;
-  /// `use`: which flights.
-  Reduced reduce(const Grams& grams, const std::vector<char>& use, Discrepancy discrepancy) const;
+  /// `use`: which flights. `unexplained`: share of the signal that eta may reach besides what every model gets wrong.
+  Reduced reduce(const Grams& grams, const std::vector<char>& use, double unexplained) const;
   /// Of the chosen columns, whose theta has the given prior means and standard deviations.
   static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns, const Eigen::VectorXd& prior_mean,
                              const Eigen::VectorXd& prior_sd);

@@ -151,8 +151,7 @@ Posterior Fitter::solve(const Linearised& point) const {
     columns.push_back(point.columns[static_cast<std::size_t>(d)].get());
     seen.push_back(d);
   }
-  const Reduced reduced =
-      evidence_.reduce(evidence_.grams(point.residual, columns), all_of(flights_.size()), discrepancy_);
+  const Reduced reduced = evidence_.reduce(evidence_.grams(point.residual, columns), all_of(flights_.size()), 0);
   const VectorXd prior_mean = -(point.directions.axes.transpose() * point.at);
   const Posterior p =
       Evidence::posterior(reduced, chosen, prior_mean(seen), VectorXd::Ones(static_cast<Index>(seen.size())));
@@ -168,7 +167,7 @@ MatrixXd Fit::covariance() const {
 }
 
 double Fitter::cost(const Signature& residual, const VectorXd& at) const {
-  const Reduced reduced = evidence_.reduce(evidence_.grams(residual, {}), all_of(flights_.size()), discrepancy_);
+  const Reduced reduced = evidence_.reduce(evidence_.grams(residual, {}), all_of(flights_.size()), 0);
   return 0.5 * (reduced.sums(0, 0) + at.squaredNorm());
 }
 
@@ -208,7 +207,8 @@ Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int iterations) co
 
 Fit Fitter::fit(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters, int iterations) const {
   Fit result;
-  result.point = linearise(hypothesis, hypothesis.bounded(start), beside(hypothesis, parameters), known(hypothesis, parameters));
+  result.point =
+      linearise(hypothesis, hypothesis.bounded(start), beside(hypothesis, parameters), known(hypothesis, parameters));
   return improve(hypothesis, std::move(result), iterations, &parameters);
 }
 
@@ -244,8 +244,9 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
       if (c < best_cost) best = i, best_cost = c;
     }
     if (best == tries.size() || before - best_cost < kWorthwhile) return fit;
-    Linearised next = parameters == nullptr ? linearise(hypothesis, tries[best], principal(hypothesis, fit))
-                                            : linearise(hypothesis, tries[best], l.directions, known(hypothesis, *parameters));
+    Linearised next = parameters == nullptr
+                          ? linearise(hypothesis, tries[best], principal(hypothesis, fit))
+                          : linearise(hypothesis, tries[best], l.directions, known(hypothesis, *parameters));
     if (next.residual.empty()) return fit;
     fit.point = std::move(next);
   }

@@ -35,8 +35,8 @@ struct Fit {
 
 class Fitter {
  public:
-  Fitter(const std::vector<CarriedFlight>& flights, Evidence& evidence, Discrepancy discrepancy, int threads)
-      : flights_(flights), evidence_(evidence), discrepancy_(discrepancy), threads_(threads) {}
+  Fitter(const std::vector<CarriedFlight>& flights, Evidence& evidence, int threads)
+      : flights_(flights), evidence_(evidence), threads_(threads) {}
 
   /// Residuals under many candidates; empty signatures for vehicles that come apart.
   std::vector<Signature> residuals(const std::vector<Candidate>& candidates) const;
@@ -63,7 +63,6 @@ class Fitter {
 
   const std::vector<CarriedFlight>& flights_;
   Evidence& evidence_;
-  Discrepancy discrepancy_;
   int threads_;
 };
 
