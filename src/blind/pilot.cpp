@@ -154,11 +154,11 @@ Inputs Pilot::steer(const Torso& torso, const Aim& aim, const Inputs& excitation
           within(u.split_cycle + excitation.split_cycle, d.split_cycle_limit)};
 }
 
-double Pilot::voltage(const Inputs& u, std::size_t side, double beat, double limit_V) {
-  const model::WingBeat<double> inputs{u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle};
+double Pilot::voltage(const Inputs& inputs, std::size_t side, double beat, double limit_V) {
+  const model::WingBeat<double> u{inputs.amplitude_V, inputs.difference_V, inputs.bias_V, inputs.split_cycle};
   const double fraction = beat < 0.5 ? beat : beat - 1;
-  return side == 0 ? model::wing_beat_voltage<+1>(inputs, fraction, limit_V)
-                   : model::wing_beat_voltage<-1>(inputs, fraction, limit_V);
+  return side == 0 ? model::wing_beat_voltage<+1>(u, fraction, limit_V)
+                   : model::wing_beat_voltage<-1>(u, fraction, limit_V);
 }
 
 }  // namespace flappy::blind

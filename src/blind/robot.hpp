@@ -156,12 +156,12 @@ class Robot {
   void integrate();
 
   void drive(double left_V, double right_V);  // drive.cpp
-  double motor_torque(std::size_t side);      //
+  double motor_torque(std::size_t k);         //
   void update_drive(double dt_s);             //
   void blow();                                // air.cpp
-  void add_added_mass(std::size_t side);      //
+  void add_added_mass(std::size_t k);         //
   void update_surroundings(double dt_s);      // surroundings.cpp
-  double place_gain(std::size_t side) const;  //
+  double place_gain(std::size_t k) const;     //
   void push();                                //
 
   Room room_;

@@ -55,7 +55,7 @@ Imu::Imu(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint
   Random fixed(seed, 21);
   const Vector3d normals = fixed.normals();
   warm_up_ = normals / std::sqrt(normals.squaredNorm());
-  rectifies_ = Vector3d(fixed.between(0.6, 1.4), fixed.between(0.6, 1.4), fixed.between(0.6, 1.4)) * 1e-3;
+  for (int k = 0; k < 3; ++k) rectifies_(k) = 1e-3 * fixed.between(0.6, 1.4);
   if (const double size = sizes[Effect::accelerometer_misalignment]; size > 0)
     for (int i = 0; i < 3; ++i)  // each axis by itself: turned, not square, and of slightly another scale
       for (int j = 0; j < 3; ++j) misaligned_(i, j) += size * (i == j ? 0.005 : 0.02) * fixed.normal();
