@@ -26,7 +26,8 @@ struct ActiveEffects {
   int stride = 0;
   const Wall* walls = nullptr;
   std::size_t wall_count = 0;
-  T rows[kEffectRows];  // parameters, then figures
+  Parameters<T>* own = nullptr;  // begins as those of the block
+  T rows[kEffectRows];           // parameters, then figures
 
   const Sides<SideFigures<T>>& figures() const {
     return *reinterpret_cast<const Sides<SideFigures<T>>*>(rows + kEffectParameterRows);
@@ -44,7 +45,7 @@ struct ActiveEffects {
         if (set >> I & 1) {
           Change changed = change;
           stage(Effect{}, q, state, changed);
-          change = chosen(state.on, changed, change);
+          change = where(state.on, changed, change);
         }
       }
       apply<Change, Stage, I + 1>(change, stage, state_row + (kept >> I & 1 ? states_of<Effect>() : 0));
@@ -58,14 +59,6 @@ struct ActiveEffects {
     auto none = q[0] == T(0);
     for (int i = 1; i < Effect::kInfo.sizes; ++i) none = none & (q[i] == T(0));
     return !none;
-  }
-  /// Member by member, for a struct whose members are all T.
-  template <class S>
-  static FLAPPY_INLINE S chosen(const auto& mask, S yes, const S& no) {
-    T* a = reinterpret_cast<T*>(&yes);
-    const T* b = reinterpret_cast<const T*>(&no);
-    for (std::size_t i = 0; i < sizeof(S) / sizeof(T); ++i) a[i] = where(mask, a[i], b[i]);
-    return yes;
   }
 };
 
@@ -134,9 +127,9 @@ FLAPPY_INLINE Hinges<T> hinges_of(const SideParameters<T>& p, const SideFigures<
           none};
 }
 
-/// The parameters of a side with its hinges as effects left them.
+/// Changes the parameters of a side to its hinges as effects left them.
 template <class T>
-FLAPPY_INLINE void put_hinges(const Hinges<T>& h, SideParameters<T>& p) {
+FLAPPY_INLINE void put_hinges(const Hinges<T>& h, const SideParameters<T>& given, SideParameters<T>& p) {
   p.stroke_torque_per_V_Nm = h.torque_per_V_Nm;
   p.stroke_damping_Nm_s = h.damping_Nm_s;
   p.stroke_stiffening_kg_m2 = h.stiffening_kg_m2;
@@ -146,7 +139,7 @@ FLAPPY_INLINE void put_hinges(const Hinges<T>& h, SideParameters<T>& p) {
   p.spring_negative_Nm_rad = h.spring_negative_Nm_rad;
   p.rotation_lower_rad = h.rotation_lower_rad;
   p.rotation_upper_rad = h.rotation_upper_rad;
-  p.rotation_stiffening_kg_m2 += h.rotation_inertia_kg_m2;
+  p.rotation_stiffening_kg_m2 = given.rotation_stiffening_kg_m2 + h.rotation_inertia_kg_m2;
 }
 
 /// What acts on a flapper: air and motors;
@@ -163,7 +156,7 @@ template <class T>
 struct Acting<true, T> {
   Surroundings<T> s;
   Sides<Hinges<T>> hinges;
-  Parameters<T> p;
+  Parameters<T>& p;
   Voltages<T> voltages;
   Sides<WingWrench<T>> air;
   BodyLoad<T> body;
@@ -179,8 +172,8 @@ FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<true, T
                     auto& change) requires requires { effect.hinges(q, s, state, change); } {
         effect.hinges(q, s, state, change);
       });
-  put_hinges(a.hinges.left, a.p.left);
-  put_hinges(a.hinges.right, a.p.right);
+  put_hinges(a.hinges.left, s.p.left, a.p.left);
+  put_hinges(a.hinges.right, s.p.right, a.p.right);
   a.voltages = {a.hinges.left.voltage_V, a.hinges.right.voltage_V};
   effects.apply(
       s.wind_B_m_s, [&](auto effect, const auto& q, const auto& state,
@@ -292,7 +285,7 @@ FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const Stat
          {v_left, v_right},
          zero},
         {hinges_of(p.left, figures.left, voltages.left_V), hinges_of(p.right, figures.right, voltages.right_V)},
-        p,
+        *effects.own,
         voltages,
         {},
         none};
