@@ -26,7 +26,8 @@ struct ActiveEffects {
   int stride = 0;
   const Wall* walls = nullptr;
   std::size_t wall_count = 0;
-  T rows[kEffectRows];  // parameters, then figures
+  Parameters<T>* own = nullptr;  // begins as those of the block
+  T rows[kEffectRows];           // parameters, then figures
 
   const Sides<SideFigures<T>>& figures() const {
     return *reinterpret_cast<const Sides<SideFigures<T>>*>(rows + kEffectParameterRows);
@@ -44,7 +45,7 @@ struct ActiveEffects {
         if (set >> I & 1) {
           Change changed = change;
           stage(Effect{}, q, state, changed);
-          change = chosen(state.on, changed, change);
+          change = where(state.on, changed, change);
         }
       }
       apply<Change, Stage, I + 1>(change, stage, state_row + (kept >> I & 1 ? states_of<Effect>() : 0));
@@ -58,14 +59,6 @@ struct ActiveEffects {
     auto none = q[0] == T(0);
     for (int i = 1; i < Effect::kInfo.sizes; ++i) none = none & (q[i] == T(0));
     return !none;
-  }
-  /// Member by member, for a struct whose members are all T.
-  template <class S>
-  static FLAPPY_INLINE S chosen(const auto& mask, S yes, const S& no) {
-    T* a = reinterpret_cast<T*>(&yes);
-    const T* b = reinterpret_cast<const T*>(&no);
-    for (std::size_t i = 0; i < sizeof(S) / sizeof(T); ++i) a[i] = where(mask, a[i], b[i]);
-    return yes;
   }
 };
 
@@ -134,9 +127,9 @@ FLAPPY_INLINE Hinges<T> hinges_of(const SideParameters<T>& p, const SideFigures<
           none};
 }
 
-/// The parameters of a side with its hinges as effects left them.
+/// Changes the parameters of a side to its hinges as effects left them.
 template <class T>
-FLAPPY_INLINE void put_hinges(const Hinges<T>& h, SideParameters<T>& p) {
+FLAPPY_INLINE void put_hinges(const Hinges<T>& h, const SideParameters<T>& given, SideParameters<T>& p) {
   p.stroke_torque_per_V_Nm = h.torque_per_V_Nm;
   p.stroke_damping_Nm_s = h.damping_Nm_s;
   p.stroke_stiffening_kg_m2 = h.stiffening_kg_m2;
@@ -146,20 +139,32 @@ FLAPPY_INLINE void put_hinges(const Hinges<T>& h, SideParameters<T>& p) {
   p.spring_negative_Nm_rad = h.spring_negative_Nm_rad;
   p.rotation_lower_rad = h.rotation_lower_rad;
   p.rotation_upper_rad = h.rotation_upper_rad;
-  p.rotation_stiffening_kg_m2 += h.rotation_inertia_kg_m2;
+  p.rotation_stiffening_kg_m2 = given.rotation_stiffening_kg_m2 + h.rotation_inertia_kg_m2;
 }
 
-/// What acts on a flapper under effects beyond the base model: motors and stops, wind, air, loads on the body.
-template <class T>
+/// What acts on a flapper: air and motors;
+template <bool with_effects, class T>
 struct Acting {
-  Surroundings<T> s;
-  Sides<Hinges<T>> hinges;
+  const Parameters<T>& p;
+  const Voltages<T>& voltages;
   Sides<WingWrench<T>> air;
   BodyLoad<T> body;
 };
 
+/// and effects beyond the base model, which have parameters and voltages of their own.
 template <class T>
-FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<T>& a) {
+struct Acting<true, T> {
+  Surroundings<T> s;
+  Sides<Hinges<T>> hinges;
+  Parameters<T>& p;
+  Voltages<T> voltages;
+  Sides<WingWrench<T>> air;
+  BodyLoad<T> body;
+};
+
+/// Stage by stage, in the order of effect.hpp.
+template <class T>
+FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<true, T>& a) {
   Surroundings<T>& s = a.s;
   find_wall(effects, s);
   effects.apply(
@@ -167,6 +172,9 @@ FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<T>& a) 
                     auto& change) requires requires { effect.hinges(q, s, state, change); } {
         effect.hinges(q, s, state, change);
       });
+  put_hinges(a.hinges.left, s.p.left, a.p.left);
+  put_hinges(a.hinges.right, s.p.right, a.p.right);
+  a.voltages = {a.hinges.left.voltage_V, a.hinges.right.voltage_V};
   effects.apply(
       s.wind_B_m_s, [&](auto effect, const auto& q, const auto& state,
                         auto& change) requires requires { effect.wind(q, s, state, change); } {
@@ -202,7 +210,7 @@ FLAPPY_INLINE void add_hinges(const Hinges<T>& h, SideLoad<T>& load, WingInertia
 
 /// Lets effects keep what they will need of this step.
 template <class T>
-FLAPPY_INLINE void remember(const ActiveEffects<T>& effects, Acting<T>& a) {
+FLAPPY_INLINE void remember(const ActiveEffects<T>& effects, Acting<true, T>& a) {
   effects.apply(
       a.hinges, [&](auto effect, const auto& q, const auto& state,
                     const auto& hinges) requires requires { effect.after(q, a.s, state, hinges); } {
@@ -242,101 +250,92 @@ FLAPPY_INLINE void feel(const Parameters<T>& p, State<T>& x, const Sides<WingPos
   x.lift_N = where(held, T(x.lift_N + T(lift - x.lift_N) / p.beat_steps), x.lift_N);
 }
 
-template <class T>
-FLAPPY_INLINE Sides<WingInertia<T>> wing_inertias(const Parameters<T>& p, const Sides<WingPose<T>>& pose) {
-  return {wing_inertia(p.left, pose.left), wing_inertia(p.right, pose.right)};
-}
-
-/// Where everything is and how it moves.
-template <class T>
-struct Place {
-  Matrix3<T> R;  // R_WB
-  Sides<WingPose<T>> pose;
-  WholeVehicle<T> whole;
-  typename T::Mask held;
-};
-
-/// New rates, and new positions with them.
-template <class T>
-FLAPPY_INLINE void advance(const Parameters<T>& p, State<T>& x, Vec3<T>& com_m, const Place<T>& at,
-                           const Sides<WingInertia<T>>& wing, const Sides<WingWrench<T>>& air,
-                           const Sides<SideLoad<T>>& load, const BodyLoad<T>& body, const Constants<T>& k) {
-  const BodyInertia<T> inertia = body_inertia(p, x, at.pose, wing, at.whole);
-  const BodyDrive<T> drive = drive_body(p, x, at.pose, wing, at.whole, inertia, load, body, at.R.row_z, k.gravity);
-  const HingeSystem<T> hinges = eliminate_body(p, at.pose, wing, at.whole, inertia, drive, load);
-  const Motion<T> m = move(p, x, inertia, drive, hinges, k.step, k.per_step);
-  const Vec3<T> force = at.R * drive.force;
-  x.body_rate_rad_s = add_scaled(x.body_rate_rad_s, k.step, m.body_acceleration);
-  x.com_velocity_m_s = add_scaled(x.com_velocity_m_s, T(k.step * p.inverse_mass_1_kg), force);
-  x.com_velocity_m_s.z -= k.step * k.gravity;
-
-  turn<+1>(p.left, x.left, m.stroke_left, m.rotation_left, k.per_step);
-  turn<-1>(p.right, x.right, m.stroke_right, m.rotation_right, k.per_step);
-  com_m = add_scaled(com_m, k.step, x.com_velocity_m_s);
-  x.attitude = turned(x.attitude, k.half_step * x.body_rate_rad_s);
-  feel(p, x, at.pose, air, force.z, k.step, at.held);
+/// What acts on it: air, motors, effects beyond the base model.
+template <bool with_effects, class T>
+FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const State<T>& x, const Voltages<T>& voltages,
+                                              const Matrix3<T>& R, const Sides<WingPose<T>>& pose,
+                                              const WholeVehicle<T>& whole, const Vec3<T>& com_m,
+                                              const ActiveEffects<T>& effects, const Constants<T>& k) {
+  const T zero(0);
+  const Vec3<T>&w = x.body_rate_rad_s, v_C = transpose_times(R, x.com_velocity_m_s) - whole.com_rate;
+  const Vec3<T> v_left = v_C + cross(w, whole.arm_left), v_right = v_C + cross(w, whole.arm_right);
+  const BodyLoad<T> none{{zero, zero, zero}, {zero, zero, zero}};
+  if constexpr (with_effects) {
+    const T stroke_plane = T(0.5) * T(p.left.shoulder_m.z + p.right.shoulder_m.z);
+    const Sides<SideFigures<T>>& figures = effects.figures();
+    Acting<true, T> a{
+        {p,
+         x,
+         pose,
+         figures,
+         R,
+         com_m - R * whole.com,
+         v_C - cross(w, whole.com),
+         whole.com,
+         stroke_plane,
+         k.step,
+         k.per_step,
+         k.gravity,
+         k.ground_z,
+         k.ceiling_z,
+         zero,
+         zero,
+         zero,
+         {zero, zero, zero},
+         {v_left, v_right},
+         zero},
+        {hinges_of(p.left, figures.left, voltages.left_V), hinges_of(p.right, figures.right, voltages.right_V)},
+        *effects.own,
+        voltages,
+        {},
+        none};
+    apply_effects(effects, a);
+    return a;
+  } else {
+    return {
+        p, voltages, {air_on_wing<+1>(p.left, pose.left, v_left), air_on_wing<-1>(p.right, pose.right, v_right)}, none};
+  }
 }
 
 /// One physics step. `com_m`: the vehicle's centre of mass in W, carried along because it is what inertia moves.
 template <bool with_effects, class T>
-FLAPPY_INLINE void physics_step(const Parameters<T>& p, State<T>& x, const Voltages<T>& voltages, Vec3<T>& com_m,
+FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const Voltages<T>& voltages, Vec3<T>& com_m,
                                 const ActiveEffects<T>& effects, const Constants<T>& k) {
   // where everything is and how it moves
+  const Matrix3<T> R = rotation_matrix(x.attitude);
   const Vec3<T>& w = x.body_rate_rad_s;
-  Place<T> at;
-  at.R = rotation_matrix(x.attitude);
-  at.pose = {place_wing<+1>(p.left, x.left, w), place_wing<-1>(p.right, x.right, w)};
-  at.whole = whole_vehicle(p, at.pose);
-  at.held = hold(p, x, at.whole, at.R, com_m, k.gravity);
-  const Vec3<T> v_C = transpose_times(at.R, x.com_velocity_m_s) - at.whole.com_rate;
-  const Sides<Vec3<T>> shoulder{v_C + cross(w, at.whole.arm_left), v_C + cross(w, at.whole.arm_right)};
-  const T zero(0);
+  const Sides<WingPose<T>> pose{place_wing<+1>(vehicle.left, x.left, w), place_wing<-1>(vehicle.right, x.right, w)};
+  const WholeVehicle<T> whole = whole_vehicle(vehicle, pose);
+  const auto held = hold(vehicle, x, whole, R, com_m, k.gravity);
 
-  // what acts on it, and where that takes it
+  // what acts on it: air, effects beyond the base model, motors
+  auto acting = acts_on<with_effects>(vehicle, x, voltages, R, pose, whole, com_m, effects, k);
+  const Parameters<T>& p = acting.p;
+  Sides<SideLoad<T>> load{load_side<+1>(p.left, x.left, acting.air.left, acting.voltages.left_V),
+                          load_side<-1>(p.right, x.right, acting.air.right, acting.voltages.right_V)};
+  Sides<WingInertia<T>> wing{wing_inertia(p.left, pose.left), wing_inertia(p.right, pose.right)};
   if constexpr (with_effects) {
-    Acting<T> acting{{p,
-                      x,
-                      at.pose,
-                      effects.figures(),
-                      at.R,
-                      com_m - at.R * at.whole.com,
-                      v_C - cross(w, at.whole.com),
-                      at.whole.com,
-                      T(0.5) * T(p.left.shoulder_m.z + p.right.shoulder_m.z),
-                      k.step,
-                      k.per_step,
-                      k.gravity,
-                      k.ground_z,
-                      k.ceiling_z,
-                      zero,
-                      zero,
-                      zero,
-                      {zero, zero, zero},
-                      shoulder,
-                      zero},
-                     {hinges_of(p.left, effects.figures().left, voltages.left_V),
-                      hinges_of(p.right, effects.figures().right, voltages.right_V)},
-                     {},
-                     {{zero, zero, zero}, {zero, zero, zero}}};
-    apply_effects(effects, acting);
-    const Sides<Hinges<T>>& hinges = acting.hinges;
-    Parameters<T> own = p;
-    put_hinges(hinges.left, own.left);
-    put_hinges(hinges.right, own.right);
-    Sides<SideLoad<T>> load{load_side<+1>(own.left, x.left, acting.air.left, hinges.left.voltage_V),
-                            load_side<-1>(own.right, x.right, acting.air.right, hinges.right.voltage_V)};
-    Sides<WingInertia<T>> wing = wing_inertias(p, at.pose);
-    add_hinges(hinges.left, load.left, wing.left);
-    add_hinges(hinges.right, load.right, wing.right);
-    advance(own, x, com_m, at, wing, acting.air, load, acting.body, k);
-    remember(effects, acting);
-  } else {
-    const Sides<WingWrench<T>> air{air_on_wing<+1>(p.left, at.pose.left, shoulder.left),
-                                   air_on_wing<-1>(p.right, at.pose.right, shoulder.right)};
-    const Sides<SideLoad<T>> load{load_side<+1>(p.left, x.left, air.left, voltages.left_V),
-                                  load_side<-1>(p.right, x.right, air.right, voltages.right_V)};
-    advance(p, x, com_m, at, wing_inertias(p, at.pose), air, load, {{zero, zero, zero}, {zero, zero, zero}}, k);
+    add_hinges(acting.hinges.left, load.left, wing.left);
+    add_hinges(acting.hinges.right, load.right, wing.right);
   }
+
+  // new rates
+  const BodyInertia<T> inertia = body_inertia(p, x, pose, wing, whole);
+  const BodyDrive<T> body_drive = drive_body(p, x, pose, wing, whole, inertia, load, acting.body, R.row_z, k.gravity);
+  const HingeSystem<T> hinges = eliminate_body(p, pose, wing, whole, inertia, body_drive, load);
+  const Motion<T> m = move(p, x, inertia, body_drive, hinges, k.step, k.per_step);
+  const Vec3<T> force = R * body_drive.force;
+  x.body_rate_rad_s = add_scaled(w, k.step, m.body_acceleration);
+  x.com_velocity_m_s = add_scaled(x.com_velocity_m_s, T(k.step * p.inverse_mass_1_kg), force);
+  x.com_velocity_m_s.z -= k.step * k.gravity;
+
+  // new positions, with the new rates
+  turn<+1>(p.left, x.left, m.stroke_left, m.rotation_left, k.per_step);
+  turn<-1>(p.right, x.right, m.stroke_right, m.rotation_right, k.per_step);
+  com_m = add_scaled(com_m, k.step, x.com_velocity_m_s);
+  x.attitude = turned(x.attitude, k.half_step * x.body_rate_rad_s);
+  feel(p, x, pose, acting.air, force.z, k.step, held);
+  if constexpr (with_effects) remember(effects, acting);
 }
 
 }  // namespace FLAPPY_ISA

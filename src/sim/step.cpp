@@ -158,7 +158,10 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     auto x = load_rows<State<L>>(block.state, first);
     Voltages<L> voltages = load_rows<Drive<L>>(block.drive, first).voltages;
     ActiveEffects<L> effects;
+    Parameters<L> own;
     if constexpr (with_effects) {
+      own = p;
+      effects.own = &own;
       effects.set = in_force.set;
       effects.kept = in_force.kept;
       effects.states = in_force.states + first;

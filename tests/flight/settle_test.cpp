@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "fleets.hpp"
+#include "model/effects/registry.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::flight {
@@ -160,9 +163,40 @@ TEST(HandBack, PaysAtTheGoalAndOnceForArrivingAndForKeepingIt) {
   }
 }
 
+/// One that has every effect but the tether, whose line would be a kilometre long here.
+model::Vehicle affected(model::Vehicle v) {
+  for (const model::EffectEntry& e : model::effects())
+    if (e.info.id != std::string_view("tether")) v.effects[e.info.id] = {};
+  return v;
+}
+
+TEST(Snapshot, HoldsWhatEffectsRemember) {
+  const FleetOptions o = fleet_options(sensors("code"), controller("pid"), task(holding(0, 0)));
+  Fleet<float> from(3, affected(test::identified()), o), to(20, test::identified(), o),
+      plain(20, test::identified(), o);
+  for (int i = 0; i < 40; ++i) from.step();
+  const Snapshot<float> snapshot = from.snapshot(2);
+  to.start(17, 1, snapshot);
+  const Snapshot<float> again = to.snapshot(17);
+  EXPECT_EQ(again.effects, snapshot.effects);
+  EXPECT_NE(again.effects, 0u);
+  EXPECT_EQ(again.effect_rows, snapshot.effect_rows);
+  EXPECT_EQ(again.effect_states, snapshot.effect_states);
+  EXPECT_GT(std::ranges::count_if(snapshot.effect_states, [](float x) { return x != 0; }), 100);
+  // and leaves the others alone
+  for (int i = 0; i < 40; ++i) to.step(), plain.step();
+  EXPECT_EQ(to.hash(0, 17), plain.hash(0, 17));
+  EXPECT_EQ(to.hash(18, 20), plain.hash(18, 20));
+  EXPECT_NE(to.snapshot(17).effect_states, snapshot.effect_states);
+  to.start(17, 2, plain.snapshot(3));  // over what it had
+  EXPECT_EQ(to.snapshot(17).effects, 0u);
+}
+
 TEST(Fleet, FliesOnFromItsMemory) {
   const sim::Randomisation vehicles = randomisation();
-  const auto vehicle = [&](std::uint32_t flapper) { return vehicles.sample({.seed = 4, .flapper = flapper}); };
+  const auto vehicle = [&](std::uint32_t flapper) {
+    return affected(vehicles.sample({.seed = 4, .flapper = flapper}));
+  };
   const FleetOptions o = fleet_options(sensors("code"), controller("pid"), task(holding(0.1, 0)));
   const auto pool = settle<float>(o, 20, 0.5, vehicle);
   Fleet<float> one(20, vehicle(0), o), other(20, vehicle(0), o);

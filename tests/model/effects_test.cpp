@@ -314,7 +314,7 @@ TEST(SpringHardening, IsDuffings) {
   b.x.left.stroke_rad = One(rest + 1.2);
   const auto h = b.hinges<SpringHardening>(q, 0, 0);
   SideParameters<One> p = b.p.left;
-  sim::put_hinges(h.left, p);
+  sim::put_hinges(h.left, b.p.left, p);
   EXPECT_NEAR(value(spring_torque(p, b.x.left.stroke_rad)), -k * 1.2 - 0.1 * k * 1.2 * 1.2 * 1.2, 1e-16);
 }
 
@@ -343,6 +343,8 @@ struct Stand {
   }
   void step(double left_V, double right_V = 0) {
     const Parameters<One> p = in_lane(derive(airless, h));
+    Parameters<One> own = p;
+    effects.own = &own;
     sim::physics_step<true>(p, x, {One(left_V), One(right_V)}, com_m, effects,
                             {One(h), One(h / 2), One(1 / h), One(gravity), One(0), One(10)});
   }

@@ -103,6 +103,40 @@ struct StateRows {
   }
 };
 
+// What stages change, lane by lane. Written out, so that compilers keep it in registers.
+
+template <class T>
+FLAPPY_INLINE Hinges<T> where(auto m, const Hinges<T>& a, const Hinges<T>& b) {
+  return {where(m, a.voltage_V, b.voltage_V),
+          where(m, a.resistance_ohm, b.resistance_ohm),
+          where(m, a.torque_per_V_Nm, b.torque_per_V_Nm),
+          where(m, a.damping_Nm_s, b.damping_Nm_s),
+          where(m, a.stiffening_kg_m2, b.stiffening_kg_m2),
+          where(m, a.friction_Nm, b.friction_Nm),
+          where(m, a.rotor_kg_m2, b.rotor_kg_m2),
+          where(m, a.spring_positive_Nm_rad, b.spring_positive_Nm_rad),
+          where(m, a.spring_negative_Nm_rad, b.spring_negative_Nm_rad),
+          where(m, a.rotation_lower_rad, b.rotation_lower_rad),
+          where(m, a.rotation_upper_rad, b.rotation_upper_rad),
+          where(m, a.stroke_torque_Nm, b.stroke_torque_Nm),
+          where(m, a.rotation_torque_Nm, b.rotation_torque_Nm),
+          where(m, a.rotation_inertia_kg_m2, b.rotation_inertia_kg_m2),
+          where(m, a.cross_inertia_kg_m2, b.cross_inertia_kg_m2)};
+}
+template <class T>
+FLAPPY_INLINE Sides<Hinges<T>> where(auto m, const Sides<Hinges<T>>& a, const Sides<Hinges<T>>& b) {
+  return {where(m, a.left, b.left), where(m, a.right, b.right)};
+}
+template <class T>
+FLAPPY_INLINE WingWrench<T> where(auto m, const WingWrench<T>& a, const WingWrench<T>& b) {
+  return {where(m, a.normal_force_N, b.normal_force_N), where(m, a.force_x_N, b.force_x_N),
+          where(m, a.force_z_N, b.force_z_N), where(m, a.moment_Nm, b.moment_Nm)};
+}
+template <class T>
+FLAPPY_INLINE BodyLoad<T> where(auto m, const BodyLoad<T>& a, const BodyLoad<T>& b) {
+  return {where(m, a.force_B, b.force_B), where(m, a.moment_B, b.moment_B)};
+}
+
 template <int side, class S>
 FLAPPY_INLINE auto& of_side(S& s) {
   if constexpr (side > 0) return s.left;

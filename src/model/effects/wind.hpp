@@ -16,9 +16,9 @@ inline namespace FLAPPY_ISA {
 struct Wind {
   static constexpr EffectInfo kInfo{"wind", Stage::air, 4, "world_force", "Shinozuka, Jan 1972"};
   static constexpr std::array<EffectParameter, 5> kParameters{{{"x_m_s", -5, 5, 0.3, -0.9, 0.9},
-                                                               {"y_m_s", -5, 5, 0, -0.9, 0.9},
-                                                               {"z_m_s", -5, 5, 0, -0.3, 0.3},
-                                                               {"gust_m_s", 0, 3, 0, 0, 0.5},
+                                                               {"y_m_s", -5, 5, 0.3, -0.9, 0.9},
+                                                               {"z_m_s", -5, 5, 0.1, -0.3, 0.3},
+                                                               {"gust_m_s", 0, 3, 0.15, 0, 0.45},
                                                                {"gust_time_s", 0.01, 100, 0.5, 0.2, 0.8}}};
   static constexpr int kStates = 3;  // phases, in half turns
   static constexpr double kPhaseRates[3] = {0.618034 * 0.31830989, 0.31830989,

@@ -16,7 +16,7 @@ inline namespace FLAPPY_ISA {
 struct WingDamage {
   static constexpr EffectInfo kInfo{"wing_damage", Stage::body, 2, "asymmetry", "Muijres et al. 2017"};
   static constexpr std::array<EffectParameter, 2> kParameters{
-      {{"left_area", 0, 0.3, 0.05, 0, 0.15}, {"right_area", 0, 0.3, 0.05, 0, 0.15}}};
+      {{"left_area", 0, 0.3, 0.05, 0, 0.15}, {"right_area", 0, 0.3, 0, 0, 0.15}}};
 
   template <class V>
   static void vehicle(const double (&q)[2], V& v) {
