@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <tuple>
 
 #include "model/effects/registry.hpp"
 
@@ -17,21 +16,35 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Reach of the first difference along a size or a shape.
+/// Reach of the first difference along a size.
 constexpr double kEffectReach = 0.4;
-/// An effect that gains less in the linear screening is not fitted.
-constexpr double kLeastGain = 0;
-/// What no entry explains may be as large as these shares of the signal.
-constexpr double kUnknownSizes[] = {0.02, 0.05, 0.15};
+/// An effect that gains less in the linear screening is not fitted; a further effect has to gain more.
+constexpr double kLeastGain = 0, kLeastFurther = 8;
+/// How well an entry's equation describes the effect of its name: share of its own signature.
+constexpr double kForm = 0.15;
+/// Shares of the signal that a term which no entry explains may have.
+constexpr double kUnexplained[] = {0.01, 0.04, 0.16};
+constexpr int kMostTerms = 12;
+/// What was thought before any flight: how often a gap is of each kind.
+constexpr double kPriorNone = 0.15, kPriorParameters = 0.35, kPriorEffect = 0.35, kPriorUnknown = 0.15;
+/// For every further effect.
+constexpr double kPriorFurther = 0.1;
+
+/// What every real vehicle has a little of, in units of the effect's first coordinate: stops are never hard.
+struct Background {
+  const char* effect;
+  double sd;
+};
+constexpr Background kBackground[] = {{"stop_compliance", 0.07}};
 
 class Diagnoser {
  public:
   Diagnoser(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
             const DiagnoseOptions& options)
-      : flights_(flights),
-        uncertain_(uncertain),
+      : uncertain_(uncertain),
         options_(options),
         threads_(options.threads > 0 ? options.threads : omp_get_num_procs()),
+        all_(flights.size(), 1),
         evidence_(flights),
         fitter_(flights, evidence_, threads_) {}
 
@@ -39,26 +52,54 @@ class Diagnoser {
     Diagnosis d;
     progress(0, "fitting parameters");
     const Hypothesis plain(uncertain_, {});
-    d.parameters = fit_parameters(plain);
+    const Linearised nominal = fit_parameters(plain);
+    d.parameters = parameters_;
     progress(0.3, "screening effects");
-    add_plain_answers(plain, d);
-    const std::vector<Screened> ranking = screen(plain, d.parameters, {});
-    std::vector<std::vector<std::string>> finalists;
-    for (const Screened& s : ranking)
-      if (static_cast<int>(finalists.size()) < options_.finalists && s.gain > kLeastGain)
-        finalists.push_back({s.effect});
-    double done = 0;
-    for (const auto& effects : finalists) {
-      progress(0.4 + 0.4 * done++ / static_cast<double>(finalists.size()), "fitting " + effects.front());
-      d.answers.push_back(fit_effects(effects, d.parameters));
+    add_background(plain);
+    d.answers.push_back(weigh(Answer::Kind::none, {}, nominal, {}, std::log(kPriorNone)));
+    d.answers.push_back(weigh(Answer::Kind::parameters, {}, parameters_.point, {}, std::log(kPriorParameters)));
+    d.answers.push_back(explain_freely());
+    const double parameters = d.answers[1].log_evidence;
+
+    std::vector<Answer> singles;
+    const auto ranking = screen({}, parameters_);
+    for (std::size_t i = 0; i < ranking.size() && static_cast<int>(i) < options_.finalists; ++i) {
+      if (ranking[i].gain < kLeastGain) break;
+      progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + ranking[i].effect);
+      singles.push_back(fit_effects({ranking[i]}));
     }
-    weigh(d);
+    std::ranges::sort(singles, std::greater{}, &Answer::log_evidence);
+    // further effects beside the best
+    if (!singles.empty() && singles.front().log_evidence > parameters) {
+      Answer best = singles.front();
+      for (int n = 2; n <= options_.most_effects; ++n) {
+        progress(0.7 + 0.1 * n, "looking beside " + best.effects.back());
+        const auto beside = screen(best.effects, best.fit);
+        if (beside.empty() || beside.front().gain < kLeastFurther) break;
+        std::vector<Screened> set = screened_of(best);
+        set.push_back(beside.front());
+        Answer more = fit_effects(set);
+        if (more.log_evidence < best.log_evidence) break;
+        singles.push_back(more);
+        best = std::move(more);
+      }
+    }
+    for (Answer& a : singles) d.answers.push_back(std::move(a));
+    normalise(d);
     return d;
   }
 
-  Fit fit_parameters(const Hypothesis& plain) {
-    const Linearised nominal =
-        fitter_.linearise(plain, plain.start(), Directions{MatrixXd(plain.size(), 0), VectorXd(0)});
+ private:
+  struct Screened {
+    std::string effect;
+    double gain = 0;       ///< nats
+    VectorXd coordinates;  ///< of the effect's unknowns, as far as a linear model sees them
+  };
+
+  /// Leaves the fit in parameters_ and returns the nominal vehicle's residual under the noise found with it.
+  Linearised fit_parameters(const Hypothesis& plain) {
+    const Directions none{MatrixXd(plain.size(), 0), VectorXd(0)};
+    const Linearised nominal = fitter_.linearise(plain, plain.start(), none);
     evidence_.learn_weights(nominal.residual);
     Fit fit = fitter_.fit(plain, plain.start(), 3);
     for (int i = 0; i < 2; ++i) {
@@ -66,145 +107,202 @@ class Diagnoser {
       fit = fitter_.refit(plain, fit, 3);
     }
     evidence_.learn_noise(fit.point.residual);
-    return fitter_.refit(plain, fit, 3);
+    parameters_ = fitter_.refit(plain, fit, 3);
+    return fitter_.linearise(plain, plain.start(), none);
   }
 
- private:
-  struct Screened {
-    std::string effect;
-    double gain = 0;       ///< nats over the fit it was screened beside
-    VectorXd coordinates;  ///< of the effect's unknowns, as far as a linear model sees them
-  };
-
-  std::vector<char> all_flights() const { return std::vector<char>(flights_.size(), 1); }
-
-  /// Log probability of all flights, and of every flight given the others.
-  std::pair<double, double> weigh_point(const Linearised& l, const Grams& grams, const std::vector<int>& columns,
-                                        const VectorXd& prior_mean, double unexplained) const {
-    const VectorXd sd = VectorXd::Ones(prior_mean.size());
-    (void)l;
-    const auto of = [&](const std::vector<char>& use) {
-      return Evidence::posterior(evidence_.reduce(grams, use, unexplained), columns, prior_mean, sd).log_evidence;
-    };
-    const double all = of(all_flights());
-    double held_out = 0;
-    for (std::size_t f = 0; f < flights_.size(); ++f) {
-      std::vector<char> others = all_flights();
-      others[f] = 0;
-      held_out += all - of(others);
+  void add_background(const Hypothesis& plain) {
+    for (const Background& b : kBackground) {
+      const Hypothesis h(uncertain_, {b.effect});
+      VectorXd at = h.start();
+      at.head(plain.size()) = parameters_.point.at;
+      at[plain.size()] = b.sd;
+      Smooth column = change(parameters_.point.residual, fitter_.residuals({h.candidate(at)})[0], 1);
+      if (column.size() > 0) background_.push_back(std::move(column));
     }
-    return {all, held_out};
   }
 
-  void add_plain_answers(const Hypothesis& plain, Diagnosis& d) const {
-    const auto add = [&](Answer::Kind kind, const Linearised& l, bool free, double unexplained, double log_prior) {
-      std::vector<const Signature*> columns;
-      std::vector<int> chosen;
-      std::vector<double> mean;
-      for (std::size_t k = 0; free && k < l.columns.size(); ++k) {
-        if (l.columns[k] == nullptr) continue;
-        chosen.push_back(static_cast<int>(columns.size()));
-        columns.push_back(l.columns[k].get());
-        mean.push_back(-l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
-      }
-      const Grams grams = evidence_.grams(l.residual, columns);
-      Answer a;
-      a.kind = kind;
-      std::tie(a.log_evidence, a.log_held_out) = weigh_point(
-          l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), unexplained);
-      a.log_evidence += log_prior;
-      d.answers.push_back(std::move(a));
+  /// Of a prediction, from what is left before and after it moved by `span`; empty where it came apart.
+  Smooth change(const Signature& before, Signature after, double span) const {
+    if (after.empty()) return {};
+    for (std::size_t f = 0; f < after.size(); ++f)
+      for (std::size_t i = 0; i < after[f].size(); ++i) after[f][i] = (before[f][i] - after[f][i]) / span;
+    return evidence_.smooth(after);
+  }
+
+  /// Columns of a linearised hypothesis, its prior means, and the background's.
+  struct Columns {
+    std::vector<const Smooth*> columns;
+    std::vector<int> chosen;
+    std::vector<double> prior_mean;
+    VectorXd mean() const {
+      return Eigen::Map<const VectorXd>(prior_mean.data(), static_cast<Index>(prior_mean.size()));
+    }
+    void add(const Smooth& column, double mean) {
+      chosen.push_back(static_cast<int>(columns.size()));
+      columns.push_back(&column);
+      prior_mean.push_back(mean);
+    }
+  };
+  Columns columns_of(const Linearised& l) const {
+    Columns c;
+    for (std::size_t k = 0; k < l.columns.size(); ++k)
+      if (l.columns[k].size() > 0) c.add(l.columns[k], -l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
+    for (const Smooth& b : background_) c.add(b, 0);
+    return c;
+  }
+
+  /// Floor, and what the equations of effects get wrong of themselves.
+  Smooth eta_sd(const Linearised& l, Index shared) const {
+    Smooth sd = evidence_.floor();
+    Smooth own = Smooth::Zero(sd.rows(), sd.cols());
+    for (std::size_t k = static_cast<std::size_t>(shared); k < l.columns.size(); ++k)
+      if (l.columns[k].size() > 0) own += l.at[static_cast<Index>(k)] * l.columns[k];
+    return (sd.array().square() + (kForm * own).array().square()).sqrt();
+  }
+
+  Answer weigh(Answer::Kind kind, std::vector<std::string> effects, const Linearised& l, const Smooth& given_sd,
+               double log_prior) const {
+    const Columns c = columns_of(l);
+    const Smooth sd = given_sd.size() > 0 ? given_sd : evidence_.floor();
+    const auto of = [&](const std::vector<char>& use) {
+      return Evidence::posterior(evidence_.reduce(l.statistics, c.columns, use, sd), c.chosen, c.mean()).log_evidence;
     };
-    const Linearised nominal =
-        fitter_.linearise(plain, plain.start(), Directions{MatrixXd(plain.size(), 0), VectorXd(0)});
-    add(Answer::Kind::none, nominal, false, 0, 0);
-    add(Answer::Kind::parameters, d.parameters.point, true, 0, 0);
-    for (const double size : kUnknownSizes) add(Answer::Kind::unknown, d.parameters.point, true, size, 0);
+    Answer a;
+    a.kind = kind;
+    a.effects = std::move(effects);
+    a.log_evidence = of(all_);
+    for (std::size_t f = 0; f < all_.size(); ++f) {
+      std::vector<char> others = all_;
+      others[f] = 0;
+      a.log_held_out += a.log_evidence - of(others);
+    }
+    a.log_evidence += log_prior;
+    return a;
   }
 
-  /// What every effect would gain beside a fit, as far as a linear model sees: sizes step from 0, shapes stay where they are.
-  std::vector<Screened> screen(const Hypothesis& base, const Fit& fit, const std::vector<std::string>& beside) const {
+  /// Gives single functions of the regime in single channels more room than every model needs, as long as that pays.
+  Answer explain_freely() const {
+    const Linearised& l = parameters_.point;
+    const Columns c = columns_of(l);
+    Smooth sd = evidence_.floor();
+    const auto of = [&](const Smooth& room) {
+      return Evidence::posterior(evidence_.reduce(l.statistics, c.columns, all_, room), c.chosen, c.mean())
+          .log_evidence;
+    };
+    const Index q = evidence_.basis().size();
+    double now = of(sd);
+    Answer a;
+    a.kind = Answer::Kind::unknown;
+    Statistics settled = l.statistics;  // with the columns where they are most probable
+    {
+      const Posterior p = Evidence::posterior(evidence_.reduce(l.statistics, c.columns, all_, sd), c.chosen, c.mean());
+      for (std::size_t k = 0; k < c.columns.size(); ++k)
+        evidence_.add(-p.mean[static_cast<Index>(k)], *c.columns[k], settled);
+    }
+    std::vector<Term> terms;
+    for (int n = 0; n < kMostTerms; ++n) {
+      Term best{0, 0, 0, 0};
+      for (int channel = 0; channel < kChannels; ++channel)
+        for (Index i = 0; i < q; ++i)
+          for (const double share : kUnexplained) {
+            const double gain = evidence_.local_gain(settled, all_, sd, channel, static_cast<int>(i), share);
+            if (gain > best.gain) best = {channel, static_cast<int>(i), share, gain};
+          }
+      if (best.gain <= 0) break;
+      Smooth room = sd;
+      for (int k = 0; k < kCoefficients; ++k) {
+        const int g = best.channel * kCoefficients + k;
+        room(g, best.function) = std::hypot(sd(g, best.function), best.share * evidence_.signal(g));
+      }
+      const double next = of(room) - std::log(static_cast<double>(kChannels * q * std::size(kUnexplained)));
+      if (next < now) break;
+      best.gain = next - now;
+      now = next;
+      sd = room;
+      terms.push_back(best);
+    }
+    if (std::getenv("GAP_DEBUG"))
+      for (const Term& t : terms)
+        std::printf("  term %-12s %-24s %.2f gains %.1f\n", channel_name(t.channel),
+                    evidence_.basis().name(t.function).c_str(), t.share, t.gain);
+    a.terms = std::move(terms);
+    a.log_evidence = now + std::log(kPriorUnknown);
+    return a;
+  }
+
+  /// What every effect would gain beside others, as far as a linear model sees: sizes step from 0, shapes stay.
+  std::vector<Screened> screen(const std::vector<std::string>& beside, const Fit& fit) const {
     struct Column {
       std::size_t effect;
       Index unknown;
+      Smooth change;
     };
     std::vector<std::string> names;
+    std::vector<std::vector<Unknown>> unknowns;
     std::vector<Column> columns;
     std::vector<Candidate> candidates;
-    std::vector<std::vector<Unknown>> unknowns;
     for (const model::EffectEntry& e : model::effects()) {
       const std::string id = e.info.id;
       if (std::ranges::count(options_.withheld, id) || std::ranges::count(beside, id)) continue;
-      const Hypothesis h(uncertain_, {id});
-      VectorXd at(h.size());
-      at << fit.point.at.head(base.shared()), VectorXd::Zero(h.size() - base.shared());
-      for (Index i = h.shared(); i < h.size(); ++i) {
+      std::vector<std::string> set = beside;
+      set.push_back(id);
+      const Hypothesis h(uncertain_, set);
+      const Index first = fit.point.at.size();
+      VectorXd at = h.start();
+      at.head(first) = fit.point.at;
+      for (Index i = first; i < h.size(); ++i) {
         if (!h.unknowns()[static_cast<std::size_t>(i)].size) continue;
         VectorXd there = at;
         there[i] = kEffectReach;
-        columns.push_back({names.size(), i - h.shared()});
+        columns.push_back({names.size(), i - first, {}});
         candidates.push_back(h.candidate(there));
       }
       names.push_back(id);
       unknowns.push_back(unknowns_of(id));
     }
     std::vector<Signature> rows = fitter_.residuals(candidates);
-    std::vector<const Signature*> used;
-    std::vector<int> shared;
-    std::vector<double> shared_mean;
-    const Linearised& l = fit.point;
-    for (std::size_t k = 0; k < l.columns.size(); ++k) {
-      if (l.columns[k] == nullptr) continue;
-      shared.push_back(static_cast<int>(used.size()));
-      used.push_back(l.columns[k].get());
-      shared_mean.push_back(-l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
-    }
+    Columns c = columns_of(fit.point);
+    const std::vector<int> base = c.chosen;
     std::vector<int> column_of(columns.size(), -1);
-    for (std::size_t c = 0; c < columns.size(); ++c) {
-      if (rows[c].empty()) continue;
-      for (std::size_t f = 0; f < rows[c].size(); ++f)
-        for (std::size_t i = 0; i < rows[c][f].size(); ++i)
-          rows[c][f][i] = (l.residual[f][i] - rows[c][f][i]) / kEffectReach;
-      evidence_.smooth(rows[c]);
-      column_of[c] = static_cast<int>(used.size());
-      used.push_back(&rows[c]);
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      columns[i].change = change(fit.point.residual, std::move(rows[i]), kEffectReach);
+      if (columns[i].change.size() == 0) continue;
+      column_of[i] = static_cast<int>(c.columns.size());
+      c.add(columns[i].change, 0);
     }
-    const Reduced reduced = evidence_.reduce(evidence_.grams(l.residual, used), all_flights(), 0);
-    const auto solve = [&](const std::vector<int>& more) {
-      std::vector<int> chosen = shared;
-      std::vector<double> mean = shared_mean;
-      for (const int c : more) chosen.push_back(c), mean.push_back(0);
-      return Evidence::posterior(reduced, chosen,
-                                 Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())),
-                                 VectorXd::Ones(static_cast<Index>(mean.size())));
+    const Reduced reduced = evidence_.reduce(fit.point.statistics, c.columns, all_, evidence_.floor());
+    const VectorXd mean = c.mean();
+    const auto solve = [&](const std::vector<std::size_t>& own) {
+      std::vector<int> chosen = base;
+      for (const std::size_t i : own) chosen.push_back(column_of[i]);
+      return Evidence::posterior(reduced, chosen, mean(chosen));
     };
     const double without = solve({}).log_evidence;
     std::vector<Screened> ranking;
     for (std::size_t e = 0; e < names.size(); ++e) {
-      // of sizes with one sign, those that come out on the other are none
       std::vector<std::size_t> own;
-      for (std::size_t c = 0; c < columns.size(); ++c)
-        if (columns[c].effect == e && column_of[c] >= 0) own.push_back(c);
+      for (std::size_t i = 0; i < columns.size(); ++i)
+        if (columns[i].effect == e && column_of[i] >= 0) own.push_back(i);
       Screened s{names[e], 0, VectorXd::Zero(static_cast<Index>(unknowns[e].size()))};
       while (!own.empty()) {
-        std::vector<int> more;
-        for (const std::size_t c : own) more.push_back(column_of[c]);
-        const Posterior p = solve(more);
+        const Posterior p = solve(own);
+        const auto value = [&](std::size_t k) { return p.mean[static_cast<Index>(base.size() + k)]; };
+        const auto one_sided = [&](std::size_t k) {
+          return unknowns[e][static_cast<std::size_t>(columns[own[k]].unknown)].low >= 0;
+        };
+        // of sizes with one sign, the one that comes out farthest on the other is none
         std::size_t worst = own.size();
-        double below = 0;
-        for (std::size_t k = 0; k < own.size(); ++k) {
-          const Unknown& u = unknowns[e][static_cast<std::size_t>(columns[own[k]].unknown)];
-          const double value = p.mean[static_cast<Index>(shared.size() + k)];
-          if (u.low >= 0 && value < below) worst = k, below = value;
-        }
+        for (std::size_t k = 0; k < own.size(); ++k)
+          if (one_sided(k) && value(k) < 0 && (worst == own.size() || value(k) < value(worst))) worst = k;
         if (worst < own.size()) {
           own.erase(own.begin() + static_cast<std::ptrdiff_t>(worst));
           continue;
         }
         s.gain = p.log_evidence - without;
         for (std::size_t k = 0; k < own.size(); ++k) {
-          s.coordinates[columns[own[k]].unknown] = p.mean[static_cast<Index>(shared.size() + k)];
-          if (unknowns[e][static_cast<std::size_t>(columns[own[k]].unknown)].low >= 0) s.gain += std::log(2.0);
+          s.coordinates[columns[own[k]].unknown] = value(k);
+          if (one_sided(k)) s.gain += std::log(2.0);
         }
         break;
       }
@@ -212,64 +310,74 @@ class Diagnoser {
     }
     std::ranges::sort(ranking, std::greater{}, &Screened::gain);
     if (std::getenv("GAP_DEBUG"))
-      for (const Screened& s : ranking) {
-        std::printf("  screen %-28s %9.1f ", s.effect.c_str(), s.gain);
-        for (Index i = 0; i < s.coordinates.size(); ++i) std::printf(" %.3f", s.coordinates[i]);
-        std::printf("\n");
-      }
-    screened_ = ranking;
+      for (const Screened& s : ranking)
+        if (s.gain > 0) std::printf("  screen %-28s %9.1f  %.3f\n", s.effect.c_str(), s.gain, s.coordinates[0]);
     return ranking;
   }
 
-  Answer fit_effects(const std::vector<std::string>& effects, const Fit& parameters) const {
+  /// Where a fit left its effects, to go on from.
+  std::vector<Screened> screened_of(const Answer& a) const {
+    std::vector<Screened> list;
+    Index at = Hypothesis(uncertain_, {}).size();
+    for (const std::string& e : a.effects) {
+      const auto n = static_cast<Index>(unknowns_of(e).size());
+      list.push_back({e, 0, a.fit.point.at.segment(at, n)});
+      at += n;
+    }
+    return list;
+  }
+
+  Answer fit_effects(const std::vector<Screened>& set) const {
+    std::vector<std::string> effects;
+    for (const Screened& s : set) effects.push_back(s.effect);
     const Hypothesis h(uncertain_, effects);
     VectorXd start = h.start();
-    start.head(h.shared()) = parameters.point.at.head(h.shared());
+    start.head(h.shared()) = parameters_.point.at.head(h.shared());
     Index at = h.shared();
-    for (const std::string& e : effects) {
-      const auto s = std::ranges::find(screened_, e, &Screened::effect);
-      start.segment(at, s->coordinates.size()) = 0.7 * s->coordinates;
-      at += s->coordinates.size();
+    for (const Screened& s : set) {
+      start.segment(at, s.coordinates.size()) = s.coordinates;
+      at += s.coordinates.size();
     }
-    Answer a;
-    a.kind = Answer::Kind::effect;
-    a.effects = effects;
-    a.fit = fitter_.fit(h, h.bounded(start), parameters, 5);
-    const Linearised& l = a.fit.point;
-    std::vector<const Signature*> columns;
-    std::vector<int> chosen;
-    std::vector<double> mean;
-    for (std::size_t k = 0; k < l.columns.size(); ++k) {
-      if (l.columns[k] == nullptr) continue;
-      chosen.push_back(static_cast<int>(columns.size()));
-      columns.push_back(l.columns[k].get());
-      mean.push_back(-l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
+    Fit fit = fitter_.fit(h, h.bounded(start), parameters_, 6);
+    if (fit.point.residual.empty()) {
+      Answer none;
+      none.kind = Answer::Kind::effect;
+      none.effects = effects;
+      none.log_evidence = -1e300;
+      return none;
     }
-    const Grams grams = evidence_.grams(l.residual, columns);
-    std::tie(a.log_evidence, a.log_held_out) =
-        weigh_point(l, grams, chosen, Eigen::Map<const VectorXd>(mean.data(), static_cast<Index>(mean.size())), 0);
+    double log_prior = std::log(kPriorEffect / static_cast<double>(model::effects().size()));
+    for (std::size_t i = 1; i < set.size(); ++i)
+      log_prior += std::log(kPriorFurther / static_cast<double>(model::effects().size()));
+    for (Index i = h.shared(); i < h.size(); ++i) {
+      const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+      if (u.size && u.low >= 0) log_prior += std::log(2.0);
+    }
+    Answer a = weigh(Answer::Kind::effect, effects, fit.point, eta_sd(fit.point, h.shared()), log_prior);
+    a.fit = std::move(fit);
     return a;
   }
 
-  void weigh(Diagnosis& d) const {
+  void normalise(Diagnosis& d) const {
     double most = -1e300, sum = 0;
     for (const Answer& a : d.answers) most = std::max(most, a.log_evidence);
     for (Answer& a : d.answers) sum += a.probability = std::exp(a.log_evidence - most);
     for (Answer& a : d.answers) a.probability /= sum;
-    std::ranges::sort(d.answers, std::greater{}, &Answer::probability);
+    std::ranges::sort(d.answers, std::greater{}, &Answer::log_evidence);
   }
 
   void progress(double share, const std::string& what) const {
     if (options_.progress) options_.progress(share, what);
   }
 
-  const std::vector<CarriedFlight>& flights_;
   const sim::Randomisation& uncertain_;
   const DiagnoseOptions& options_;
   int threads_;
+  std::vector<char> all_;
   mutable Evidence evidence_;
   Fitter fitter_;
-  mutable std::vector<Screened> screened_;
+  Fit parameters_;
+  std::vector<Smooth> background_;
 };
 
 }  // namespace

@@ -10,6 +10,13 @@
 
 namespace flappy::gap {
 
+/// What no entry explains: a smooth function of the regime in a channel.
+struct Term {
+  int channel = 0, function = 0;  ///< of the basis
+  double share = 0;               ///< of the signal, how large it may be
+  double gain = 0;                ///< nats
+};
+
 /// What explains the flights, one of several answers that exclude each other.
 struct Answer {
   enum class Kind { none, parameters, effect, unknown } kind = Kind::parameters;
@@ -17,7 +24,8 @@ struct Answer {
   double log_evidence = 0;  ///< of all flights
   double log_held_out = 0;  ///< of every flight given the others, summed
   double probability = 0;
-  Fit fit;  ///< of effects and parameters
+  std::vector<Term> terms;  ///< of an unknown cause
+  Fit fit;                  ///< of effects and parameters
 };
 
 struct DiagnoseOptions {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace flappy::gap {
 namespace {
@@ -49,11 +48,32 @@ Evidence::Evidence(const std::vector<CarriedFlight>& flights) : flights_(flights
   }
   Signature declared;
   for (std::size_t f = 0; f < flights.size(); ++f) declared.push_back(flights[f].declared_noise(f + 1));
+  const Index q = basis_.size();
+  for (int channel = 0; channel < kChannels; ++channel) {
+    MatrixXd normal = MatrixXd::Identity(q, q) * 1e-12;
+    double n = 0;
+    for (std::size_t f = 0; f < flights.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool) {
+        const auto b = basis_.values(f).row(static_cast<Index>(j));
+        normal.noalias() += b.transpose() * b;
+        n += 1;
+      });
+    normal.diagonal().array() += kLooseRidge * n;
+    plain_inverse_.push_back(normal.inverse());
+  }
   find_noise(declared, Find::declared);
+  sum_basis();
 }
 
-void Evidence::learn_weights(const Signature& residual) { find_noise(residual, Find::weights); }
-void Evidence::learn_noise(const Signature& residual) { find_noise(residual, Find::noise); }
+void Evidence::learn_weights(const Signature& residual) {
+  find_noise(residual, Find::weights);
+  sum_basis();
+}
+
+void Evidence::learn_noise(const Signature& residual) {
+  find_noise(residual, Find::noise);
+  sum_basis();
+}
 
 /// Calls use(beat, whether the one before it counts) for the beats of a flight that a channel covers.
 template <class Use>
@@ -73,19 +93,15 @@ void Evidence::find_noise(const Signature& residual, Find what) {
   for (int g = 0; g < kGroups; ++g) {
     const int channel = g / kCoefficients;
     if (!has_rows(channel, g % kCoefficients)) continue;
-    MatrixXd normal = MatrixXd::Zero(q, q);
     VectorXd right = VectorXd::Zero(q);
     double n = 0;
     for (std::size_t f = 0; f < flights_.size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool) {
-        const auto b = basis_.values(f).row(static_cast<Index>(j));
-        normal.noalias() += b.transpose() * b;
-        right += residual[f][row_of(j, g)] * b.transpose();
+        right += residual[f][row_of(j, g)] * basis_.values(f).row(static_cast<Index>(j)).transpose();
         n += 1;
       });
     if (n == 0) continue;
-    normal.diagonal().array() += kLooseRidge * n;
-    const VectorXd eta = normal.ldlt().solve(right);
+    const VectorXd eta = plain_inverse_[static_cast<std::size_t>(channel)] * right;
     const auto left = [&](std::size_t f, std::size_t j) {
       return residual[f][row_of(j, g)] - basis_.values(f).row(static_cast<Index>(j)).dot(eta);
     };
@@ -122,122 +138,164 @@ void Evidence::find_noise(const Signature& residual, Find what) {
   }
 }
 
-void Evidence::smooth(Signature& rows) const {
-  const Index q = basis_.size();
-  for (int channel = 0; channel < kChannels; ++channel) {
-    MatrixXd normal = MatrixXd::Zero(q, q), right = MatrixXd::Zero(q, kCoefficients);
-    double n = 0;
-    for (std::size_t f = 0; f < flights_.size(); ++f)
-      for_rows(f, channel, [&](std::size_t j, bool) {
-        const auto b = basis_.values(f).row(static_cast<Index>(j));
-        const Eigen::Map<const Eigen::RowVectorXd> y(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
-        normal.noalias() += b.transpose() * b;
-        right.noalias() += b.transpose() * y;
-        n += 1;
-      });
-    if (n == 0) continue;
-    normal.diagonal().array() += kLooseRidge * n;
-    const MatrixXd eta = normal.ldlt().solve(right);
-    for (std::size_t f = 0; f < flights_.size(); ++f)
-      for_rows(f, channel, [&](std::size_t j, bool) {
-        Eigen::Map<Eigen::RowVectorXd> y(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
-        y = basis_.values(f).row(static_cast<Index>(j)) * eta;
-      });
-  }
+/// Calls use(beat, row of the basis, its share of the beat before, whitened) in a group.
+template <class Use>
+void Evidence::for_whitened(std::size_t flight, int group, const Use& use) const {
+  const Group& g = groups_[static_cast<std::size_t>(group)];
+  for_rows(flight, group / kCoefficients, [&](std::size_t j, bool before) {
+    const double scale = std::sqrt(weights_[flight][row_of(j, group)]) / g.sd;
+    if (before) use(j, scale, scale * g.past);
+    else use(j, scale * std::sqrt(1 - g.past * g.past), 0.0);
+  });
 }
 
-Grams Evidence::grams(const Signature& residual, const std::vector<const Signature*>& columns) const {
-  const Index q = basis_.size(), k = static_cast<Index>(columns.size()), width = q + k + 1;
-  Grams result;
-  result.basis = static_cast<int>(q);
-  result.columns = static_cast<int>(k);
-  result.sums.assign(flights_.size(), std::vector<MatrixXd>(kGroups));
-  result.constant.assign(flights_.size(), 0);
+void Evidence::sum_basis() {
+  const Index q = basis_.size();
+  normal_.assign(flights_.size(), std::vector<MatrixXd>(kGroups, MatrixXd::Zero(q, q)));
   for (std::size_t f = 0; f < flights_.size(); ++f) {
-    std::vector<double> constants(kGroups, 0);
-#pragma omp parallel for schedule(dynamic) num_threads(2)
+    const MatrixXd& basis = basis_.values(f);
     for (int g = 0; g < kGroups; ++g) {
-      const Group& group = groups_[static_cast<std::size_t>(g)];
-      const int channel = g / kCoefficients;
-      if (!has_rows(channel, g % kCoefficients)) {
-        result.sums[f][static_cast<std::size_t>(g)] = MatrixXd::Zero(width, width);
-        continue;
-      }
-      MatrixXd z(static_cast<Index>(flights_[f].beats()), width);
+      if (!has_rows(g / kCoefficients, g % kCoefficients)) continue;
+      MatrixXd rows(static_cast<Index>(flights_[f].beats()), q);
       Index n = 0;
-      VectorXd now(width), past = VectorXd::Zero(width);
-      for_rows(f, channel, [&](std::size_t j, bool before) {
-        now.head(q) = basis_.values(f).row(static_cast<Index>(j));
-        for (Index i = 0; i < k; ++i) now[q + i] = (*columns[static_cast<std::size_t>(i)])[f][row_of(j, g)];
-        now[q + k] = residual[f][row_of(j, g)];
-        const double weight = weights_[f][row_of(j, g)], scale = std::sqrt(weight) / group.sd;
-        if (before) z.row(n) = scale * (now - group.past * past).transpose();
-        else z.row(n) = scale * std::sqrt(1 - group.past * group.past) * now.transpose();
-        constants[static_cast<std::size_t>(g)] += std::log(scale / std::sqrt(2 * std::numbers::pi));
-        past = now;
+      for_whitened(f, g, [&](std::size_t j, double now, double past) {
+        const auto i = static_cast<Index>(j);
+        if (past != 0) rows.row(n) = now * basis.row(i) - past * basis.row(i - 1);
+        else rows.row(n) = now * basis.row(i);
         ++n;
       });
-      const auto used = z.topRows(n);
-      MatrixXd sum = MatrixXd::Zero(width, width);
-      if (n > 0) sum.selfadjointView<Eigen::Lower>().rankUpdate(used.transpose());
-      sum = sum.selfadjointView<Eigen::Lower>();
-      // what is no smooth function of the regime is noise, whatever the hypothesis
-      MatrixXd smooth = sum.topLeftCorner(q, q);
-      smooth.diagonal().array() += kLooseRidge * static_cast<double>(n) + 1e-12;
-      const VectorXd right = sum.block(0, q + k, q, 1);
-      sum(q + k, q + k) = right.dot(smooth.ldlt().solve(right));
-      result.sums[f][static_cast<std::size_t>(g)] = std::move(sum);
+      if (n == 0) continue;
+      const auto used = rows.topRows(n);
+      normal_[f][static_cast<std::size_t>(g)].selfadjointView<Eigen::Lower>().rankUpdate(used.transpose());
+      normal_[f][static_cast<std::size_t>(g)] =
+          MatrixXd(normal_[f][static_cast<std::size_t>(g)].selfadjointView<Eigen::Lower>());
     }
-    for (const double c : constants) result.constant[f] += c;
+  }
+}
+
+Smooth Evidence::smooth(const Signature& rows) const {
+  const Index q = basis_.size();
+  Smooth result = Smooth::Zero(kGroups, q);
+  for (int channel = 0; channel < kChannels; ++channel) {
+    MatrixXd right = MatrixXd::Zero(q, kCoefficients);
+    for (std::size_t f = 0; f < flights_.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool) {
+        const Eigen::Map<const Eigen::RowVectorXd> y(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
+        right.noalias() += basis_.values(f).row(static_cast<Index>(j)).transpose() * y;
+      });
+    result.middleRows(channel * kCoefficients, kCoefficients) =
+        (plain_inverse_[static_cast<std::size_t>(channel)] * right).transpose();
   }
   return result;
 }
 
-Reduced Evidence::reduce(const Grams& grams, const std::vector<char>& use, double unexplained) const {
-  const Index q = grams.basis, k = grams.columns + 1;
-  Reduced result{MatrixXd::Zero(k, k), 0};
-  for (std::size_t f = 0; f < use.size(); ++f)
-    if (use[f]) result.log_scale += grams.constant[f];
+Statistics Evidence::statistics(const Signature& residual) const {
+  const Index q = basis_.size();
+  Statistics s{{flights_.size(), std::vector<VectorXd>(kGroups, VectorXd::Zero(q))}};
+  for (std::size_t f = 0; f < flights_.size(); ++f) {
+    const MatrixXd& basis = basis_.values(f);
+    for (int g = 0; g < kGroups; ++g) {
+      if (!has_rows(g / kCoefficients, g % kCoefficients)) continue;
+      VectorXd& sum = s.sums[f][static_cast<std::size_t>(g)];
+      for_whitened(f, g, [&](std::size_t j, double now, double past) {
+        const auto i = static_cast<Index>(j);
+        const double y = now * residual[f][row_of(j, g)] - (past != 0 ? past * residual[f][row_of(j - 1, g)] : 0);
+        sum += (now * y) * basis.row(i).transpose();
+        if (past != 0) sum -= (past * y) * basis.row(i - 1).transpose();
+      });
+    }
+  }
+  return s;
+}
+
+void Evidence::add(double share, const Smooth& change, Statistics& to) const {
+  for (std::size_t f = 0; f < flights_.size(); ++f)
+    for (int g = 0; g < kGroups; ++g)
+      to.sums[f][static_cast<std::size_t>(g)] +=
+          share * (normal_[f][static_cast<std::size_t>(g)] * change.row(g).transpose());
+}
+
+Smooth Evidence::floor(double unexplained) const {
+  Smooth sd(kGroups, basis_.size());
+  for (int g = 0; g < kGroups; ++g)
+    for (int i = 0; i < basis_.size(); ++i)
+      sd(g, i) = groups_[static_cast<std::size_t>(g)].signal * std::hypot(basis_.floor(i), unexplained);
+  return sd;
+}
+
+Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smooth*>& columns,
+                         const std::vector<char>& use, const Smooth& eta_sd) const {
+  const Index q = basis_.size(), k = static_cast<Index>(columns.size());
+  Reduced result{MatrixXd::Zero(k + 1, k + 1), 0};
   for (int g = 0; g < kGroups; ++g) {
-    MatrixXd sum = MatrixXd::Zero(q + k, q + k);
-    for (std::size_t f = 0; f < use.size(); ++f)
-      if (use[f]) sum += grams.sums[f][static_cast<std::size_t>(g)];
-    if (sum(0, 0) == 0) continue;  // nothing was seen
+    MatrixXd normal = MatrixXd::Zero(q, q);
+    VectorXd right = VectorXd::Zero(q);
+    for (std::size_t f = 0; f < use.size(); ++f) {
+      if (!use[f]) continue;
+      normal += normal_[f][static_cast<std::size_t>(g)];
+      right += residual.sums[f][static_cast<std::size_t>(g)];
+    }
+    if (normal(0, 0) == 0) continue;  // nothing was seen
+    MatrixXd change(q, k + 1), sums(q, k + 1);
+    for (Index i = 0; i < k; ++i) change.col(i) = columns[static_cast<std::size_t>(i)]->row(g).transpose();
+    sums.leftCols(k) = normal * change.leftCols(k);
+    sums.col(k) = right;
+    MatrixXd ridge = normal;
+    ridge.diagonal().array() += kLooseRidge * normal(0, 0);
+    change.col(k) = ridge.ldlt().solve(right);
     // precision of eta given the rest, in units of its prior's sd
-    const double signal = groups_[static_cast<std::size_t>(g)].signal;
-    VectorXd sd(q);
-    for (Index i = 0; i < q; ++i) sd[i] = signal * std::hypot(basis_.floor(static_cast<int>(i)), unexplained);
-    MatrixXd precision = sd.asDiagonal() * sum.topLeftCorner(q, q) * sd.asDiagonal();
+    const VectorXd sd = eta_sd.row(g).transpose();
+    MatrixXd precision = sd.asDiagonal() * normal * sd.asDiagonal();
     precision.diagonal().array() += 1;
     const Eigen::LLT<MatrixXd> llt(precision);
-    const MatrixXd cross = llt.matrixL().solve(sd.asDiagonal() * sum.block(0, q, q, k));
-    result.sums += sum.bottomRightCorner(k, k) - cross.transpose() * cross;
+    const MatrixXd cross = llt.matrixL().solve(sd.asDiagonal() * sums);
+    result.sums += change.transpose() * sums - cross.transpose() * cross;
     result.log_scale -= llt.matrixLLT().diagonal().array().log().sum();
   }
+  result.sums = (0.5 * (result.sums + result.sums.transpose())).eval();
   return result;
 }
 
-Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& columns, const VectorXd& prior_mean,
-                              const VectorXd& prior_sd) {
-  const Index k = static_cast<Index>(columns.size()), last = reduced.sums.rows() - 1;
-  MatrixXd precision(k, k);
-  VectorXd right(k);
-  for (Index i = 0; i < k; ++i) {
-    for (Index j = 0; j < k; ++j)
-      precision(i, j) = reduced.sums(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]);
-    right[i] = reduced.sums(columns[static_cast<std::size_t>(i)], last);
+double Evidence::local_gain(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd, int channel,
+                            int function, double share) const {
+  const Index q = basis_.size();
+  double gain = 0;
+  for (int g = channel * kCoefficients; g < (channel + 1) * kCoefficients; ++g) {
+    MatrixXd normal = MatrixXd::Zero(q, q);
+    VectorXd right = VectorXd::Zero(q);
+    for (std::size_t f = 0; f < use.size(); ++f) {
+      if (!use[f]) continue;
+      normal += normal_[f][static_cast<std::size_t>(g)];
+      right += residual.sums[f][static_cast<std::size_t>(g)];
+    }
+    if (normal(0, 0) == 0) continue;
+    const VectorXd sd = eta_sd.row(g).transpose();
+    MatrixXd precision = sd.asDiagonal() * normal * sd.asDiagonal();
+    precision.diagonal().array() += 1;
+    const Eigen::LLT<MatrixXd> llt(precision);
+    // one more coefficient, beside those that were there
+    const VectorXd b = normal.col(function), half = llt.matrixL().solve(sd.cwiseProduct(b));
+    const VectorXd half_right = llt.matrixL().solve(sd.cwiseProduct(right));
+    const double more = share * groups_[static_cast<std::size_t>(g)].signal;
+    const double information = more * more * (b[function] - half.squaredNorm());
+    const double score = more * (right[function] - half.dot(half_right));
+    gain += 0.5 * (score * score / (1 + information) - std::log1p(information));
   }
-  const VectorXd weight = prior_sd.array().square().inverse();
-  precision.diagonal() += weight;
-  right += weight.cwiseProduct(prior_mean);
+  return gain;
+}
+
+Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& columns, const VectorXd& prior_mean) {
+  const Index k = static_cast<Index>(columns.size()), last = reduced.sums.rows() - 1;
+  MatrixXd precision = reduced.sums(columns, columns);
+  VectorXd right = reduced.sums(columns, last);
+  precision.diagonal().array() += 1;
+  right += prior_mean;
   const Eigen::LLT<MatrixXd> llt(precision);
   Posterior p;
   p.mean = llt.solve(right);
   p.covariance = llt.solve(MatrixXd::Identity(k, k));
-  p.log_evidence =
-      reduced.log_scale -
-      0.5 * (reduced.sums(last, last) + weight.dot(prior_mean.cwiseProduct(prior_mean)) - right.dot(p.mean)) -
-      llt.matrixLLT().diagonal().array().log().sum() - prior_sd.array().log().sum();
+  p.log_evidence = reduced.log_scale - 0.5 * (reduced.sums(last, last) + prior_mean.squaredNorm() - right.dot(p.mean)) -
+                   llt.matrixLLT().diagonal().array().log().sum();
   return p;
 }
 

@@ -41,17 +41,18 @@ class RegimeBasis {
   std::vector<Eigen::MatrixXd> values_;
 };
 
-/// Sums of products of basis, columns and residual (last), whitened: [flight][group].
-struct Grams {
-  int basis = 0, columns = 0;
-  std::vector<std::vector<Eigen::MatrixXd>> sums;
-  /// Terms of log p that no hypothesis changes: [flight].
-  std::vector<double> constant;
+/// The part of rows that is a smooth function of the regime: coefficients of the basis, [group][basis].
+using Smooth = Eigen::MatrixXd;
+
+/// All that the rows of flights say of smooth residuals: sums over the whitened rows of a group, basis x
+/// residual, [flight][group].
+struct Statistics {
+  std::vector<std::vector<Eigen::VectorXd>> sums;
 };
 
-/// Grams with eta integrated out.
+/// Columns and residual with eta integrated out.
 struct Reduced {
-  Eigen::MatrixXd sums;  ///< columns and residual: square, columns + 1
+  Eigen::MatrixXd sums;  ///< columns, then the residual: square
   double log_scale = 0;  ///< of what was integrated out
 };
 
@@ -70,15 +71,24 @@ class Evidence {
   /// which rows count less. The weights alone are for residuals that are no noise yet.
   void learn_weights(const Signature& residual);
   void learn_noise(const Signature& residual);
-  /// The part of rows that is a smooth function of the regime. Differences of simulations are rough: where in its step a
-  /// wing meets its stop decides on more than the parameter that was moved.
-  void smooth(Signature& rows) const;
-  Grams grams(const Signature& residual, const std::vector<const Signature*>& columns) const;
-  /// `use`: which flights. `unexplained`: share of the signal that eta may reach besides what every model gets wrong.
-  Reduced reduce(const Grams& grams, const std::vector<char>& use, double unexplained) const;
-  /// Of the chosen columns, whose theta has the given prior means and standard deviations.
-  static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns, const Eigen::VectorXd& prior_mean,
-                             const Eigen::VectorXd& prior_sd);
+  /// By least squares. Differences of simulations are rough: where in its step a wing meets its stop decides on more than
+  /// the parameter that was moved. What is no smooth function of the regime is noise, whatever the hypothesis.
+  Smooth smooth(const Signature& rows) const;
+  Statistics statistics(const Signature& residual) const;
+  /// Adds to a residual `share` times a smooth one.
+  void add(double share, const Smooth& change, Statistics& to) const;
+  /// Sd of eta that every model of a wing has, and that of what is unexplained besides: a share of the signal.
+  Smooth floor(double unexplained = 0) const;
+  /// `use`: which flights. `eta_sd`: of eta's coefficients.
+  Reduced reduce(const Statistics& residual, const std::vector<const Smooth*>& columns, const std::vector<char>& use,
+                 const Smooth& eta_sd) const;
+  /// What log p gains when eta of one function in one channel may be as large as a share of the signal besides, while the
+  /// columns stay as they are.
+  double local_gain(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd, int channel,
+                    int function, double share) const;
+  /// Of the chosen columns, whose theta has the given prior means and sd 1.
+  static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns,
+                             const Eigen::VectorXd& prior_mean);
 
   double noise_sd(int group) const { return groups_[static_cast<std::size_t>(group)].sd; }
   double signal(int group) const { return groups_[static_cast<std::size_t>(group)].signal; }
@@ -90,15 +100,20 @@ class Evidence {
     double sd = 1, past = 0, signal = 0;
     double least_sd = 0;  ///< as declared
   };
+  void sum_basis();
   enum class Find { declared, weights, noise };
   void find_noise(const Signature& residual, Find what);
   template <class Use>
   void for_rows(std::size_t flight, int channel, const Use& use) const;
+  template <class Use>
+  void for_whitened(std::size_t flight, int group, const Use& use) const;
 
   const std::vector<CarriedFlight>& flights_;
   RegimeBasis basis_;
   std::vector<Group> groups_;
   Signature weights_;
+  std::vector<Eigen::MatrixXd> plain_inverse_;        ///< of basis x basis, by channel
+  std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< basis x basis of the whitened rows, [flight][group]
 };
 
 }  // namespace flappy::gap

@@ -74,7 +74,7 @@ Directions Fitter::axes(const Hypothesis& hypothesis) {
 }
 
 Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions,
-                             const std::vector<std::shared_ptr<const Signature>>& known) const {
+                             const std::vector<Smooth>& known) const {
   std::vector<Candidate> candidates = {hypothesis.candidate(at)};
   std::vector<double> spans;
   const auto first = static_cast<Index>(known.size());
@@ -87,17 +87,18 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
     candidates.push_back(hypothesis.candidate(down));
   }
   std::vector<Signature> rows = residuals(candidates);
-  Linearised l{at, std::move(directions), std::move(rows[0]), known};
+  Linearised l{at, std::move(directions), std::move(rows[0]), {}, known};
   for (std::size_t d = 0; d < spans.size(); ++d) {
     Signature &up = rows[1 + 2 * d], &down = rows[2 + 2 * d];
     l.columns.emplace_back();
     if (up.empty() || down.empty() || !(spans[d] > 0)) continue;
     for (std::size_t f = 0; f < up.size(); ++f)
       for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / spans[d];
-    evidence_.smooth(up);
-    l.columns.back() = std::make_shared<Signature>(std::move(up));
+    l.columns.back() = evidence_.smooth(up);
   }
-  if (!l.residual.empty()) average(hypothesis, l);
+  if (l.residual.empty()) return l;
+  l.statistics = evidence_.statistics(l.residual);
+  average(hypothesis, l);
   return l;
 }
 
@@ -111,7 +112,7 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
   for (int i = 0; i < kAround; ++i) {
     VectorXd shift = VectorXd::Zero(k);
     for (Index d = 0; d < k; ++d) {
-      if (l.columns[static_cast<std::size_t>(d)] == nullptr) continue;
+      if (l.columns[static_cast<std::size_t>(d)].size() == 0) continue;
       // rows of a Hadamard matrix: every direction goes as often up as down, and no two together
       const int sign = __builtin_popcount(static_cast<unsigned>((d + 1) & i)) % 2 ? -1 : 1;
       shift[d] = kAroundReach * sign * l.directions.reach[d];
@@ -122,39 +123,34 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
   }
   const std::vector<Signature> rows = residuals(candidates);
   double n = 1;
-  for (int i = 0; i < kAround; ++i) {
-    const Signature& r = rows[static_cast<std::size_t>(i)];
-    if (r.empty()) continue;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (rows[i].empty()) continue;
+    Statistics there = evidence_.statistics(rows[i]);
+    for (Index d = 0; d < k; ++d)
+      if (shifts[i][d] != 0 && l.columns[static_cast<std::size_t>(d)].size() > 0)
+        evidence_.add(shifts[i][d], l.columns[static_cast<std::size_t>(d)], there);
+    for (std::size_t f = 0; f < there.sums.size(); ++f)
+      for (std::size_t g = 0; g < there.sums[f].size(); ++g) l.statistics.sums[f][g] += there.sums[f][g];
     n += 1;
-    for (std::size_t f = 0; f < r.size(); ++f) {
-      for (std::size_t j = 0; j < r[f].size(); ++j) l.residual[f][j] += r[f][j];
-      for (Index d = 0; d < k; ++d) {
-        const double shift = shifts[static_cast<std::size_t>(i)][d];
-        if (shift == 0 || l.columns[static_cast<std::size_t>(d)] == nullptr) continue;
-        const Rows& column = (*l.columns[static_cast<std::size_t>(d)])[f];
-        for (std::size_t j = 0; j < column.size(); ++j) l.residual[f][j] += shift * column[j];
-      }
-    }
   }
-  for (Rows& rows_of_flight : l.residual)
-    for (double& x : rows_of_flight) x /= n;
+  for (auto& flight : l.statistics.sums)
+    for (VectorXd& sum : flight) sum /= n;
 }
 
 Posterior Fitter::solve(const Linearised& point) const {
   const Index k = point.directions.reach.size();
-  std::vector<const Signature*> columns;
+  std::vector<const Smooth*> columns;
   std::vector<int> chosen;
   std::vector<Index> seen;
   for (Index d = 0; d < k; ++d) {
-    if (point.columns[static_cast<std::size_t>(d)] == nullptr) continue;
+    if (point.columns[static_cast<std::size_t>(d)].size() == 0) continue;
     chosen.push_back(static_cast<int>(columns.size()));
-    columns.push_back(point.columns[static_cast<std::size_t>(d)].get());
+    columns.push_back(&point.columns[static_cast<std::size_t>(d)]);
     seen.push_back(d);
   }
-  const Reduced reduced = evidence_.reduce(evidence_.grams(point.residual, columns), all_of(flights_.size()), 0);
+  const Reduced reduced = evidence_.reduce(point.statistics, columns, all_of(flights_.size()), evidence_.floor());
   const VectorXd prior_mean = -(point.directions.axes.transpose() * point.at);
-  const Posterior p =
-      Evidence::posterior(reduced, chosen, prior_mean(seen), VectorXd::Ones(static_cast<Index>(seen.size())));
+  const Posterior p = Evidence::posterior(reduced, chosen, prior_mean(seen));
   Posterior all{p.log_evidence, VectorXd::Zero(k), MatrixXd::Identity(k, k)};
   all.mean(seen) = p.mean;
   all.covariance(seen, seen) = p.covariance;
@@ -166,8 +162,8 @@ MatrixXd Fit::covariance() const {
   return point.directions.axes * posterior.covariance * point.directions.axes.transpose();
 }
 
-double Fitter::cost(const Signature& residual, const VectorXd& at) const {
-  const Reduced reduced = evidence_.reduce(evidence_.grams(residual, {}), all_of(flights_.size()), 0);
+double Fitter::cost(const Statistics& residual, const VectorXd& at) const {
+  const Reduced reduced = evidence_.reduce(residual, {}, all_of(flights_.size()), evidence_.floor());
   return 0.5 * (reduced.sums(0, 0) + at.squaredNorm());
 }
 
@@ -180,7 +176,7 @@ Directions Fitter::beside(const Hypothesis& hypothesis, const Fit& parameters) {
   return d;
 }
 
-std::vector<std::shared_ptr<const Signature>> Fitter::known(const Hypothesis& hypothesis, const Fit& parameters) {
+std::vector<Smooth> Fitter::known(const Hypothesis& hypothesis, const Fit& parameters) {
   const auto& columns = parameters.point.columns;
   return {columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(hypothesis.shared())};
 }
@@ -235,12 +231,12 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
       candidates.push_back(hypothesis.candidate(tries.back()));
     }
     const std::vector<Signature> left = residuals(candidates);
-    const double before = cost(l.residual, l.at);
+    const double before = cost(evidence_.statistics(l.residual), l.at);
     std::size_t best = tries.size();
     double best_cost = before;
     for (std::size_t i = 0; i < tries.size(); ++i) {
       if (left[i].empty()) continue;
-      const double c = cost(left[i], tries[i]);
+      const double c = cost(evidence_.statistics(left[i]), tries[i]);
       if (c < best_cost) best = i, best_cost = c;
     }
     if (best == tries.size() || before - best_cost < kWorthwhile) return fit;

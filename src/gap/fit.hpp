@@ -2,8 +2,6 @@
 // differences between vehicles that fly side by side as lanes.
 #pragma once
 
-#include <memory>
-
 #include "gap/evidence.hpp"
 #include "gap/hypothesis.hpp"
 
@@ -19,9 +17,10 @@ struct Directions {
 struct Linearised {
   Eigen::VectorXd at;
   Directions directions;
-  Signature residual;
-  /// Change of the prediction for a unit along each direction; null where it comes apart.
-  std::vector<std::shared_ptr<const Signature>> columns;
+  Signature residual;     ///< empty: the vehicle comes apart
+  Statistics statistics;  ///< of the residual, less rough
+  std::vector<Smooth>
+      columns;  ///< change of the prediction for a unit along each direction; empty: it comes apart there
 };
 
 struct Fit {
@@ -42,7 +41,7 @@ class Fitter {
   std::vector<Signature> residuals(const std::vector<Candidate>& candidates) const;
   /// `known`: columns of the first directions, which need not be found again.
   Linearised linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
-                       const std::vector<std::shared_ptr<const Signature>>& known = {}) const;
+                       const std::vector<Smooth>& known = {}) const;
   /// Every coordinate.
   static Directions axes(const Hypothesis& hypothesis);
   /// From `start` on, at most `iterations` linearisations; empty residual where the vehicle comes apart at once.
@@ -54,12 +53,12 @@ class Fitter {
 
  private:
   static Directions beside(const Hypothesis& hypothesis, const Fit& parameters);
-  static std::vector<std::shared_ptr<const Signature>> known(const Hypothesis& hypothesis, const Fit& parameters);
+  static std::vector<Smooth> known(const Hypothesis& hypothesis, const Fit& parameters);
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
   Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* beside) const;
   void average(const Hypothesis& hypothesis, Linearised& point) const;
   Posterior solve(const Linearised& point) const;
-  double cost(const Signature& residual, const Eigen::VectorXd& at) const;
+  double cost(const Statistics& residual, const Eigen::VectorXd& at) const;
 
   const std::vector<CarriedFlight>& flights_;
   Evidence& evidence_;
