@@ -165,7 +165,9 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
   std::vector<ShiftedVoltage> shifted;
   for (std::size_t i = 0; i < kVehicles; ++i) {
     const Candidate& c = *candidates[std::min(i, candidates.size() - 1)];
-    batch.set_vehicle(i, c.vehicle);
+    model::Vehicle vehicle = c.vehicle;
+    vehicle.air_density_kg_m3 *= r.density_ratio;
+    batch.set_vehicle(i, vehicle);
     batch.reset(i, {});
     shifted.emplace_back(c.lag_s / kStep_s);
   }

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include "model/effects/registry.hpp"
 
@@ -20,6 +18,8 @@ using Eigen::VectorXd;
 constexpr double kEffectReach = 0.4;
 /// An effect that gains less in the linear screening is not fitted; a further effect has to gain more.
 constexpr double kLeastGain = 0, kLeastFurther = 8;
+/// A coordinate of a size that is as good as 0.
+constexpr double kVanished = 0.005;
 /// How well an entry's equation describes the effect of its name: share of its own signature.
 constexpr double kForm = 0.15;
 /// Shares of the signal that a term which no entry explains may have.
@@ -62,11 +62,12 @@ class Diagnoser {
     const double parameters = d.answers[1].log_evidence;
 
     std::vector<Answer> singles;
-    const auto ranking = screen({}, parameters_);
-    for (std::size_t i = 0; i < ranking.size() && static_cast<int>(i) < options_.finalists; ++i) {
-      if (ranking[i].gain < kLeastGain) break;
-      progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + ranking[i].effect);
-      singles.push_back(fit_effects({ranking[i]}));
+    d.screened = screen({}, parameters_);
+    for (std::size_t i = 0; i < d.screened.size() && static_cast<int>(i) < options_.finalists; ++i) {
+      if (d.screened[i].gain < kLeastGain) break;
+      progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + d.screened[i].effect);
+      Answer a = fit_effects({d.screened[i]});
+      if (!vanished(a)) singles.push_back(std::move(a));
     }
     std::ranges::sort(singles, std::greater{}, &Answer::log_evidence);
     // further effects beside the best
@@ -79,7 +80,7 @@ class Diagnoser {
         std::vector<Screened> set = screened_of(best);
         set.push_back(beside.front());
         Answer more = fit_effects(set);
-        if (more.log_evidence < best.log_evidence) break;
+        if (vanished(more) || more.log_evidence < best.log_evidence) break;
         singles.push_back(more);
         best = std::move(more);
       }
@@ -90,12 +91,6 @@ class Diagnoser {
   }
 
  private:
-  struct Screened {
-    std::string effect;
-    double gain = 0;       ///< nats
-    VectorXd coordinates;  ///< of the effect's unknowns, as far as a linear model sees them
-  };
-
   /// Leaves the fit in parameters_ and returns the nominal vehicle's residual under the noise found with it.
   Linearised fit_parameters(const Hypothesis& plain) {
     const Directions none{MatrixXd(plain.size(), 0), VectorXd(0)};
@@ -107,7 +102,7 @@ class Diagnoser {
       fit = fitter_.refit(plain, fit, 3);
     }
     evidence_.learn_noise(fit.point.residual);
-    parameters_ = fitter_.refit(plain, fit, 3);
+    parameters_ = fitter_.refit(plain, fit, 6);
     return fitter_.linearise(plain, plain.start(), none);
   }
 
@@ -222,10 +217,6 @@ class Diagnoser {
       sd = room;
       terms.push_back(best);
     }
-    if (std::getenv("GAP_DEBUG"))
-      for (const Term& t : terms)
-        std::printf("  term %-12s %-24s %.2f gains %.1f\n", channel_name(t.channel),
-                    evidence_.basis().name(t.function).c_str(), t.share, t.gain);
     a.terms = std::move(terms);
     a.log_evidence = now + std::log(kPriorUnknown);
     return a;
@@ -309,9 +300,6 @@ class Diagnoser {
       ranking.push_back(std::move(s));
     }
     std::ranges::sort(ranking, std::greater{}, &Screened::gain);
-    if (std::getenv("GAP_DEBUG"))
-      for (const Screened& s : ranking)
-        if (s.gain > 0) std::printf("  screen %-28s %9.1f  %.3f\n", s.effect.c_str(), s.gain, s.coordinates[0]);
     return ranking;
   }
 
@@ -325,6 +313,21 @@ class Diagnoser {
       at += n;
     }
     return list;
+  }
+
+  /// Whether a fit left one of its effects without any size.
+  bool vanished(const Answer& a) const {
+    if (a.fit.point.residual.empty()) return true;
+    const Hypothesis h(uncertain_, a.effects);
+    for (const std::string& e : a.effects) {
+      double largest = 0;
+      for (Index i = h.shared(); i < h.size(); ++i) {
+        const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+        if (u.effect == e && u.size) largest = std::max(largest, std::abs(a.fit.point.at[i]));
+      }
+      if (largest < kVanished) return true;
+    }
+    return false;
   }
 
   Answer fit_effects(const std::vector<Screened>& set) const {
@@ -343,7 +346,6 @@ class Diagnoser {
       Answer none;
       none.kind = Answer::Kind::effect;
       none.effects = effects;
-      none.log_evidence = -1e300;
       return none;
     }
     double log_prior = std::log(kPriorEffect / static_cast<double>(model::effects().size()));

@@ -28,6 +28,13 @@ struct Answer {
   Fit fit;                  ///< of effects and parameters
 };
 
+/// What an effect would explain beside the fitted parameters, as far as a linear model sees.
+struct Screened {
+  std::string effect;
+  double gain = 0;              ///< nats
+  Eigen::VectorXd coordinates;  ///< of its unknowns
+};
+
 struct DiagnoseOptions {
   int threads = 0;
   int finalists = 8;  ///< effects that are fitted in full
@@ -37,8 +44,9 @@ struct DiagnoseOptions {
 };
 
 struct Diagnosis {
-  std::vector<Answer> answers;  ///< most probable first
-  Fit parameters;               ///< without any effect
+  std::vector<Answer> answers;     ///< most probable first
+  Fit parameters;                  ///< without any effect
+  std::vector<Screened> screened;  ///< all entries, the best first
 };
 
 Diagnosis diagnose(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,

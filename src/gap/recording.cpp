@@ -30,9 +30,10 @@ TorsoAt torso_at(const flight::TorsoMotion& m) {
 
 }  // namespace
 
-Recording::Recording(const std::filesystem::path& folder, flight::FlightLog flight_log, double standing_m)
+Recording::Recording(const std::filesystem::path& folder, flight::FlightLog flight_log, const model::Vehicle& nominal)
     : name(folder.filename().empty() ? folder.parent_path().filename().string() : folder.filename().string()),
-      least_z_m(flight_log.header.ambient.ground_z_m + standing_m + kLeastClearance_m),
+      least_z_m(flight_log.header.ambient.ground_z_m + nominal.extent.below_m + kLeastClearance_m),
+      density_ratio(flight_log.header.ambient.air_density_kg_m3 / nominal.air_density_kg_m3),
       log(std::move(flight_log)),
       track(log, folder),
       begin_s(std::max(track.begin_s(), log.command.t_s.front()) + kMargin_s),
@@ -43,6 +44,7 @@ Recording::Recording(const std::filesystem::path& folder, flight::FlightLog flig
 Recording::Recording(const Recording& other, flight::FlightLog flight_log)
     : name(other.name),
       least_z_m(other.least_z_m),
+      density_ratio(other.density_ratio),
       log(std::move(flight_log)),
       track(log, other.name),
       begin_s(other.begin_s),

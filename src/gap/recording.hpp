@@ -28,7 +28,8 @@ struct Regime {
 
 struct Recording {
   std::string name;
-  double least_z_m = 0;  ///< lower, the ground may be touched
+  double least_z_m = 0;      ///< lower, the ground may be touched
+  double density_ratio = 1;  ///< of the air that day, over that of the vehicle's file
   flight::FlightLog log;
   flight::Track track;
   sim::World world;
@@ -47,9 +48,8 @@ struct Recording {
   std::size_t beats = 0;        ///< whole ones
   std::vector<Regime> regimes;  ///< of each
 
-  /// `standing_m`: height of the origin over the ground when the vehicle stands. InputError naming `folder` where nothing
-  /// of it can be replayed.
-  Recording(const std::filesystem::path& folder, flight::FlightLog flight_log, double standing_m);
+  /// `nominal`: the vehicle that is believed to have flown. InputError naming `folder` where nothing of it can be replayed.
+  Recording(const std::filesystem::path& folder, flight::FlightLog flight_log, const model::Vehicle& nominal);
   /// The same flight, from the same beat to the same beat, with another log of it: one whose sensors were corrected.
   Recording(const Recording& other, flight::FlightLog flight_log);
 

@@ -30,7 +30,7 @@ nlohmann::ordered_json run_diagnose(const DiagnoseCommand& command) {
   const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors, {}).root());
   std::vector<CarriedFlight> flights;
   for (const std::string& folder : command.flights)
-    flights.emplace_back(Recording(folder, flight::read_flight_log(folder), vehicle.extent.below_m));
+    flights.emplace_back(Recording(folder, flight::read_flight_log(folder), vehicle));
   DiagnoseOptions options;
   options.withheld = command.withheld;
   const Diagnosis d = diagnose(flights, uncertain, options);
