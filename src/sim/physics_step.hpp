@@ -40,9 +40,9 @@ struct ActiveEffects {
       using Effect = EffectAt<I>;
       constexpr int kCount = static_cast<int>(Effect::kParameters.size());
       const auto& q = *reinterpret_cast<const T(*)[kCount]>(rows + effect_rows_before<I>());
-      const StateRows<T> state{states + state_row * stride, stride, acts<Effect>(q)};
-      if constexpr (requires { stage(Effect{}, q, state, change); }) {
-        if (set >> I & 1) {
+      if constexpr (requires(const StateRows<T>& state) { stage(Effect{}, q, state, change); }) {
+        if (__builtin_expect(set >> I & 1, 0)) {
+          const StateRows<T> state{states + state_row * stride, stride, acts<Effect>(q)};
           Change changed = change;
           stage(Effect{}, q, state, changed);
           change = where(state.on, changed, change);
@@ -250,7 +250,7 @@ FLAPPY_INLINE void feel(const Parameters<T>& p, State<T>& x, const Sides<WingPos
   x.lift_N = where(held, T(x.lift_N + T(lift - x.lift_N) / p.beat_steps), x.lift_N);
 }
 
-/// What acts on it: air, motors, effects beyond the base model.
+/// What acts on it: air and motors, or what effects begin with.
 template <bool with_effects, class T>
 FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const State<T>& x, const Voltages<T>& voltages,
                                               const Matrix3<T>& R, const Sides<WingPose<T>>& pose,
@@ -263,34 +263,31 @@ FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const Stat
   if constexpr (with_effects) {
     const T stroke_plane = T(0.5) * T(p.left.shoulder_m.z + p.right.shoulder_m.z);
     const Sides<SideFigures<T>>& figures = effects.figures();
-    Acting<true, T> a{
-        {p,
-         x,
-         pose,
-         figures,
-         R,
-         com_m - R * whole.com,
-         v_C - cross(w, whole.com),
-         whole.com,
-         stroke_plane,
-         k.step,
-         k.per_step,
-         k.gravity,
-         k.ground_z,
-         k.ceiling_z,
-         zero,
-         zero,
-         zero,
-         {zero, zero, zero},
-         {v_left, v_right},
-         zero},
-        {hinges_of(p.left, figures.left, voltages.left_V), hinges_of(p.right, figures.right, voltages.right_V)},
-        *effects.own,
-        voltages,
-        {},
-        none};
-    apply_effects(effects, a);
-    return a;
+    return {{p,
+             x,
+             pose,
+             figures,
+             R,
+             com_m - R * whole.com,
+             v_C - cross(w, whole.com),
+             whole.com,
+             stroke_plane,
+             k.step,
+             k.per_step,
+             k.gravity,
+             k.ground_z,
+             k.ceiling_z,
+             zero,
+             zero,
+             zero,
+             {zero, zero, zero},
+             {v_left, v_right},
+             zero},
+            {hinges_of(p.left, figures.left, voltages.left_V), hinges_of(p.right, figures.right, voltages.right_V)},
+            *effects.own,
+            voltages,
+            {},
+            none};
   } else {
     return {
         p, voltages, {air_on_wing<+1>(p.left, pose.left, v_left), air_on_wing<-1>(p.right, pose.right, v_right)}, none};
@@ -310,6 +307,7 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
 
   // what acts on it: air, effects beyond the base model, motors
   auto acting = acts_on<with_effects>(vehicle, x, voltages, R, pose, whole, com_m, effects, k);
+  if constexpr (with_effects) apply_effects(effects, acting);
   const Parameters<T>& p = acting.p;
   Sides<SideLoad<T>> load{load_side<+1>(p.left, x.left, acting.air.left, acting.voltages.left_V),
                           load_side<-1>(p.right, x.right, acting.air.right, acting.voltages.right_V)};
