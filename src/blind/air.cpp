@@ -58,9 +58,10 @@ void Robot::blow() {
       double f = pressure * s.kept[i] * c * normal * speed2;
       double arm = centre * c;
       if (rotational != 0) {
-        // circulation of the pitching strip, which a gust of its own edges limits; at half chord
+        // circulation of the pitching strip, which a gust of its own edges limits; at half chord. On either stroke thetadot > 0
+        // moves the flow at 3/4 chord towards a larger C_N (Sane and Dickinson 2002): it adds to a wing that pitches up
         const double limited = 1 / (1 + std::abs(q.rotation_rad_s) * c / 40);
-        const double extra = rotational * limited * s.kept[i] * s.strips.width_m * c * c * way / per_speed;
+        const double extra = rotational * limited * s.kept[i] * s.strips.width_m * c * c / per_speed;
         arm = std::abs(f + extra) > 1e-9 ? (f * arm + extra * 0.5 * c) / (f + extra) : 0.5 * c;
         f += extra;
       }

@@ -10,7 +10,8 @@ namespace flappy::gap {
 struct DiagnoseCommand {
   std::string vehicle, priors = "configs/gap/priors.toml";
   std::vector<std::string> flights, withheld;
-  std::string out;
+  std::string out;  ///< folder for vehicle_corrected.toml; empty: none
+  int threads = 0;  ///< 0: one for each processor
 };
 
 /// Diagnoses, prints, writes; the machine-readable result.
