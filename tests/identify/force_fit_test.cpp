@@ -198,8 +198,8 @@ TEST(ForceFit, KeepsTheUnseenWhoseNominalValueDoesNotFit) {
   EXPECT_EQ(f.after.total, f.stages[0].error);
 }
 
-// Thirteen amplitudes and eight differences see some directions forty times worse than the default inputs do: slopes over short steps take
-// kinks for knowledge, and then hold 29 of 48.
+// Thirteen amplitudes and eight differences see some directions 35 times worse than all 37 inputs: slopes over short steps
+// take kinks for knowledge there, and intervals then hold 29 of 48.
 TEST(ForceFit, IntervalsHoldTheTruthWhereDirectionsAreWeak) {
   model::Vehicle truth = test::identified();
   std::vector<sim::Input> inputs = default_inputs();
