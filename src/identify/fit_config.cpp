@@ -36,8 +36,8 @@ FitConfig read_fit_config(const std::filesystem::path& path, const model::Vehicl
   if (offered.empty()) root.fail("parameter", "is missing", "at least one [[parameter]]");
   for (const std::string& name : chosen)
     if (std::ranges::count(offered, name) == 0)
-      throw io::InputError("--parameters: " + name + ": not among those of " + path.string() +
-                           io::did_you_mean(name, offered));
+      throw io::InputError("--parameters: \"" + name + "\" is not fitted by " + path.string() +
+                           "; accepted: names of its parameters" + io::did_you_mean(name, offered));
   return config;
 }
 

@@ -1,6 +1,8 @@
 // Vehicles as points of the unit cube of a fit's bounds, judged against a measured map with its standard deviations.
 #pragma once
 
+#include <algorithm>
+
 #include "identify/fit_config.hpp"
 #include "identify/least_squares.hpp"
 #include "identify/measured_map.hpp"

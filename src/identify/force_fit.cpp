@@ -84,8 +84,8 @@ class Fit {
       costs.push_back(cost_);
       result_.ends.push_back({cost_, at});
     }
-    const auto residuals = static_cast<std::size_t>(problem_({nominal}).front().size());
-    result_.starts_agreed = count_agreed(costs, residuals, problem_.size(), result_.sd_declared);
+    result_.starts_agreed =
+        count_agreed(costs, problem_({nominal}).front().size(), nominal.size(), result_.sd_declared);
     return std::ranges::min_element(result_.ends, {}, &End::cost)->point;
   }
 
@@ -104,7 +104,7 @@ std::vector<Eigen::Index> put_back(const Problem& problem, const FitOptions& opt
   std::iota(free.begin(), free.end(), Eigen::Index{0});
   std::vector<Eigen::Index> candidates = free;
   const VectorXd r = problem({point}).front();
-  const double noise = std::max(1.0, r.squaredNorm() / std::max(1.0, static_cast<double>(r.size() - point.size())));
+  const double noise = std::max(1.0, variance_left(r.squaredNorm(), r.size(), point.size()));
   Stage stage{"Gauss-Newton, unseen at nominal"};
   for (;;) {
     const Eigen::Index widest = widest_unseen(problem, point, free, candidates);

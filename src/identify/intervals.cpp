@@ -19,9 +19,9 @@ struct Linear {
 
 Linear linearised(const Problem& problem, const VectorXd& point) {
   const VectorXd left = problem({point}).front();
-  const double freedom = std::max(1.0, static_cast<double>(left.size() - point.size()));
   Linear l;
-  l.misfit = left.squaredNorm() / freedom;
+  l.misfit = variance_left(left.squaredNorm(), left.size(), point.size());
+  const double freedom = std::max(1.0, static_cast<double>(left.size() - point.size()));
   const double noise = std::sqrt(l.misfit > 1 + 3 * std::sqrt(2 / freedom) ? l.misfit : 1);
   l.slopes = jacobian(problem, point, first_steps(point.size()));
   for (int i = 0; i < 2; ++i) l.slopes = jacobian(problem, point, steps_along(l.slopes, point, noise));
@@ -50,6 +50,10 @@ std::vector<WeakDirection> weak_directions(const Eigen::JacobiSVD<MatrixXd>& svd
 
 }  // namespace
 
+double variance_left(double cost, Eigen::Index residuals, Eigen::Index parameters) {
+  return cost / std::max(1.0, static_cast<double>(residuals - parameters));
+}
+
 double explained_by_noise(std::size_t parameters, double noise) {
   // 95 % quantile of chi squared (Wilson and Hilferty), within 3 %
   const auto k = static_cast<double>(parameters);
@@ -57,12 +61,11 @@ double explained_by_noise(std::size_t parameters, double noise) {
   return noise * k * root * root * root;
 }
 
-int count_agreed(const std::vector<double>& costs, std::size_t residuals, std::size_t parameters, bool declared) {
-  const auto n = static_cast<double>(residuals);
+int count_agreed(const std::vector<double>& costs, Eigen::Index residuals, Eigen::Index parameters, bool declared) {
   const double lowest = *std::ranges::min_element(costs);
-  const double noise = declared ? 1 : lowest / std::max(1.0, n - static_cast<double>(parameters));
+  const double noise = declared ? 1 : variance_left(lowest, residuals, parameters);
   constexpr double kNothing = 1e-12;  // of the map's own square: errors of the sixth digit are no difference
-  const double most = 1.01 * lowest + noise + kNothing * n;
+  const double most = 1.01 * lowest + noise + kNothing * static_cast<double>(residuals);
   return static_cast<int>(std::ranges::count_if(costs, [&](double c) { return c <= most; }));
 }
 
@@ -75,7 +78,7 @@ std::vector<End> likely_ends(const Problem& problem, std::vector<End> ends, cons
     ends[i].cost = r[i + 1].squaredNorm();
     lowest = std::min(lowest, ends[i].cost);
   }
-  const double noise = std::max(1.0, lowest / std::max(1.0, static_cast<double>(r[0].size() - point.size())));
+  const double noise = std::max(1.0, variance_left(lowest, r[0].size(), point.size()));
   std::erase_if(ends, [&](const End& e) { return !(e.cost <= lowest + explained_by_noise(problem.size(), noise)); });
   return ends;
 }

@@ -41,12 +41,15 @@ struct End {
   Eigen::VectorXd point;
 };
 
-/// Cost above `lowest` that noise explains in 19 of 20 maps, for `parameters` of them. `noise`: variance of a residual.
+/// Variance of a residual, of those that a fit leaves: 1 where it leaves the declared noise alone.
+double variance_left(double cost, Eigen::Index residuals, Eigen::Index parameters);
+
+/// Cost above the lowest that noise explains in 19 of 20 maps, for `parameters` of them. `noise`: variance of a residual.
 double explained_by_noise(std::size_t parameters, double noise);
 
 /// Starts that ended as low as the lowest, of `residuals` in standard deviations where those are `declared`, else in
 /// units of the map itself.
-int count_agreed(const std::vector<double>& costs, std::size_t residuals, std::size_t parameters, bool declared);
+int count_agreed(const std::vector<double>& costs, Eigen::Index residuals, Eigen::Index parameters, bool declared);
 
 /// Those `ends` whose cost, over what is fitted in the end, noise allows above the lowest of them and of `point`.
 std::vector<End> likely_ends(const Problem& problem, std::vector<End> ends, const Eigen::VectorXd& point);

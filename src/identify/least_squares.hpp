@@ -35,7 +35,8 @@ struct LeastSquares {
   std::size_t evaluations = 0;
 };
 
-/// The lowest cost downhill of `start`, inside the unit cube; infinite where `start` cannot be evaluated. `more`: asked before each iteration, false ends the search.
+/// The lowest cost downhill of `start`, inside the unit cube; infinite where `start` cannot be evaluated. `more`: asked
+/// before each iteration, false ends the search.
 LeastSquares minimise(const Residuals& residuals, const Eigen::VectorXd& start,
                       const std::function<bool(const LeastSquares&)>& more = {});
 

@@ -66,8 +66,8 @@ TEST(LeastSquares, KinksAreNoKnowledge) {
   Eigen::MatrixXd j = jacobian(rough, p, first_steps(2));
   EXPECT_GT(least(j), 3 * exact);
   for (int i = 0; i < 2; ++i) j = jacobian(rough, p, steps_along(j, p, 1));
-  EXPECT_NEAR(least(j), exact,
-              0.05 * exact);  // 40 ripples of 0.02 over two steps of 0.05 leave 1.3 at most, about square
+  // 40 ripples of 0.02 over two steps of 0.05 leave 1.3 at most, about square
+  EXPECT_NEAR(least(j), exact, 0.05 * exact);
 }
 
 TEST(LeastSquares, StepsStayInside) {

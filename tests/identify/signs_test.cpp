@@ -14,10 +14,15 @@
 namespace flappy::identify {
 namespace {
 
-std::string refusal_of(const MeasuredMap& map) {
+std::vector<Wrench> nominal_map(const std::vector<sim::Input>& inputs) {
   const model::Vehicle start = test::nominal();
-  return test::refusal([&] { check_signs(map, force_map<double>(std::span(&start, 1), map.inputs)); });
+  return force_map<double>(std::span(&start, 1), inputs);
 }
+
+std::string refusal_of(const MeasuredMap& map, const std::vector<Wrench>& simulated) {
+  return test::refusal([&] { check_signs(map, simulated); });
+}
+std::string refusal_of(const MeasuredMap& map) { return refusal_of(map, nominal_map(map.inputs)); }
 
 MeasuredMap measured(const std::vector<sim::Input>& inputs) {
   MeasuredMap map = simulate_forces(test::identified(), inputs, {}, 3);
@@ -41,15 +46,12 @@ TEST(Signs, SlopesAreThoseOfAPlane) {
 }
 
 TEST(Signs, OppositeSignsAreRefused) {
-  const model::Vehicle v = test::identified(), start = test::nominal();
-  const std::vector<sim::Input> inputs = default_inputs();
-  const MeasuredMap good = simulate_forces(v, inputs, {}, 3);
-  const auto simulated = force_map<double>(std::span(&start, 1), inputs);
+  const MeasuredMap good = measured(default_inputs());
+  const std::vector<Wrench> simulated = nominal_map(good.inputs);
   const auto refused = [&](const std::function<void(Wrench&)>& change) {
     MeasuredMap bad = good;
-    bad.name = "m.csv";
     for (Wrench& w : bad.wrenches) change(w);
-    return test::refusal([&] { check_signs(bad, simulated); });
+    return refusal_of(bad, simulated);
   };
   EXPECT_EQ(refused([](Wrench&) {}), "accepted");
   const std::array<std::string, 4> starts = {"m.csv:1: force_z_N: thrust against amplitude_V has slope -0.01",
@@ -82,10 +84,11 @@ TEST(Signs, SideForcesHaveThemToo) {
 
 TEST(Signs, OneRowIsRefused) {
   const MeasuredMap good = measured(default_inputs());
+  const std::vector<Wrench> simulated = nominal_map(good.inputs);
   const auto refused = [&](std::size_t row, std::size_t channel) {
     MeasuredMap bad = good;
     bad.wrenches[row][channel] *= -1;
-    return refusal_of(bad);
+    return refusal_of(bad, simulated);
   };
   for (std::size_t row = 0; row < good.size(); ++row)
     EXPECT_TRUE(refused(row, 2).starts_with("m.csv:" + std::to_string(row + 2) + ": force_z_N: thrust is -")) << row;
@@ -121,12 +124,10 @@ TEST(Signs, SmallMapsHaveThemToo) {
   // noise that is not declared may be a fiftieth of all forces: more than these side forces answer
   MeasuredMap plain = good;
   plain.sd.clear();
-  const model::Vehicle start = test::nominal();
-  EXPECT_EQ(check_signs(plain, force_map<double>(std::span(&start, 1), plain.inputs)),
-            (std::vector<std::string>{"force_x_N", "force_y_N"}));
+  EXPECT_EQ(check_signs(plain, nominal_map(plain.inputs)), (std::vector<std::string>{"force_x_N", "force_y_N"}));
   // where no input moves a torque, that is said
   const std::vector<sim::Input> inputs = {{10, 0, 0, 0}, {10, 2, 0, 0}};
-  EXPECT_EQ(check_signs(measured(inputs), force_map<double>(std::span(&start, 1), inputs)),
+  EXPECT_EQ(check_signs(measured(inputs), nominal_map(inputs)),
             (std::vector<std::string>{"torque_y_Nm", "torque_z_Nm", "force_x_N"}));
 }
 
@@ -149,7 +150,7 @@ TEST(Signs, GoodMapsAreNeverRefused) {
           *values[k] = p.low + (p.high - p.low) * uniform();
         }
       }
-      const std::vector<Wrench> simulated = force_map<double>(std::span(&start, 1), inputs);
+      const std::vector<Wrench> simulated = nominal_map(inputs);
       const std::vector<Wrench> maps = force_map<double>(vehicles, inputs, {.moment_point_m = {off, -off, off}});
       for (auto at = maps.begin(); at != maps.end(); at += static_cast<std::ptrdiff_t>(inputs.size())) {
         const double noise = 20 * uniform();
@@ -161,24 +162,23 @@ TEST(Signs, GoodMapsAreNeverRefused) {
             w[k] += map.sd.back()[k] * 2 * (uniform() + uniform() + uniform() - 1.5);  // of that sd
           }
         }
-        EXPECT_EQ(test::refusal([&] { check_signs(map, simulated); }), "accepted") << inputs.size();
+        EXPECT_EQ(refusal_of(map, simulated), "accepted") << inputs.size();
         map.sd.clear();
-        EXPECT_EQ(test::refusal([&] { check_signs(map, simulated); }), "accepted") << inputs.size();
+        EXPECT_EQ(refusal_of(map, simulated), "accepted") << inputs.size();
       }
     }
 }
 
 TEST(Signs, ARowIsNotRefusedForAModelThatFitsNoRow) {
-  const model::Vehicle start = test::nominal();
   const std::vector<sim::Input> inputs = default_inputs();
-  const std::vector<Wrench> simulated = force_map<double>(std::span(&start, 1), inputs);
+  const std::vector<Wrench> simulated = nominal_map(inputs);
   MeasuredMap rough{"m.csv", inputs, simulated};
   for (std::size_t i = 0; i < rough.size(); ++i) {
     constexpr std::array<double, 3> kErrors = {0, 3.2e-3, -3.2e-3};  // roll is 2.1e-3 at most
     rough.wrenches[i][3] += kErrors[i / 3 % 3];
   }
   ASSERT_LT(rough.wrenches[34][3], -0.5 * simulated[34][3]);
-  EXPECT_EQ(refusal_of(rough), "accepted");
+  EXPECT_EQ(refusal_of(rough, simulated), "accepted");
   // a torque that no input of the map moves has the sign of its offset, and that may change
   MeasuredMap amplitudes{"m.csv", {inputs.begin(), inputs.begin() + 13}, {simulated.begin(), simulated.begin() + 13}};
   for (std::size_t i = 0; i < amplitudes.size(); ++i) amplitudes.wrenches[i][5] = i < 10 ? 1e-4 : -2e-4;

@@ -59,6 +59,12 @@ expect_match("stdout" "${out}" "CMA-ES +32 maps.*\n32 inputs, total error 0\\.[0
 run(calibrate --vehicle ${nominal} --truth ${identified} --seeds 1 --json ${WORK}/calibration.json)
 expect_match("calibration" "${out}" "\n1 noise seeds: 11 of 12 inside their 95 % intervals, ")
 expect_keys(${WORK}/calibration.json coverage_percent=NUMBER parameters=ARRAY)
+run(calibrate --vehicle ${nominal} --truth ${identified} --seeds 1 --inputs ${SOURCE}/configs/identify/held_out_inputs.csv
+  --json ${WORK}/calibration.json --parameters left.motor.resistance_ohm)
+expect_match("calibration on other inputs" "${out}" "\n1 noise seeds: [01] of 1 inside ")
+file(READ ${WORK}/calibration.json json)
+string(JSON inputs GET "${json}" inputs)
+expect_equal("inputs" "${inputs}" 16)
 
 # ---- compare-map
 
@@ -86,6 +92,9 @@ expect_equal("points of the beat" "${count}" 201)
 
 expect_refused("${WORK}/map.csv:2: is line 2 of ${WORK}/map.csv; accepted: measurements that are not fitted"
   forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/out.toml --held-out ${WORK}/map.csv)
+file(CREATE_LINK map.csv ${WORK}/link.csv SYMBOLIC)
+expect_refused("--out: ${WORK}/link.csv is what was measured; accepted: another file"
+  forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/link.csv)
 expect_refused("flappy-identify: --seed: Value -1 not in range 0 to 9223372036854775807; see flappy-identify --help"
   simulate-forces --vehicle ${identified} --out ${WORK}/out.csv --seed -1)
 
@@ -103,10 +112,14 @@ expect_refused("${WORK}/few.csv: has 10 inputs for 12 parameters; accepted: at l
   forces ${WORK}/few.csv --vehicle ${nominal} --out ${WORK}/out.toml)
 expect_refused("--moment-point: \"1,2\" is no point; accepted: x,y,z, three numbers of metres from -1 to 1, or com"
   forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/out.toml --moment-point 1,2)
-expect_refused("--parameters: left.motor.resistance: not among those of ${SOURCE}/configs/identify/forces.toml; did you mean \"left.motor.resistance_ohm\"?"
+expect_refused("--parameters: \"left.motor.resistance\" is not fitted by ${SOURCE}/configs/identify/forces.toml; accepted: names of its parameters; did you mean \"left.motor.resistance_ohm\"?"
   forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/out.toml --parameters left.motor.resistance)
 expect_refused("${WORK}/still.csv: amplitude_V: column is missing; accepted: this column, or --amplitude"
   kinematics ${WORK}/still.csv --vehicle ${nominal})
+expect_refused("--from-s: is not before --to-s; accepted: a time before it"
+  kinematics ${WORK}/still.csv --vehicle ${nominal} --amplitude 10 --from-s nan)
+expect_refused("${WORK}/none/beat.svg: cannot be written: No such file or directory"
+  kinematics ${WORK}/still.csv --vehicle ${nominal} --amplitude 10 --csv ${WORK}/none.csv --svg ${WORK}/none/beat.svg)
 foreach(value IN ITEMS 100 nan -5)
   expect_refused("command line: amplitude_V: ${value} is beyond the vehicle's limits; accepted: 0 to 18"
     kinematics ${WORK}/still.csv --vehicle ${nominal} --amplitude ${value})
@@ -120,8 +133,10 @@ list(JOIN rows "\n" rows)
 file(WRITE ${WORK}/high.csv "t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad,amplitude_V\n${rows}\n")
 expect_refused("${WORK}/high.csv: amplitude_V: 19 is beyond the vehicle's limits; accepted: 0 to 18"
   kinematics ${WORK}/high.csv --vehicle ${nominal})
-if(EXISTS ${WORK}/out.toml)
-  message(SEND_ERROR "a refused run left a vehicle")
-endif()
+foreach(left IN ITEMS out.toml out.csv none.csv)
+  if(EXISTS ${WORK}/${left})
+    message(SEND_ERROR "a refused run left ${left}")
+  endif()
+endforeach()
 
 # ---- transitions

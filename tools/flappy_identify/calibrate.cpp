@@ -18,7 +18,7 @@ namespace {
 struct Settings {
   MapSource source;
   FitSettings fit;
-  std::string truth, held_out;
+  std::string truth, inputs, held_out;
   unsigned seeds = 20;
 };
 
@@ -29,6 +29,7 @@ Json run(const Settings& s) {
   const FitConfig config = s.fit.read_config(vehicle);
   const FitOptions options = s.fit.options(s.source.options(vehicle));
   const std::vector<double*> true_values = fitted_values(config, truth);
+  const std::vector<sim::Input> inputs = s.inputs.empty() ? default_inputs() : read_inputs(s.inputs, vehicle.driver);
   const std::vector<sim::Input> held =
       s.held_out.empty() ? std::vector<sim::Input>{} : read_inputs(s.held_out, vehicle.driver);
   struct Count {
@@ -41,7 +42,8 @@ Json run(const Settings& s) {
   unsigned done = 0;
   for (unsigned seed = 1; seed <= s.seeds && !io::interrupted(); ++seed) {
     line.show(static_cast<double>(seed - 1) / s.seeds);
-    const MeasuredMap measured = simulate_forces(truth, default_inputs(), {}, seed, options.map);
+    MeasuredMap measured = simulate_forces(truth, inputs, {}, seed, options.map);
+    measured.name = s.inputs.empty() ? "map of " + s.truth : s.inputs;
     const ForceFit fit = fit_forces(vehicle, measured, config, options);
     after = std::max(after, fit.after.total);
     if (!held.empty()) {
@@ -73,7 +75,8 @@ Json run(const Settings& s) {
               inside, seen, coverage, after);
   if (!held.empty()) std::printf(", held-out inputs at most %.3f %%", held_error);
   std::printf("\n");
-  return {{"seeds", done},
+  return {{"inputs", inputs.size()},
+          {"seeds", done},
           {"seen", seen},
           {"inside", inside},
           {"coverage_percent", coverage},
@@ -93,6 +96,7 @@ Command add_calibrate(CLI::App& program) {
   app->add_option("--seeds", s->seeds, "fits, each of noise of its own")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
+  app->add_option("--inputs", s->inputs, "table of inputs to fit; without it, 37 about hover");
   app->add_option("--held-out-inputs", s->held_out, "table of inputs to judge each fit on");
   s->fit.starts = 1;
   s->fit.add(*app);

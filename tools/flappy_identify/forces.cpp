@@ -189,6 +189,9 @@ Json run(const Settings& s) {
     check_scales(held);
     check_held_out(measured, held);
   }
+  for (const std::string& input : {s.measured, s.held_out})
+    if (std::error_code none; std::filesystem::equivalent(s.out, input, none))
+      throw io::InputError("--out: " + s.out + " is what was measured; accepted: another file");
   { const io::AtomicFile refused_before_the_work(s.out); }
 
   FitOptions options = s.fit.options(s.source.options(vehicle));

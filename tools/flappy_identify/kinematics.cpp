@@ -29,6 +29,9 @@ Json figures(const BeatFigures& f) {
 Json run(const Settings& s) {
   constexpr double kDegree = std::numbers::pi / 180;
   const model::Vehicle vehicle = s.source.read_vehicle();
+  if (!(s.from_s < s.to_s)) throw io::InputError("--from-s: is not before --to-s; accepted: a time before it");
+  for (const std::string& out : {s.csv, s.svg})
+    if (!out.empty()) io::AtomicFile refused_before_the_work(out);
   WingSamples samples = read_wing_samples(s.measured);
   cut(samples, s.from_s, s.to_s);
   if (s.amplitude->count() == 0 && !samples.input)
