@@ -60,14 +60,14 @@ void print(const Answer& a, const sim::Randomisation& uncertain) {
 
 Json run_diagnose(const DiagnoseCommand& command) {
   const model::Vehicle vehicle = model::read_vehicle(command.vehicle);
-  const sim::Randomisation uncertain =
-      sim::read_randomisation(vehicle, io::Config::load(command.priors, {}).root());
+  const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors, {}).root());
   std::vector<CarriedFlight> flights;
   for (const std::string& folder : command.flights)
     flights.emplace_back(Recording(folder, flight::read_flight_log(folder), vehicle));
   for (const std::string& id : command.withheld)
     if (model::effect_index(id.c_str()) < 0)
-      throw io::InputError("command line: --withhold: no effect \"" + id + "\"; accepted: identifiers of docs/effects.md");
+      throw io::InputError("command line: --withhold: no effect \"" + id +
+                           "\"; accepted: identifiers of docs/effects.md");
   DiagnoseOptions options;
   options.threads = command.threads;
   options.withheld = command.withheld;
