@@ -23,8 +23,8 @@ BeatProjection::BeatProjection(const std::vector<double>& beat, const std::vecto
       there[k] += hat;
       Weight w{i, k, {}};
       w.f[0] = hat;
-      for (int h = 1; h <= kHarmonics; ++h) {
-        const double angle = 2 * std::numbers::pi * h * beat[i];
+      for (std::size_t h = 1; h <= kHarmonics; ++h) {
+        const double angle = 2 * std::numbers::pi * static_cast<double>(h) * beat[i];
         w.f[2 * h - 1] = 2 * hat * std::cos(angle);
         w.f[2 * h] = 2 * hat * std::sin(angle);
       }
@@ -35,7 +35,7 @@ BeatProjection::BeatProjection(const std::vector<double>& beat, const std::vecto
   std::vector<double> sorted = all;
   std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
   const double usual = sorted.empty() ? 0 : sorted[sorted.size() / 2];
-  for (std::size_t k = 0; k < beats; ++k) covered_[k] = k >= first && there[k] > (1 - kMissing) * usual;
+  for (std::size_t k = 0; k < beats; ++k) covered_[k] = k >= first && there[k] > (1 - kMissing) * usual ? 1 : 0;
   for (Weight& w : weights_)
     for (double& f : w.f) f /= there[w.beat];
 }

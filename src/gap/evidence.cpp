@@ -42,7 +42,7 @@ Evidence::Evidence(const std::vector<CarriedFlight>& flights) : flights_(flights
     }
     // half its own, half that of its channel: an error of shape moves power between harmonics
     for (int c = 0; c < kCoefficients; ++c) {
-      double& s = groups_[static_cast<std::size_t>(channel * kCoefficients + c)].signal;
+      double& s = groups_[static_cast<std::size_t>(channel) * kCoefficients + static_cast<std::size_t>(c)].signal;
       s = std::sqrt((s + all) / 2);
     }
   }
@@ -183,7 +183,7 @@ Smooth Evidence::smooth(const Signature& rows) const {
         const Eigen::Map<const Eigen::RowVectorXd> y(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
         right.noalias() += basis_.values(f).row(static_cast<Index>(j)).transpose() * y;
       });
-    result.middleRows(channel * kCoefficients, kCoefficients) =
+    result.middleRows(Index{channel} * kCoefficients, kCoefficients) =
         (plain_inverse_[static_cast<std::size_t>(channel)] * right).transpose();
   }
   return result;

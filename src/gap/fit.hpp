@@ -55,8 +55,8 @@ class Fitter {
   static Directions beside(const Hypothesis& hypothesis, const Fit& parameters);
   static std::vector<Smooth> known(const Hypothesis& hypothesis, const Fit& parameters);
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
-  Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* beside) const;
-  void average(const Hypothesis& hypothesis, Linearised& point) const;
+  Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const;
+  void average(const Hypothesis& hypothesis, Linearised& l) const;
   Posterior solve(const Linearised& point) const;
   double cost(const Statistics& residual, const Eigen::VectorXd& at) const;
 

@@ -15,7 +15,6 @@ namespace flappy::gap {
 namespace {
 
 using Eigen::Index;
-namespace fs = std::filesystem;
 
 const std::string kConfigs = FLAPPY_SOURCE_DIR "/configs/";
 
@@ -65,7 +64,7 @@ TEST(BeatRows, ProjectAConstantAndItsHarmonics) {
   EXPECT_FALSE(projection.covers(0)) << "left out";
   EXPECT_FALSE(projection.covers(5)) << "two samples of the middle are more than a tenth of its weight";
   ASSERT_TRUE(projection.covers(3));
-  const double* r = &rows[3 * kCoefficients];
+  const double* r = &rows[std::size_t{3} * kCoefficients];
   const double expected[kCoefficients] = {3, 2, 0, 0, 0, 0, -0.5, 0, 0};
   // over whole samples of a hat, harmonics leak into each other by the square of 1/(2 x 15)
   for (int c = 0; c < kCoefficients; ++c) EXPECT_NEAR(r[c], expected[c], 5e-3) << c;
