@@ -51,7 +51,8 @@ void print(const Answer& a, const sim::Randomisation& uncertain) {
   std::printf("  %6.3f  %-10s", a.probability, kind_name(a.kind));
   for (const std::string& e : a.effects) std::printf(" %s", e.c_str());
   std::printf("\n");
-  for (const auto& [name, v] : effect_values(a, uncertain).items())
+  const Json values = effect_values(a, uncertain);
+  for (const auto& [name, v] : values.items())
     std::printf("            %s %.3g (%.3g to %.3g)\n", name.c_str(), v["value"].get<double>(), v["low"].get<double>(),
                 v["high"].get<double>());
 }
