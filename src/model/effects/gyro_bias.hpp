@@ -16,7 +16,7 @@ struct GyroBias {
   static constexpr std::array<EffectParameter, 4> kParameters{{{"x_rad_s", -0.5, 0.5, 0.03, -0.09, 0.09},
                                                                {"y_rad_s", -0.5, 0.5, 0.03, -0.09, 0.09},
                                                                {"z_rad_s", -0.5, 0.5, 0.03, -0.09, 0.09},
-                                                               {"warm_up_s", 0.5, 600, 10, 3, 60}}};
+                                                               {"warm_up_s", 0.5, 600, 15, 3, 27}}};
 };
 
 }  // namespace FLAPPY_ISA
