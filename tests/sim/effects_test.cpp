@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
+#include <map>
 #include <set>
+#include <sstream>
 #include <string_view>
 
 #include "model/effects/registry.hpp"
@@ -110,6 +113,20 @@ TEST(Effects, StateTheirParameters) {
       else EXPECT_EQ(p.prior_low, 0) << e.info.id << "." << name;
     }
   }
+}
+
+TEST(Effects, AreDocumented) {
+  std::ifstream file(test::source_path("docs/effects.md"));
+  std::map<std::string, std::string> rows;
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("| ")) rows[line.substr(2, line.find(' ', 2) - 2)] = line;
+  for (const EffectEntry& e : effects())
+    for (const EffectParameter& p : e.parameters) {
+      std::ostringstream text;
+      text << "`" << p.name << "` " << p.typical << " (" << p.low << " to " << p.high << "; prior " << p.prior_low
+           << " to " << p.prior_high << ")";
+      EXPECT_NE(rows[e.info.id].find(text.str()), std::string::npos) << e.info.id << ": " << text.str();
+    }
 }
 
 TEST(Effects, VanishExactlyAtSizeZero) {
