@@ -101,7 +101,20 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   Fit fit = fitter.fit(plain, plain.start(), 4);
   evidence.learn_weights(fit.point.residual);
   fit = fitter.refit(plain, fit, 3);
+  const int groups[] = {kTorqueX * kCoefficients, kTorqueZ * kCoefficients + 1, kForceY * kCoefficients,
+                        kStrokeLeft * kCoefficients};
+  std::vector<double> declared;
+  const Rows noise = flights[0].declared_noise(1);
+  for (const int g : groups) {
+    declared.push_back(evidence.noise_sd(g));
+    // an innovation is no larger than the noise it belongs to; neighbours share half of their samples
+    EXPECT_LT(declared.back(), 1.2 * rms(flights[0], noise, g)) << g;
+    EXPECT_GT(declared.back(), 0.4 * rms(flights[0], noise, g)) << g;
+  }
   evidence.learn_noise(fit.point.residual);
+  // what a right model leaves is noise as declared, to the 8 % of a median of 200, and no less by definition
+  for (std::size_t i = 0; i < declared.size(); ++i)
+    EXPECT_LT(evidence.noise_sd(groups[i]), 1.35 * declared[i]) << groups[i];
   fit = fitter.refit(plain, fit, 3);
   const model::Vehicle truth = model::read_vehicle(kConfigs + "vehicles/hummingbird_identified.toml");
   const Eigen::VectorXd mean = fit.mean();
