@@ -6,6 +6,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "flight/rotation.hpp"
+
 namespace flappy::flight {
 namespace {
 
@@ -32,20 +34,6 @@ Matrix3d cross_matrix(const Vector3d& v) {
   Matrix3d m;
   m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
   return m;
-}
-
-Quaterniond exponential(const Vector3d& turn) {
-  const double angle = turn.norm();
-  const double scale = angle < 1e-6 ? 0.5 : std::sin(angle / 2) / angle;
-  Quaterniond q(std::cos(angle / 2), scale * turn.x(), scale * turn.y(), scale * turn.z());
-  return q;
-}
-
-/// The shorter way round.
-Vector3d logarithm(const Quaterniond& q) {
-  const double sine = q.vec().norm(), sign = q.w() < 0 ? -1 : 1;
-  if (sine < 1e-12) return 2 * sign * q.vec();
-  return q.vec() * (sign * 2 * std::atan2(sine, std::abs(q.w())) / sine);
 }
 
 /// Share of a new value in the low-pass that, after the mean over an interval, passes 1/sqrt(2) at the bandwidth; 1

@@ -147,6 +147,10 @@ class Diagnoser {
     return c;
   }
 
+  Posterior posterior(const Linearised& l, const Columns& c, const std::vector<char>& use, const Smooth& sd) const {
+    return Evidence::posterior(evidence_.reduce(l.statistics, c.columns, use, sd), c.chosen, c.mean());
+  }
+
   /// Floor, and what the equations of effects get wrong of themselves.
   Smooth eta_sd(const Linearised& l, Index shared) const {
     Smooth sd = evidence_.floor();
@@ -160,9 +164,7 @@ class Diagnoser {
                double log_prior) const {
     const Columns c = columns_of(l);
     const Smooth sd = given_sd.size() > 0 ? given_sd : evidence_.floor();
-    const auto of = [&](const std::vector<char>& use) {
-      return Evidence::posterior(evidence_.reduce(l.statistics, c.columns, use, sd), c.chosen, c.mean()).log_evidence;
-    };
+    const auto of = [&](const std::vector<char>& use) { return posterior(l, c, use, sd).log_evidence; };
     Answer a;
     a.kind = kind;
     a.effects = std::move(effects);
@@ -181,20 +183,14 @@ class Diagnoser {
     const Linearised& l = parameters_.point;
     const Columns c = columns_of(l);
     Smooth sd = evidence_.floor();
-    const auto of = [&](const Smooth& room) {
-      return Evidence::posterior(evidence_.reduce(l.statistics, c.columns, all_, room), c.chosen, c.mean())
-          .log_evidence;
-    };
     const Index q = evidence_.basis().size();
-    double now = of(sd);
+    const Posterior before = posterior(l, c, all_, sd);
+    double now = before.log_evidence;
     Answer a;
     a.kind = Answer::Kind::unknown;
     Statistics settled = l.statistics;  // with the columns where they are most probable
-    {
-      const Posterior p = Evidence::posterior(evidence_.reduce(l.statistics, c.columns, all_, sd), c.chosen, c.mean());
-      for (std::size_t k = 0; k < c.columns.size(); ++k)
-        evidence_.add(-p.mean[static_cast<Index>(k)], *c.columns[k], settled);
-    }
+    for (std::size_t k = 0; k < c.columns.size(); ++k)
+      evidence_.add(-before.mean[static_cast<Index>(k)], *c.columns[k], settled);
     std::vector<Term> terms;
     for (int n = 0; n < kMostTerms; ++n) {
       Term best{0, 0, 0, 0};
@@ -210,7 +206,8 @@ class Diagnoser {
         const int g = best.channel * kCoefficients + k;
         room(g, best.function) = std::hypot(sd(g, best.function), best.share * evidence_.signal(g));
       }
-      const double next = of(room) - std::log(static_cast<double>(kChannels * q * std::size(kUnexplained)));
+      const double next = posterior(l, c, all_, room).log_evidence -
+                          std::log(static_cast<double>(kChannels * q * std::size(kUnexplained)));
       if (next < now) break;
       best.gain = next - now;
       now = next;

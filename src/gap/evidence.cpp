@@ -18,6 +18,13 @@ constexpr double kMostPast = 0.95;
 
 std::size_t row_of(std::size_t beat, int group) { return beat * kRowsPerBeat + static_cast<std::size_t>(group); }
 
+/// Precision of eta given the rest, in units of its prior's sd.
+Eigen::LLT<MatrixXd> eta_precision(const MatrixXd& normal, const VectorXd& sd) {
+  MatrixXd precision = sd.asDiagonal() * normal * sd.asDiagonal();
+  precision.diagonal().array() += 1;
+  return Eigen::LLT<MatrixXd>(precision);
+}
+
 double median(std::vector<double> v) {
   if (v.empty()) return 0;
   const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
@@ -215,12 +222,24 @@ void Evidence::add(double share, const Smooth& change, Statistics& to) const {
           share * (normal_[f][static_cast<std::size_t>(g)] * change.row(g).transpose());
 }
 
-Smooth Evidence::floor(double unexplained) const {
+Smooth Evidence::floor() const {
   Smooth sd(kGroups, basis_.size());
   for (int g = 0; g < kGroups; ++g)
-    for (int i = 0; i < basis_.size(); ++i)
-      sd(g, i) = groups_[static_cast<std::size_t>(g)].signal * std::hypot(basis_.floor(i), unexplained);
+    for (int i = 0; i < basis_.size(); ++i) sd(g, i) = groups_[static_cast<std::size_t>(g)].signal * basis_.floor(i);
   return sd;
+}
+
+/// Of a group over the chosen flights: basis x basis, and basis x residual.
+std::pair<MatrixXd, VectorXd> Evidence::sums_of(const Statistics& residual, const std::vector<char>& use,
+                                                int group) const {
+  const auto g = static_cast<std::size_t>(group);
+  std::pair<MatrixXd, VectorXd> sums{MatrixXd::Zero(basis_.size(), basis_.size()), VectorXd::Zero(basis_.size())};
+  for (std::size_t f = 0; f < use.size(); ++f) {
+    if (!use[f]) continue;
+    sums.first += normal_[f][g];
+    sums.second += residual.sums[f][g];
+  }
+  return sums;
 }
 
 Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smooth*>& columns,
@@ -228,13 +247,7 @@ Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smo
   const Index q = basis_.size(), k = static_cast<Index>(columns.size());
   Reduced result{MatrixXd::Zero(k + 1, k + 1), 0};
   for (int g = 0; g < kGroups; ++g) {
-    MatrixXd normal = MatrixXd::Zero(q, q);
-    VectorXd right = VectorXd::Zero(q);
-    for (std::size_t f = 0; f < use.size(); ++f) {
-      if (!use[f]) continue;
-      normal += normal_[f][static_cast<std::size_t>(g)];
-      right += residual.sums[f][static_cast<std::size_t>(g)];
-    }
+    const auto [normal, right] = sums_of(residual, use, g);
     if (normal(0, 0) == 0) continue;  // nothing was seen
     MatrixXd change(q, k + 1), sums(q, k + 1);
     for (Index i = 0; i < k; ++i) change.col(i) = columns[static_cast<std::size_t>(i)]->row(g).transpose();
@@ -243,11 +256,8 @@ Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smo
     MatrixXd ridge = normal;
     ridge.diagonal().array() += kLooseRidge * normal(0, 0);
     change.col(k) = ridge.ldlt().solve(right);
-    // precision of eta given the rest, in units of its prior's sd
     const VectorXd sd = eta_sd.row(g).transpose();
-    MatrixXd precision = sd.asDiagonal() * normal * sd.asDiagonal();
-    precision.diagonal().array() += 1;
-    const Eigen::LLT<MatrixXd> llt(precision);
+    const Eigen::LLT<MatrixXd> llt = eta_precision(normal, sd);
     const MatrixXd cross = llt.matrixL().solve(sd.asDiagonal() * sums);
     result.sums += change.transpose() * sums - cross.transpose() * cross;
     result.log_scale -= llt.matrixLLT().diagonal().array().log().sum();
@@ -258,21 +268,12 @@ Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smo
 
 double Evidence::local_gain(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd, int channel,
                             int function, double share) const {
-  const Index q = basis_.size();
   double gain = 0;
   for (int g = channel * kCoefficients; g < (channel + 1) * kCoefficients; ++g) {
-    MatrixXd normal = MatrixXd::Zero(q, q);
-    VectorXd right = VectorXd::Zero(q);
-    for (std::size_t f = 0; f < use.size(); ++f) {
-      if (!use[f]) continue;
-      normal += normal_[f][static_cast<std::size_t>(g)];
-      right += residual.sums[f][static_cast<std::size_t>(g)];
-    }
+    const auto [normal, right] = sums_of(residual, use, g);
     if (normal(0, 0) == 0) continue;
     const VectorXd sd = eta_sd.row(g).transpose();
-    MatrixXd precision = sd.asDiagonal() * normal * sd.asDiagonal();
-    precision.diagonal().array() += 1;
-    const Eigen::LLT<MatrixXd> llt(precision);
+    const Eigen::LLT<MatrixXd> llt = eta_precision(normal, sd);
     // one more coefficient, beside those that were there
     const VectorXd b = normal.col(function), half = llt.matrixL().solve(sd.cwiseProduct(b));
     const VectorXd half_right = llt.matrixL().solve(sd.cwiseProduct(right));
@@ -297,23 +298,6 @@ Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& co
   p.log_evidence = reduced.log_scale - 0.5 * (reduced.sums(last, last) + prior_mean.squaredNorm() - right.dot(p.mean)) -
                    llt.matrixLLT().diagonal().array().log().sum();
   return p;
-}
-
-Signature Evidence::whitened(const Signature& residual) const {
-  Signature result;
-  for (std::size_t f = 0; f < flights_.size(); ++f) {
-    result.emplace_back(residual[f].size(), 0.0);
-    for (int g = 0; g < kGroups; ++g) {
-      if (!has_rows(g / kCoefficients, g % kCoefficients)) continue;
-      const Group& group = groups_[static_cast<std::size_t>(g)];
-      for_rows(f, g / kCoefficients, [&](std::size_t j, bool before) {
-        const double past = before ? group.past * residual[f][row_of(j - 1, g)] : 0;
-        const double scale = before ? 1 : std::sqrt(1 - group.past * group.past);
-        result[f][row_of(j, g)] = scale * (residual[f][row_of(j, g)] - past) / group.sd;
-      });
-    }
-  }
-  return result;
 }
 
 }  // namespace flappy::gap

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <utility>
 #include <vector>
 
 #include "gap/carry.hpp"
@@ -77,8 +78,8 @@ class Evidence {
   Statistics statistics(const Signature& residual) const;
   /// Adds to a residual `share` times a smooth one.
   void add(double share, const Smooth& change, Statistics& to) const;
-  /// Sd of eta that every model of a wing has, and that of what is unexplained besides: a share of the signal.
-  Smooth floor(double unexplained = 0) const;
+  /// Sd of eta that every model of a wing has.
+  Smooth floor() const;
   /// `use`: which flights. `eta_sd`: of eta's coefficients.
   Reduced reduce(const Statistics& residual, const std::vector<const Smooth*>& columns, const std::vector<char>& use,
                  const Smooth& eta_sd) const;
@@ -92,8 +93,6 @@ class Evidence {
 
   double noise_sd(int group) const { return groups_[static_cast<std::size_t>(group)].sd; }
   double signal(int group) const { return groups_[static_cast<std::size_t>(group)].signal; }
-  /// Innovations of a residual over their sd, by flight, group and beat; what a plot or a test of whiteness wants.
-  Signature whitened(const Signature& residual) const;
 
  private:
   struct Group {
@@ -101,6 +100,8 @@ class Evidence {
     double least_sd = 0;  ///< as declared
   };
   void sum_basis();
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> sums_of(const Statistics& residual, const std::vector<char>& use,
+                                                      int group) const;
   enum class Find { declared, weights, noise };
   void find_noise(const Signature& residual, Find what);
   template <class Use>

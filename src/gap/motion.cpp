@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "flight/rotation.hpp"
 #include "gap/check_parts.hpp"
 
 namespace flappy::gap {
@@ -12,14 +13,6 @@ double longest_bridged(const std::vector<double>& t_s) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < t_s.size(); ++i) intervals.push_back(t_s[i] - t_s[i - 1]);
   return std::max(3 * median(intervals), 0.01);
-}
-
-Vector3d rotation_vector(const Quaterniond& q) {
-  const double sine = q.vec().norm();
-  if (sine < 1e-12) return 2 * q.vec() * (q.w() < 0 ? -1 : 1);
-  // the shorter way round
-  const double angle = 2 * std::atan2(q.w() < 0 ? -sine : sine, std::abs(q.w()));
-  return q.vec() * (angle / sine);
 }
 
 Vector3d mean_of(const std::vector<Vector3d>& values) {
@@ -143,7 +136,7 @@ double Motion::roughness_rad() const {
     if (std::max(before, after) > longest_mocap_s_) continue;
     const Quaterniond between =
         attitude(i - 1, Order::wxyz).slerp(before / (before + after), attitude(i + 1, Order::wxyz));
-    squares += rotation_vector(between.conjugate() * attitude(i, Order::wxyz)).squaredNorm() / 3;
+    squares += flight::logarithm(between.conjugate() * attitude(i, Order::wxyz)).squaredNorm() / 3;
     ++count;
   }
   return count > 0 ? std::sqrt(squares / count) : 0;
@@ -161,7 +154,7 @@ std::vector<Window> make_windows(const Motion& motion, double length_s) {
       whole &= end.has_value();
       if (end)
         w.rate_rad_s[static_cast<std::size_t>(order)] =
-            rotation_vector(motion.attitude(i, order).conjugate() * *end) / length_s;
+            flight::logarithm(motion.attitude(i, order).conjugate() * *end) / length_s;
     }
     if (whole) windows.push_back(w);
     const std::size_t last = index_before(t, end_s);

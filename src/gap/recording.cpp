@@ -153,7 +153,7 @@ void Recording::read_regimes() {
     double n = 0, left = 0, right = 0, left_cos = 0, right_cos = 0, left_sin2 = 0, right_sin2 = 0;
   };
   std::vector<Sum> sums(beats);
-  regimes.assign(beats, Regime{0, 0, 0, 0, 0, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), 0, 0});
+  regimes.assign(beats, Regime{0, 0, 0, 0, 0, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), 0});
   std::vector<double> count(beats, 0);
   std::size_t step = 0;
   double from_s = begin_s;
@@ -182,7 +182,6 @@ void Recording::read_regimes() {
     r.position_m += Vector3d(t.position_m);
     const Vector3d x = q * Vector3d::UnitX();
     r.heading_rad = std::atan2(x.y(), x.x());
-    r.tilt_rad = std::acos(std::clamp((q * Vector3d::UnitZ()).z(), -1.0, 1.0));
   }
   for (std::size_t j = 0; j < beats; ++j) {
     const Sum& s = sums[j];

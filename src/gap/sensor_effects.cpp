@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "flight/rotation.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
@@ -15,11 +16,6 @@ using Values = std::map<std::string, double>;
 
 Vector3d vector(const Values& v, const char* x, const char* y, const char* z) {
   return {v.at(x), v.at(y), z ? v.at(z) : 0};
-}
-
-Quaterniond turned_by(const Vector3d& turn) {
-  const double angle = turn.norm();
-  return angle > 0 ? Quaterniond(Eigen::AngleAxisd(angle, turn / angle)) : Quaterniond::Identity();
 }
 
 /// The columns of a vector in a stream.
@@ -40,7 +36,7 @@ void undo_gyro_bias(const Values& v, flight::ImuStream& imu) {
 }
 
 void undo_misalignment(const Values& v, flight::ImuStream& imu) {
-  const Quaterniond back = turned_by(-vector(v, "x_rad", "y_rad", "z_rad"));
+  const Quaterniond back = flight::exponential(-vector(v, "x_rad", "y_rad", "z_rad"));
   const Columns force{imu.accel_x_m_s2, imu.accel_y_m_s2, imu.accel_z_m_s2};
   for (std::size_t i = 0; i < imu.t_s.size(); ++i) force.put(i, back * force.at(i));
 }
@@ -101,7 +97,7 @@ flight::FlightLog without(const EffectValues& effects, flight::FlightLog log) {
   if (const Values* v = given("accelerometer_misalignment")) undo_misalignment(*v, log.imu);
   if (const Values* v = given("mocap_delay")) log.header.mocap.latency_s += v->at("delay_s");
   if (const Values* v = given("mocap_tilt")) {
-    const Quaterniond back = turned_by(-vector(*v, "x_rad", "y_rad", nullptr));
+    const Quaterniond back = flight::exponential(-vector(*v, "x_rad", "y_rad", nullptr));
     change_poses(log.mocap, [&](Vector3d& p, Quaterniond& q) { p = back * p, q = back * q; });
   }
   if (const Values* v = given("marker_offset")) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <random>
 
+#include "flight/rotation.hpp"
+
 namespace flappy::gap {
 namespace {
 
@@ -11,18 +13,6 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr std::size_t kSpan = 3;
-
-Vector3d rotation_vector(const Quaterniond& q) {
-  const double sine = q.vec().norm();
-  if (sine < 1e-12) return 2 * q.vec();
-  return q.vec() * (2 * std::atan2(q.w() < 0 ? -sine : sine, std::abs(q.w())) / sine);
-}
-
-Quaterniond turned_by(const Vector3d& turn) {
-  const double angle = turn.norm();
-  const double scale = angle < 1e-9 ? 0.5 : std::sin(angle / 2) / angle;
-  return {std::cos(angle / 2), scale * turn.x(), scale * turn.y(), scale * turn.z()};
-}
 
 /// Where the IMU alone says the torso is, at the bounds of its intervals.
 struct Reckoned {
@@ -55,7 +45,7 @@ Reckoned reckon(const Recording& r, const std::vector<Vector3d>& force, const st
     const Vector3d a = attitude(k).slerp(0.5, attitude(k + 1)) * force[k] - Vector3d(0, 0, gravity);
     x.position_m.push_back(x.position_m.back() + dt * x.velocity_m_s.back() + dt * dt / 2 * a);
     x.velocity_m_s.push_back(x.velocity_m_s.back() + dt * a);
-    x.attitude.push_back((x.attitude.back() * turned_by(turn[k])).normalized());
+    x.attitude.push_back((x.attitude.back() * flight::exponential(turn[k])).normalized());
     x.t_s.push_back(r.end_s[k]);
   }
   return x;
@@ -117,7 +107,7 @@ std::vector<StreamRow> stream_rows(const Recording& r) {
     const Quaterniond seen(m.qw[i], m.qx[i], m.qy[i], m.qz[i]);
     const Vector3d path = Vector3d(m.x_m[i], m.y_m[i], m.z_m[i]) + r.track.at(t_s).attitude * arm -
                           (x.position_m[k] + dt * x.velocity_m_s[k] + dt * dt / 2 * a);
-    const Vector3d off = rotation_vector(reckoned.conjugate() * seen);
+    const Vector3d off = flight::logarithm(reckoned.conjugate() * seen);
     pose_s.push_back(t_s);
     samples.insert(samples.end(), {path.x(), path.y(), path.z(), off.x(), off.y(), off.z()});
   }
