@@ -98,35 +98,6 @@ flight::FlightHeader header_of(const Case& c, const SensorSet& sensors, const Ro
 
 }  // namespace
 
-const std::vector<std::string>& truth_names() {
-  static const std::vector<std::string> kNames = {"t_s",
-                                                  "x_m",
-                                                  "y_m",
-                                                  "z_m",
-                                                  "qw",
-                                                  "qx",
-                                                  "qy",
-                                                  "qz",
-                                                  "velocity_x_m_s",
-                                                  "velocity_y_m_s",
-                                                  "velocity_z_m_s",
-                                                  "rate_x_rad_s",
-                                                  "rate_y_rad_s",
-                                                  "rate_z_rad_s",
-                                                  "left_stroke_rad",
-                                                  "left_rotation_rad",
-                                                  "right_stroke_rad",
-                                                  "right_rotation_rad",
-                                                  "left_stroke_rate_rad_s",
-                                                  "left_rotation_rate_rad_s",
-                                                  "right_stroke_rate_rad_s",
-                                                  "right_rotation_rate_rad_s",
-                                                  "gyro_bias_x_rad_s",
-                                                  "gyro_bias_y_rad_s",
-                                                  "gyro_bias_z_rad_s"};
-  return kNames;
-}
-
 Room flight_room() { return {}; }
 
 Flight fly(const Case& c, std::size_t flight) {
@@ -144,7 +115,7 @@ Flight fly(const Case& c, std::size_t flight) {
   f.log.command.phase_rad.emplace();
   if (sensors.power) f.log.power.emplace();
   if (sensors.wings) f.log.wings.emplace();
-  f.truth.resize(truth_names().size());
+  f.truth.resize(flight::kMotionNames.size());
 
   // It learns to trim a metre up, in two fifths of the time, and goes where the log begins.
   const Waypoint home = plan.start();

@@ -24,11 +24,9 @@ struct Flight {
   bool crashed = false;
   std::string how;  ///< it crashed
   flight::FlightLog log;
-  std::vector<flight::Column> truth;         ///< columns truth_names(), at the control rate
+  std::vector<flight::Column> truth;         ///< columns flight::kMotionNames, at the control rate
   double farthest_m = 0, most_tilt_rad = 0;  ///< from where it was meant to be; of the body's z axis
 };
-
-const std::vector<std::string>& truth_names();
 
 /// The room in which they fly.
 Room flight_room();

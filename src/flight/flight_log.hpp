@@ -131,6 +131,33 @@ inline const std::string kHeader = "flight.toml", kCommand = "command.csv", kMoc
 inline const std::vector<std::string> kAll = {kHeader, kCommand, kMocap, kImu, kPower, kWings, kTruth};
 }  // namespace log_file
 
+/// Columns of truth.csv: pose, motion and wings, as the flapper has them, and its gyro's bias.
+inline const std::vector<std::string> kMotionNames = {"t_s",
+                                                      "x_m",
+                                                      "y_m",
+                                                      "z_m",
+                                                      "qw",
+                                                      "qx",
+                                                      "qy",
+                                                      "qz",
+                                                      "velocity_x_m_s",
+                                                      "velocity_y_m_s",
+                                                      "velocity_z_m_s",
+                                                      "rate_x_rad_s",
+                                                      "rate_y_rad_s",
+                                                      "rate_z_rad_s",
+                                                      "left_stroke_rad",
+                                                      "left_rotation_rad",
+                                                      "right_stroke_rad",
+                                                      "right_rotation_rad",
+                                                      "left_stroke_rate_rad_s",
+                                                      "left_rotation_rate_rad_s",
+                                                      "right_stroke_rate_rad_s",
+                                                      "right_rotation_rate_rad_s",
+                                                      "gyro_bias_x_rad_s",
+                                                      "gyro_bias_y_rad_s",
+                                                      "gyro_bias_z_rad_s"};
+
 /// Texts of the files of a log by name, truth.csv left out.
 using LogFiles = std::map<std::string, std::string>;
 

@@ -17,30 +17,31 @@ constexpr int kAmplitude = 1, kDifference = 2, kBias = 3, kSplitCycle = 4, kVelo
 }  // namespace
 
 RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
-  const auto add = [&](const char* name, double floor, auto&& value) {
+  values_.resize(flights.size());
+  // centred and of rms 1, but for the constant; what never changes is the constant
+  const auto append = [&](const std::string& name, double floor, std::vector<Eigen::VectorXd> column) {
     double sum = 0, squares = 0, n = 0;
+    for (const Eigen::VectorXd& v : column)
+      sum += v.sum(), squares += v.squaredNorm(), n += static_cast<double>(v.size());
+    const bool constant = names_.empty();
+    const double mean = constant ? 0 : sum / n;
+    const double sd = constant ? 1 : std::sqrt(std::max(0.0, squares / n - mean * mean));
+    if (!(sd > 1e-9 * (std::abs(mean) + 1e-3))) return;
+    for (std::size_t f = 0; f < flights.size(); ++f) {
+      values_[f].conservativeResize(column[f].size(), values_[f].cols() + 1);
+      values_[f].rightCols(1) = (column[f].array() - mean) / sd;
+    }
+    names_.push_back(name);
+    floors_.push_back(floor);
+  };
+  const auto add = [&](const char* name, double floor, auto&& value) {
     std::vector<Eigen::VectorXd> column;
     for (const CarriedFlight& f : flights) {
-      Eigen::VectorXd v(static_cast<Eigen::Index>(f.beats()));
-      for (std::size_t j = 0; j < f.beats(); ++j) {
-        const double x = v[static_cast<Eigen::Index>(j)] = value(f.recording(), f.recording().regimes[j]);
-        sum += x, squares += x * x, n += 1;
-      }
-      column.push_back(std::move(v));
+      column.emplace_back(static_cast<Eigen::Index>(f.beats()));
+      for (std::size_t j = 0; j < f.beats(); ++j)
+        column.back()[static_cast<Eigen::Index>(j)] = value(f.recording(), f.recording().regimes[j]);
     }
-    const double mean = sum / n, sd = std::sqrt(std::max(0.0, squares / n - mean * mean));
-    if (names_.empty()) {
-      values_.resize(flights.size());
-    } else if (!(sd > 1e-9 * (std::abs(mean) + 1e-3))) {
-      return;  // what never changes is the constant
-    }
-    for (std::size_t f = 0; f < flights.size(); ++f) {
-      const Eigen::Index k = static_cast<Eigen::Index>(names_.size());
-      values_[f].conservativeResize(column[f].size(), k + 1);
-      values_[f].col(k) = names_.empty() ? column[f] : Eigen::VectorXd((column[f].array() - mean) / sd);
-    }
-    names_.emplace_back(name);
-    floors_.push_back(floor);
+    append(name, floor, std::move(column));
   };
   using R = const Recording&;
   using S = const Regime&;
@@ -57,19 +58,9 @@ RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
   add("rate_z", kInput, [](R, S s) { return s.rate_rad_s.z(); });
   // of what is already centred, so that a product says what its factors do not
   const auto multiply = [&](int a, int b) {
-    double sum = 0, squares = 0, n = 0;
     std::vector<Eigen::VectorXd> column;
-    for (const Eigen::MatrixXd& v : values_) {
-      column.push_back(v.col(a).cwiseProduct(v.col(b)));
-      sum += column.back().sum(), squares += column.back().squaredNorm(), n += static_cast<double>(v.rows());
-    }
-    const double mean = sum / n, sd = std::sqrt(std::max(1e-12, squares / n - mean * mean));
-    for (std::size_t f = 0; f < values_.size(); ++f) {
-      values_[f].conservativeResize(Eigen::NoChange, values_[f].cols() + 1);
-      values_[f].rightCols(1) = (column[f].array() - mean) / sd;
-    }
-    names_.push_back(names_[static_cast<std::size_t>(a)] + " " + names_[static_cast<std::size_t>(b)]);
-    floors_.push_back(kProduct);
+    for (const Eigen::MatrixXd& v : values_) column.emplace_back(v.col(a).cwiseProduct(v.col(b)));
+    append(name(a) + " " + name(b), kProduct, std::move(column));
   };
   if (size() == kPlain)
     for (const int b : {kAmplitude, kDifference, kBias, kSplitCycle, kVelocityX, kVelocityZ}) multiply(kAmplitude, b);

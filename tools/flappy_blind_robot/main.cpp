@@ -77,7 +77,7 @@ Json fly_case(const Options& o) {
     for (std::size_t k = 0; k < kFlights; ++k) {
       const std::filesystem::path to = folder / ("flight_" + std::to_string(k + 1));
       flight::write_flight_log(to, flights[k].log);
-      if (!o.no_truth) flight::write_truth(to, truth_names(), flights[k].truth);
+      if (!o.no_truth) flight::write_truth(to, flight::kMotionNames, flights[k].truth);
       std::printf("%s: %g s, up to %.0f mm off, tilted up to %.0f deg\n", to.c_str(), kFlight_s,
                   1e3 * flights[k].farthest_m, flights[k].most_tilt_rad * 180 / kPi);
       list.push_back({{"folder", to.string()},
