@@ -87,6 +87,9 @@ class Diagnoser {
     }
     for (Answer& a : singles) d.answers.push_back(std::move(a));
     normalise(d);
+    d.nominal = nominal.residual;
+    hold_out(d);
+    for (int g = 0; g < kGroups; ++g) d.noise_sd.push_back(evidence_.noise_sd(g));
     return d;
   }
 
@@ -355,6 +358,38 @@ class Diagnoser {
     Answer a = weigh(Answer::Kind::effect, effects, fit.point, eta_sd(fit.point, h.shared()), log_prior);
     a.fit = std::move(fit);
     return a;
+  }
+
+  /// What is left in every flight with the fit to the others; of a single flight, with its own.
+  void hold_out(Diagnosis& d) const {
+    std::vector<Candidate> candidates;
+    std::vector<Signature*> of;
+    const auto add = [&](const Hypothesis& h, const Linearised& l, const Smooth& sd, Signature& left) {
+      const Columns c = columns_of(l);
+      for (std::size_t f = 0; f < all_.size(); ++f) {
+        std::vector<char> others = all_;
+        if (all_.size() > 1) others[f] = 0;
+        const Posterior p = posterior(l, c, others, sd);
+        VectorXd at = l.at;
+        Index i = 0;
+        for (std::size_t k = 0; k < l.columns.size(); ++k)
+          if (l.columns[k].size() > 0) at += p.mean[i++] * l.directions.axes.col(static_cast<Index>(k));
+        candidates.push_back(h.candidate(h.bounded(at)));
+      }
+      of.push_back(&left);
+    };
+    add(Hypothesis(uncertain_, {}), parameters_.point, evidence_.floor(), d.refit);
+    for (Answer& a : d.answers)
+      if (a.kind == Answer::Kind::effect) {
+        const Hypothesis h(uncertain_, a.effects);
+        add(h, a.fit.point, eta_sd(a.fit.point, h.shared()), a.left);
+      }
+    std::vector<Signature> rows = fitter_.residuals(candidates);
+    for (std::size_t i = 0; i < of.size(); ++i)
+      for (std::size_t f = 0; f < all_.size(); ++f) {
+        Signature& s = rows[i * all_.size() + f];
+        of[i]->push_back(s.empty() ? Rows() : std::move(s[f]));
+      }
   }
 
   void normalise(Diagnosis& d) const {

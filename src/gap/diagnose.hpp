@@ -26,6 +26,7 @@ struct Answer {
   double probability = 0;
   std::vector<Term> terms;  ///< of an unknown cause
   Fit fit;                  ///< of effects and parameters
+  Signature left;           ///< of an effect: in each flight what is left with the fit to the others
 };
 
 /// What an effect would explain beside the fitted parameters, as far as a linear model sees.
@@ -47,6 +48,9 @@ struct Diagnosis {
   std::vector<Answer> answers;     ///< most probable first
   Fit parameters;                  ///< without any effect
   std::vector<Screened> screened;  ///< all entries, the best first
+  Signature nominal;               ///< what is left of the measurement with the vehicle's file
+  Signature refit;                 ///< with parameters alone: in each flight what is left with the fit to the others
+  std::vector<double> noise_sd;    ///< [group] of the rows of noise alone, as found
 };
 
 Diagnosis diagnose(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,

@@ -222,6 +222,11 @@ void Evidence::add(double share, const Smooth& change, Statistics& to) const {
           share * (normal_[f][static_cast<std::size_t>(g)] * change.row(g).transpose());
 }
 
+double Evidence::noise_sd(int group) const {
+  const Group& g = groups_[static_cast<std::size_t>(group)];
+  return g.sd / std::sqrt(1 - g.past * g.past);
+}
+
 Smooth Evidence::floor() const {
   Smooth sd(kGroups, basis_.size());
   for (int g = 0; g < kGroups; ++g)

@@ -91,7 +91,8 @@ class Evidence {
   static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns,
                              const Eigen::VectorXd& prior_mean);
 
-  double noise_sd(int group) const { return groups_[static_cast<std::size_t>(group)].sd; }
+  /// Sd of a row of noise alone.
+  double noise_sd(int group) const;
   double signal(int group) const { return groups_[static_cast<std::size_t>(group)].signal; }
 
  private:
