@@ -63,9 +63,10 @@ class ShiftedVoltage {
 }  // namespace
 
 const char* channel_name(int channel) {
-  static const char* const kNames[kChannels] = {"torque_x", "torque_y",    "torque_z",     "force_x", "force_y",
-                                                "force_z",  "stroke_left", "stroke_right", "path_x",  "path_y",
-                                                "path_z",   "turn_x",      "turn_y",       "turn_z"};
+  static const char* const kNames[kChannels] = {
+      "torque_x",    "torque_y",     "torque_z",     "force_x",       "force_y", "force_z",
+      "stroke_left", "stroke_right", "current_left", "current_right", "battery", "path_x",
+      "path_y",      "path_z",       "turn_x",       "turn_y",        "turn_z"};
   return kNames[channel];
 }
 
@@ -74,17 +75,21 @@ CarriedFlight::CarriedFlight(Recording recording) : recording_(std::move(recordi
   const auto first = static_cast<std::size_t>(std::ceil(kSpinUpBeats));
   imu_ = BeatProjection(r.beat, r.valid, r.beats, first);
   std::vector<double> samples(r.intervals() * kSignals, 0);
-  std::vector<char> seen(r.valid);
+  std::vector<char> seen(r.valid), metered(r.valid);
   has_wings_ = r.log.wings.has_value();
+  has_power_ = r.log.power.has_value();
   for (std::size_t k = 0; k < r.intervals(); ++k) {
     double* s = &samples[k * kSignals];
     for (int i = 0; i < 3; ++i) s[kForceX + i] = r.force_m_s2[k][i];
-    if (!has_wings_) continue;
-    const auto strokes = flight::strokes_at(*r.log.wings, r.log.header.wings->rate_hz, r.end_s[k]);
-    if (std::isfinite(strokes[0])) s[kStrokeLeft] = strokes[0], s[kStrokeRight] = strokes[1];
-    else seen[k] = 0;
+    const auto put = [&](const auto& values, Channel first_channel, std::vector<char>& there) {
+      if (std::isfinite(values[0])) std::ranges::copy(values, s + first_channel);
+      else there[k] = 0;
+    };
+    if (has_wings_) put(flight::strokes_at(*r.log.wings, r.log.header.wings->rate_hz, r.end_s[k]), kStrokeLeft, seen);
+    if (has_power_) put(flight::power_at(r.log, r.end_s[k]), kCurrentLeft, metered);
   }
   if (has_wings_) wings_ = BeatProjection(r.beat, seen, r.beats, first);
+  if (has_power_) power_ = BeatProjection(r.beat, metered, r.beats, first);
   measured_ = rows_of(samples);
   for (std::size_t k = 0; k < r.intervals(); ++k)
     for (std::size_t i = 0; i < 3; ++i)
@@ -146,6 +151,8 @@ Rows CarriedFlight::declared_noise(std::uint64_t seed) const {
       s[kForceX + i] = h.imu.accel_noise_m_s2 * normal(random);
     }
     for (int i = 0; i < 2; ++i) s[kStrokeLeft + i] = h.wings ? h.wings->noise_rad * normal(random) : 0;
+    for (int i = 0; i < 2; ++i) s[kCurrentLeft + i] = h.power ? h.power->current_noise_A * normal(random) : 0;
+    s[kBattery] = h.power ? h.power->voltage_noise_V * normal(random) : 0;
   }
   Rows rows = rows_of(samples);
   put_streams(stream_noise(recording_, seed), rows);
@@ -154,8 +161,28 @@ Rows CarriedFlight::declared_noise(std::uint64_t seed) const {
 
 bool CarriedFlight::covers(std::size_t beat, int channel) const {
   if (channel >= kPathX) return compared_[beat] != 0;
+  if (channel >= kCurrentLeft) return has_power_ && imu_.covers(beat) && power_.covers(beat);
   if (channel >= kStrokeLeft) return has_wings_ && imu_.covers(beat) && wings_.covers(beat);
   return imu_.covers(beat);
+}
+
+/// Of all lanes, at the end of an interval. `meter`: what the motors had, where effects changed it; else the last step's
+/// volts and the vehicle's ohms.
+void CarriedFlight::read_power(const double* meter, const double* volts, const CarriedBlock& kept,
+                               const std::vector<const Candidate*>& candidates, double* samples) const {
+  const double nominal_V = recording_.log.header.power->battery_nominal_V;
+  for (std::size_t lane = 0; lane < kVehicles; ++lane) {
+    const model::Vehicle& v = candidates[std::min(lane, candidates.size() - 1)]->vehicle;
+    const model::Motor* const motors[] = {&v.left.motor, &v.right.motor};
+    for (std::size_t side = 0; side < 2; ++side) {
+      const model::Motor& m = *motors[side];
+      const double V = meter != nullptr ? meter[(1 + side) * kVehicles + lane] : volts[side * kVehicles + lane];
+      const double ohm = meter != nullptr ? meter[(3 + side) * kVehicles + lane] : m.resistance_ohm;
+      samples[(kCurrentLeft + side) * kVehicles + lane] =
+          (V - m.torque_constant_Nm_A * m.gear_ratio * kept.rows[kStrokeRate + side][lane]) / ohm;
+    }
+    samples[kBattery * kVehicles + lane] = nominal_V * (meter != nullptr ? meter[lane] : 1);
+  }
 }
 
 std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& candidates) const {
@@ -182,6 +209,7 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
   const int longest = *std::ranges::max_element(r.steps);
   std::vector<double> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
   std::vector<double> samples(r.intervals() * kSignals * kVehicles, 0);
+  std::vector<double> meter(sim::kMeterRows * kVehicles);
   std::size_t step = 0;
   for (std::size_t k = 0; k < r.intervals(); ++k) {
     for (int i = 0; i < r.steps[k]; ++i, ++step) {
@@ -193,6 +221,7 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
     }
     sim::BlockEffects<double> in_force = storage.effects_of(0);
     in_force.voltages_V = voltages_V.data();
+    in_force.meter = meter.data();
     storage.kernel(block, in_force, plan, 0, r.steps[k], nullptr);
     carry(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
     double* to = &samples[k * kSignals * kVehicles];
@@ -205,6 +234,9 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
       to[kStrokeLeft * kVehicles + lane] = kept.rows[kStroke][lane];
       to[kStrokeRight * kVehicles + lane] = kept.rows[kStroke + 1][lane];
     }
+    if (has_power_)
+      read_power(in_force.set != 0 ? meter.data() : nullptr,
+                 &voltages_V[static_cast<std::size_t>(r.steps[k] - 1) * 2 * kVehicles], kept, candidates, to);
   }
 
   Rows together(r.beats * kCoefficients * kSignals * kVehicles, 0);

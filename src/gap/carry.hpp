@@ -22,6 +22,9 @@ enum Channel : int {
   kForceZ,  ///< specific force at the IMU, m/s^2, B
   kStrokeLeft,
   kStrokeRight,  ///< rad, where logged
+  kCurrentLeft,
+  kCurrentRight,  ///< of the motors, A, where logged
+  kBattery,       ///< V, where logged
   // what motion capture says against the IMU alone, no vehicle: the mean only
   kPathX,
   kPathY,
@@ -71,12 +74,15 @@ class CarriedFlight {
  private:
   Rows rows_of(const std::vector<double>& samples) const;
 
-  Recording recording_;
+  void read_power(const double* meter, const double* volts, const CarriedBlock& kept,
+                  const std::vector<const Candidate*>& candidates, double* samples) const;
   void compare_streams();
 
-  BeatProjection imu_, wings_, poses_;
+  Recording recording_;
+
+  BeatProjection imu_, wings_, power_;
   std::vector<char> compared_;  ///< beats
-  bool has_wings_ = false;
+  bool has_wings_ = false, has_power_ = false;
   Rows measured_, signal_;
 };
 

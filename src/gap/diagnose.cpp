@@ -35,7 +35,7 @@ struct Background {
   const char* effect;
   double sd;
 };
-constexpr Background kBackground[] = {{"stop_compliance", 0.07}};
+constexpr Background kBackground[] = {{"stop_compliance", 0.13}};
 
 class Diagnoser {
  public:

@@ -230,7 +230,7 @@ double Evidence::noise_sd(int group) const {
 Smooth Evidence::floor() const {
   Smooth sd(kGroups, basis_.size());
   for (int g = 0; g < kGroups; ++g)
-    for (int i = 0; i < basis_.size(); ++i) sd(g, i) = groups_[static_cast<std::size_t>(g)].signal * basis_.floor(i);
+    for (int i = 0; i < basis_.size(); ++i) sd(g, i) = groups_[static_cast<std::size_t>(g)].signal * basis_.floor(g, i);
   return sd;
 }
 

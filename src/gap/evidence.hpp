@@ -31,14 +31,14 @@ class RegimeBasis {
   explicit RegimeBasis(const std::vector<CarriedFlight>& flights);
   int size() const { return static_cast<int>(names_.size()); }
   const std::string& name(int i) const { return names_[static_cast<std::size_t>(i)]; }
-  /// How large its coefficient is in every model, as a share of the signal.
-  double floor(int i) const { return floors_[static_cast<std::size_t>(i)]; }
+  /// How large its coefficient is in every model, as a share of the signal of a group.
+  double floor(int group, int i) const;
   /// [beat][size()].
   const Eigen::MatrixXd& values(std::size_t flight) const { return values_[flight]; }
 
  private:
   std::vector<std::string> names_;
-  std::vector<double> floors_;
+  std::vector<double> kinds_;  ///< how much likelier than the inputs they are mistaken in; 0: the constant
   std::vector<Eigen::MatrixXd> values_;
 };
 

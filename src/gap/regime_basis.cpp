@@ -7,19 +7,47 @@ namespace {
 
 /// How far what is near a surface reaches: a wing's length.
 constexpr double kReach_m = 0.07;
-/// What two good models of one vehicle differ by, as a share of the signal: found between this simulator and the blind robot
-/// on development vehicles, after a fit (docs/gap.md). Its steady part is the largest.
-constexpr double kConstant = 0.025, kInput = 0.004, kVelocity = 0.012, kProduct = 0.003, kSquare = 0.006,
-                 kPlace = 0.002;
+/// What two good models of one vehicle differ by, as a share of the signal: of the constant, and of what changes with an
+/// input, by channel and harmonic. Found between this simulator and the blind robot on development vehicles, after the fit of
+/// parameters, as the variance that makes their residuals most probable; a quarter larger here (docs/gap.md).
+struct Shares {
+  double steady[kHarmonics + 1], changing[kHarmonics + 1];
+};
+constexpr Shares kTorque[3] = {{{0.0016, 0.0066, 0.0032, 0.0038, 0.0152}, {0.0015, 0.0016, 0.0020, 0.0023, 0.0052}},
+                               {{0.0015, 0.0301, 0.0025, 0.0198, 0.0021}, {0.0007, 0.0012, 0.0013, 0.0017, 0.0015}},
+                               {{0.0013, 0.0040, 0.0010, 0.0010, 0.0012}, {0.0006, 0.0011, 0.0006, 0.0010, 0.0008}}};
+constexpr Shares kForce[3] = {{{0.0010, 0.0142, 0.0021, 0.0083, 0.0013}, {0.0006, 0.0007, 0.0006, 0.0010, 0.0006}},
+                              {{0.0010, 0.0023, 0.0062, 0.0052, 0.0043}, {0.0009, 0.0017, 0.0014, 0.0013, 0.0021}},
+                              {{0.0163, 0.0089, 0.0374, 0.0085, 0.0088}, {0.0010, 0.0009, 0.0013, 0.0011, 0.0017}}};
+constexpr Shares kDrive = {{0.01, 0.01, 0.01, 0.01, 0.01}, {0.001, 0.001, 0.001, 0.001, 0.001}};
+constexpr Shares kPath = {{0.0025, 0, 0, 0, 0}, {0.0014, 0, 0, 0, 0}};
+constexpr Shares kTurn = {{0.0008, 0, 0, 0, 0}, {0.0008, 0, 0, 0, 0}};
+/// Against what changes with an input.
+constexpr double kConstant = 0, kInput = 1, kVelocity = 2.3, kRate = 0.8, kProduct = 0.65, kSquare = 1.5, kPlace = 0.6;
+
+const Shares& shares_of(int channel) {
+  if (channel <= kTorqueZ) return kTorque[channel - kTorqueX];
+  if (channel <= kForceZ) return kForce[channel - kForceX];
+  if (channel < kPathX) return kDrive;
+  return channel < kTurnX ? kPath : kTurn;
+}
+
 /// Where some of the plain functions stand, when a set of flights has them all.
 constexpr int kAmplitude = 1, kDifference = 2, kBias = 3, kSplitCycle = 4, kVelocityX = 5, kVelocityZ = 7, kPlain = 11;
 
 }  // namespace
 
+double RegimeBasis::floor(int group, int i) const {
+  const Shares& s = shares_of(group / kCoefficients);
+  const int harmonic = (group % kCoefficients + 1) / 2;
+  const double kind = kinds_[static_cast<std::size_t>(i)];
+  return kind == kConstant ? s.steady[harmonic] : kind * s.changing[harmonic];
+}
+
 RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
   values_.resize(flights.size());
   // centred and of rms 1, but for the constant; what never changes is the constant
-  const auto append = [&](const std::string& name, double floor, std::vector<Eigen::VectorXd> column) {
+  const auto append = [&](const std::string& name, double kind, std::vector<Eigen::VectorXd> column) {
     double sum = 0, squares = 0, n = 0;
     for (const Eigen::VectorXd& v : column)
       sum += v.sum(), squares += v.squaredNorm(), n += static_cast<double>(v.size());
@@ -32,16 +60,16 @@ RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
       values_[f].rightCols(1) = (column[f].array() - mean) / sd;
     }
     names_.push_back(name);
-    floors_.push_back(floor);
+    kinds_.push_back(kind);
   };
-  const auto add = [&](const char* name, double floor, auto&& value) {
+  const auto add = [&](const char* name, double kind, auto&& value) {
     std::vector<Eigen::VectorXd> column;
     for (const CarriedFlight& f : flights) {
       column.emplace_back(static_cast<Eigen::Index>(f.beats()));
       for (std::size_t j = 0; j < f.beats(); ++j)
         column.back()[static_cast<Eigen::Index>(j)] = value(f.recording(), f.recording().regimes[j]);
     }
-    append(name, floor, std::move(column));
+    append(name, kind, std::move(column));
   };
   using R = const Recording&;
   using S = const Regime&;
@@ -53,9 +81,9 @@ RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
   add("velocity_x", kVelocity, [](R, S s) { return s.velocity_B_m_s.x(); });
   add("velocity_y", kVelocity, [](R, S s) { return s.velocity_B_m_s.y(); });
   add("velocity_z", kVelocity, [](R, S s) { return s.velocity_B_m_s.z(); });
-  add("rate_x", kInput, [](R, S s) { return s.rate_rad_s.x(); });
-  add("rate_y", kInput, [](R, S s) { return s.rate_rad_s.y(); });
-  add("rate_z", kInput, [](R, S s) { return s.rate_rad_s.z(); });
+  add("rate_x", kRate, [](R, S s) { return s.rate_rad_s.x(); });
+  add("rate_y", kRate, [](R, S s) { return s.rate_rad_s.y(); });
+  add("rate_z", kRate, [](R, S s) { return s.rate_rad_s.z(); });
   // of what is already centred, so that a product says what its factors do not
   const auto multiply = [&](int a, int b) {
     std::vector<Eigen::VectorXd> column;

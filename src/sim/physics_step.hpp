@@ -27,6 +27,7 @@ struct ActiveEffects {
   const Wall* walls = nullptr;
   std::size_t wall_count = 0;
   Parameters<T>* own = nullptr;  // begins as those of the block
+  Element<T>* meter = nullptr;   // of the first lane
   T rows[kEffectRows];           // parameters, then figures
 
   const Sides<SideFigures<T>>& figures() const {
@@ -110,7 +111,8 @@ FLAPPY_INLINE void find_wall(const ActiveEffects<T>& effects, Surroundings<T>& s
 template <class T>
 FLAPPY_INLINE Hinges<T> hinges_of(const SideParameters<T>& p, const SideFigures<T>& figures, const T& voltage_V) {
   const T none(-0.0);
-  return {voltage_V,
+  return {T(1),
+          voltage_V,
           figures.resistance_ohm,
           p.stroke_torque_per_V_Nm,
           p.stroke_damping_Nm_s,
@@ -216,6 +218,10 @@ FLAPPY_INLINE void remember(const ActiveEffects<T>& effects, Acting<true, T>& a)
                     const auto& hinges) requires requires { effect.after(q, a.s, state, hinges); } {
         effect.after(q, a.s, state, hinges);
       });
+  if (effects.meter == nullptr) return;
+  const Hinges<T>&l = a.hinges.left, &r = a.hinges.right;
+  const T read[kMeterRows] = {l.source_share, l.voltage_V, r.voltage_V, l.resistance_ohm, r.resistance_ohm};
+  for (int i = 0; i < kMeterRows; ++i) read[i].store(effects.meter + i * effects.stride);
 }
 
 /// A held body goes where its support is. A standing one leaves when its wings carry it: true for lanes still held.

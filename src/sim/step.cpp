@@ -166,6 +166,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
       effects.kept = in_force.kept;
       effects.states = in_force.states + first;
       effects.stride = kLanes<T>;
+      effects.meter = in_force.meter != nullptr ? in_force.meter + first : nullptr;
       effects.walls = plan.walls;
       effects.wall_count = plan.wall_count;
       for (int i = 0; i < kEffectRows; ++i) effects.rows[i] = L::load(in_force.rows + i * kLanes<T> + first);

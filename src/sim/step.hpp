@@ -24,7 +24,12 @@ struct BlockEffects {
   T* states = nullptr;
   /// Voltages in place of the driver's, where there are any: two rows, left and right, for every update from the first on.
   const T* voltages_V = nullptr;
+  /// Where effects are in force: what the motors had in the last step, kMeterRows rows, if wanted.
+  T* meter = nullptr;
 };
+
+/// Rows of a meter: the source's voltage as a share of its nominal one, volts and ohms of the left and of the right motor.
+inline constexpr int kMeterRows = 5;
 
 /// Advances all lanes of a block by `steps` physics steps, of which the first is number `first` of the batch.
 /// `next`: the block to be fetched from memory meanwhile, if any.

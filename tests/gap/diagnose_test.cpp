@@ -71,7 +71,9 @@ TEST(BeatRows, ProjectAConstantAndItsHarmonics) {
 }
 
 TEST(Carried, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
-  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal");
+  const std::vector<CarriedFlight> flights = flown(
+      "hummingbird_nominal", {"log.power.battery_nominal_V=18", "log.power.rate_hz=500", "log.power.latency_s=0.001",
+                              "log.power.voltage_noise_V=0.02", "log.power.current_noise_A=0.01"});
   const Candidate it{nominal(), 0};
   const Rows predicted = flights[0].predict({&it})[0];
   const Rows noise = flights[0].declared_noise(1);
@@ -79,8 +81,8 @@ TEST(Carried, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
   for (std::size_t i = 0; i < left.size(); ++i) left[i] -= predicted[i];
   // 160 beats: an rms of as many normal numbers varies by 6 %, of neighbours that share samples by 8 %; heavy tails, for
   // now and then a wing's landing comes a little early, add to a few
-  for (const int channel :
-       {kTorqueX, kTorqueY, kTorqueZ, kForceX, kForceY, kForceZ, kStrokeLeft, kStrokeRight, kPathX, kTurnZ})
+  for (const int channel : {kTorqueX, kTorqueY, kTorqueZ, kForceX, kForceY, kForceZ, kStrokeLeft, kStrokeRight,
+                            kCurrentLeft, kCurrentRight, kBattery, kPathX, kTurnZ})
     for (int c = 0; c < (channel < kPathX ? 3 : 1); ++c) {
       const int g = channel * kCoefficients + c;
       const double ratio = rms(flights[0], left, g) / rms(flights[0], noise, g);
@@ -107,7 +109,7 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   const Rows noise = flights[0].declared_noise(1);
   for (const int g : groups) {
     declared.push_back(evidence.noise_sd(g));
-    // an innovation is no larger than the noise it belongs to; neighbours share half of their samples
+    // of one course of the noise, whose innovations are found with its memory
     EXPECT_LT(declared.back(), 1.2 * rms(flights[0], noise, g)) << g;
     EXPECT_GT(declared.back(), 0.4 * rms(flights[0], noise, g)) << g;
   }

@@ -28,6 +28,7 @@ struct BatterySag {
     const T full = q[2] - q[1] * state.get(0);
     const T battery_V = T(full + q[0] * T(per_ohm_l * emf_l + per_ohm_r * emf_r)) /
                         T(T(1) + q[0] * T(per_ohm_l * share_l + per_ohm_r * share_r));
+    h.left.source_share = h.right.source_share = battery_V / q[2];
     h.left.voltage_V = share_l * battery_V;
     h.right.voltage_V = share_r * battery_V;
     state.add(0, T(s.step_s * T(per_ohm_l * T(h.left.voltage_V - emf_l) + per_ohm_r * T(h.right.voltage_V - emf_r))));
