@@ -373,37 +373,19 @@ sim::VoltageScript motor_voltages(const FlightLog& log) {
   return script;
 }
 
-namespace {
-
-/// Several columns at one time, by a cubic through the four samples around it; not numbers where these have a gap.
-template <std::size_t n>
-std::array<double, n> cubic_at(const Column& t, const std::array<const Column*, n>& columns, double rate_hz,
-                               double t_s) {
-  std::array<double, n> value{};
+std::array<double, 2> strokes_at(const WingsStream& wings, double rate_hz, double t_s) {
+  const Column& t = wings.t_s;
   const std::size_t k = index_before(t, t_s);
-  if (k < 1 || k + 2 >= t.size() || t[k + 2] - t[k - 1] > 3.5 / rate_hz) {
-    value.fill(std::nan(""));
-    return value;
-  }
+  if (k < 1 || k + 2 >= t.size() || t[k + 2] - t[k - 1] > 3.5 / rate_hz) return {std::nan(""), std::nan("")};
+  std::array<double, 2> stroke = {0, 0};
   for (std::size_t i = k - 1; i <= k + 2; ++i) {
     double weight = 1;
     for (std::size_t j = k - 1; j <= k + 2; ++j)
       if (j != i) weight *= (t_s - t[j]) / (t[i] - t[j]);
-    for (std::size_t c = 0; c < n; ++c) value[c] += weight * (*columns[c])[i];
+    stroke[0] += weight * wings.left_stroke_rad[i];
+    stroke[1] += weight * wings.right_stroke_rad[i];
   }
-  return value;
-}
-
-}  // namespace
-
-std::array<double, 2> strokes_at(const WingsStream& wings, double rate_hz, double t_s) {
-  return cubic_at<2>(wings.t_s, {&wings.left_stroke_rad, &wings.right_stroke_rad}, rate_hz, t_s);
-}
-
-std::array<double, 3> power_at(const FlightLog& log, double t_s) {
-  const PowerHeader& h = *log.header.power;
-  const PowerStream& p = *log.power;
-  return cubic_at<3>(p.t_s, {&p.left_current_A, &p.right_current_A, &p.battery_V}, h.rate_hz, t_s + h.latency_s);
+  return stroke;
 }
 
 }  // namespace flappy::flight

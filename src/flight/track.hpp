@@ -123,8 +123,4 @@ sim::VoltageScript motor_voltages(const FlightLog& log);
 /// Strokes, left and right, by a cubic through the four samples around a time; not a number where these have a gap.
 std::array<double, 2> strokes_at(const WingsStream& wings, double rate_hz, double t_s);
 
-/// Currents of the left and of the right motor, A, and the battery's voltage, V, of a log with power.csv, when they were
-/// that; by a cubic as above.
-std::array<double, 3> power_at(const FlightLog& log, double t_s);
-
 }  // namespace flappy::flight

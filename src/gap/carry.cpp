@@ -35,8 +35,9 @@ CarryBlock carry_kernel(const char* instruction_set) {
 namespace {
 
 constexpr std::size_t kVehicles = sim::kLanes<double>;
-/// Of these, a vehicle predicts.
-constexpr std::size_t kSignals = kPathX;
+/// Channels of which a vehicle predicts a sample at every interval, and those of the meter.
+constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
+static_assert(kPathX == kSignals + kMetered);
 
 /// What two good streams may disagree by for reasons that no entry knows, times the share that models get wrong.
 constexpr double kStreamSignal_m_s2 = 1, kStreamSignal_rad_s = 1;
@@ -64,9 +65,9 @@ class ShiftedVoltage {
 
 const char* channel_name(int channel) {
   static const char* const kNames[kChannels] = {
-      "torque_x",    "torque_y",     "torque_z",     "force_x",       "force_y", "force_z",
-      "stroke_left", "stroke_right", "current_left", "current_right", "battery", "path_x",
-      "path_y",      "path_z",       "turn_x",       "turn_y",        "turn_z"};
+      "torque_x",    "torque_y",     "torque_z", "force_x",      "force_y",       "force_z",
+      "stroke_left", "stroke_right", "battery",  "current_left", "current_right", "path_x",
+      "path_y",      "path_z",       "turn_x",   "turn_y",       "turn_z"};
   return kNames[channel];
 }
 
@@ -75,31 +76,69 @@ CarriedFlight::CarriedFlight(Recording recording) : recording_(std::move(recordi
   const auto first = static_cast<std::size_t>(std::ceil(kSpinUpBeats));
   imu_ = BeatProjection(r.beat, r.valid, r.beats, first);
   std::vector<double> samples(r.intervals() * kSignals, 0);
-  std::vector<char> seen(r.valid), metered(r.valid);
+  std::vector<char> seen(r.valid);
   has_wings_ = r.log.wings.has_value();
-  has_power_ = r.log.power.has_value();
   for (std::size_t k = 0; k < r.intervals(); ++k) {
     double* s = &samples[k * kSignals];
     for (int i = 0; i < 3; ++i) s[kForceX + i] = r.force_m_s2[k][i];
-    const auto put = [&](const auto& values, Channel first_channel, std::vector<char>& there) {
-      if (std::isfinite(values[0])) std::ranges::copy(values, s + first_channel);
-      else there[k] = 0;
-    };
-    if (has_wings_) put(flight::strokes_at(*r.log.wings, r.log.header.wings->rate_hz, r.end_s[k]), kStrokeLeft, seen);
-    if (has_power_) put(flight::power_at(r.log, r.end_s[k]), kCurrentLeft, metered);
+    if (!has_wings_) continue;
+    const auto strokes = flight::strokes_at(*r.log.wings, r.log.header.wings->rate_hz, r.end_s[k]);
+    if (std::isfinite(strokes[0])) s[kStrokeLeft] = strokes[0], s[kStrokeRight] = strokes[1];
+    else seen[k] = 0;
   }
   if (has_wings_) wings_ = BeatProjection(r.beat, seen, r.beats, first);
-  if (has_power_) power_ = BeatProjection(r.beat, metered, r.beats, first);
+  lay_power(first);
   measured_ = rows_of(samples);
   for (std::size_t k = 0; k < r.intervals(); ++k)
     for (std::size_t i = 0; i < 3; ++i)
       samples[k * kSignals + kTorqueX + i] =
           (r.torso[k + 1].body_rate_rad_s[i] - r.torso[k].body_rate_rad_s[i]) / r.interval_s(k);
   signal_ = rows_of(samples);
+  if (r.log.power) {
+    const flight::PowerStream& p = *r.log.power;
+    std::vector<double> power;
+    for (const std::size_t i : power_sample_)
+      power.insert(power.end(), {p.battery_V[i], p.left_current_A[i], p.right_current_A[i]});
+    put_power(power, measured_);
+    for (std::size_t i = 0; i < power.size(); i += kMetered) power[i] -= r.log.header.power->battery_nominal_V;
+    put_power(power, signal_);
+  }
   compare_streams();
 }
 
+/// The samples of power.csv on the grid: they are of the instant at which a step begins.
+void CarriedFlight::lay_power(std::size_t first_beat) {
+  const Recording& r = recording_;
+  if (!r.log.power) return;
+  std::vector<double> beat;
+  std::vector<char> valid;
+  std::size_t step = 0, k = 0;  // the interval, and where it begins
+  for (std::size_t i = 0; i < r.log.power->t_s.size(); ++i) {
+    const double t_s = r.log.power->t_s[i] - r.log.header.power->latency_s;
+    const double at = std::round((t_s - r.begin_s) / kStep_s);
+    if (at < 0) continue;
+    while (k < r.intervals() && at >= static_cast<double>(step) + r.steps[k])
+      step += static_cast<std::size_t>(r.steps[k++]);
+    if (k == r.intervals()) break;
+    power_sample_.push_back(i);
+    power_step_.push_back(static_cast<std::size_t>(at));
+    beat.push_back(r.beat_at(t_s));
+    valid.push_back(r.valid[k]);
+  }
+  power_ = BeatProjection(beat, valid, r.beats, first_beat);
+}
+
 namespace {
+
+/// Of signals side by side, [beat][coefficient][width], those of one lane of `stride`.
+void put_channels(const Rows& together, std::size_t beats, std::size_t signals, std::size_t stride, std::size_t lane,
+                  std::size_t first_channel, Rows& rows) {
+  for (std::size_t j = 0; j < beats; ++j)
+    for (std::size_t c = 0; c < kCoefficients; ++c)
+      for (std::size_t s = 0; s < signals; ++s)
+        rows[j * kRowsPerBeat + (first_channel + s) * kCoefficients + c] =
+            together[((j * kCoefficients + c) * signals + s) * stride + lane];
+}
 
 void put_streams(const std::vector<StreamRow>& streams, Rows& rows) {
   for (std::size_t j = 0; j < streams.size(); ++j)
@@ -125,14 +164,17 @@ void CarriedFlight::compare_streams() {
 
 /// Of samples [interval][channel].
 Rows CarriedFlight::rows_of(const std::vector<double>& samples) const {
-  const Recording& r = recording_;
-  Rows together(r.beats * kCoefficients * kSignals, 0), rows(r.beats * kRowsPerBeat, 0);
+  Rows together(recording_.beats * kCoefficients * kSignals, 0), rows(recording_.beats * kRowsPerBeat, 0);
   imu_.project(samples.data(), kSignals, together.data());
-  for (std::size_t j = 0; j < r.beats; ++j)
-    for (std::size_t c = 0; c < kCoefficients; ++c)
-      for (std::size_t s = 0; s < kSignals; ++s)
-        rows[j * kRowsPerBeat + s * kCoefficients + c] = together[(j * kCoefficients + c) * kSignals + s];
+  put_channels(together, recording_.beats, kSignals, 1, 0, 0, rows);
   return rows;
+}
+
+/// Of samples [sample][battery, left, right].
+void CarriedFlight::put_power(const std::vector<double>& samples, Rows& rows) const {
+  Rows together(recording_.beats * kCoefficients * kMetered, 0);
+  power_.project(samples.data(), kMetered, together.data());
+  put_channels(together, recording_.beats, kMetered, 1, 0, kBattery, rows);
 }
 
 Rows CarriedFlight::declared_noise(std::uint64_t seed) const {
@@ -151,44 +193,31 @@ Rows CarriedFlight::declared_noise(std::uint64_t seed) const {
       s[kForceX + i] = h.imu.accel_noise_m_s2 * normal(random);
     }
     for (int i = 0; i < 2; ++i) s[kStrokeLeft + i] = h.wings ? h.wings->noise_rad * normal(random) : 0;
-    for (int i = 0; i < 2; ++i) s[kCurrentLeft + i] = h.power ? h.power->current_noise_A * normal(random) : 0;
-    s[kBattery] = h.power ? h.power->voltage_noise_V * normal(random) : 0;
   }
   Rows rows = rows_of(samples);
+  if (h.power) {
+    std::vector<double> power;
+    for (std::size_t i = 0; i < power_sample_.size(); ++i)
+      power.insert(power.end(), {h.power->voltage_noise_V * normal(random), h.power->current_noise_A * normal(random),
+                                 h.power->current_noise_A * normal(random)});
+    put_power(power, rows);
+  }
   put_streams(stream_noise(recording_, seed), rows);
   return rows;
 }
 
 bool CarriedFlight::covers(std::size_t beat, int channel) const {
   if (channel >= kPathX) return compared_[beat] != 0;
-  if (channel >= kCurrentLeft) return has_power_ && imu_.covers(beat) && power_.covers(beat);
+  if (channel >= kBattery) return imu_.covers(beat) && beat < power_.beats() && power_.covers(beat);
   if (channel >= kStrokeLeft) return has_wings_ && imu_.covers(beat) && wings_.covers(beat);
   return imu_.covers(beat);
-}
-
-/// Of all lanes, at the end of an interval. `meter`: what the motors had, where effects changed it; else the last step's
-/// volts and the vehicle's ohms.
-void CarriedFlight::read_power(const double* meter, const double* volts, const CarriedBlock& kept,
-                               const std::vector<const Candidate*>& candidates, double* samples) const {
-  const double nominal_V = recording_.log.header.power->battery_nominal_V;
-  for (std::size_t lane = 0; lane < kVehicles; ++lane) {
-    const model::Vehicle& v = candidates[std::min(lane, candidates.size() - 1)]->vehicle;
-    const model::Motor* const motors[] = {&v.left.motor, &v.right.motor};
-    for (std::size_t side = 0; side < 2; ++side) {
-      const model::Motor& m = *motors[side];
-      const double V = meter != nullptr ? meter[(1 + side) * kVehicles + lane] : volts[side * kVehicles + lane];
-      const double ohm = meter != nullptr ? meter[(3 + side) * kVehicles + lane] : m.resistance_ohm;
-      samples[(kCurrentLeft + side) * kVehicles + lane] =
-          (V - m.torque_constant_Nm_A * m.gear_ratio * kept.rows[kStrokeRate + side][lane]) / ohm;
-    }
-    samples[kBattery * kVehicles + lane] = nominal_V * (meter != nullptr ? meter[lane] : 1);
-  }
 }
 
 std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& candidates) const {
   const Recording& r = recording_;
   const CarryBlock carry = carry_kernel("");
   sim::Batch<double> batch(kVehicles, candidates.front()->vehicle, {kStep_s, 1, r.world, {}});
+  if (r.log.power) batch.storage().keep_effects(0);  // the meter needs their rows
   std::vector<ShiftedVoltage> shifted;
   for (std::size_t i = 0; i < kVehicles; ++i) {
     const Candidate& c = *candidates[std::min(i, candidates.size() - 1)];
@@ -209,8 +238,9 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
   const int longest = *std::ranges::max_element(r.steps);
   std::vector<double> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
   std::vector<double> samples(r.intervals() * kSignals * kVehicles, 0);
-  std::vector<double> meter(sim::kMeterRows * kVehicles);
-  std::size_t step = 0;
+  std::vector<double> meter(r.log.power ? static_cast<std::size_t>(longest) * kMetered * kVehicles : 0);
+  std::vector<double> power;
+  std::size_t step = 0, metered = 0;
   for (std::size_t k = 0; k < r.intervals(); ++k) {
     for (int i = 0; i < r.steps[k]; ++i, ++step) {
       double* to = &voltages_V[static_cast<std::size_t>(i) * 2 * kVehicles];
@@ -221,7 +251,7 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
     }
     sim::BlockEffects<double> in_force = storage.effects_of(0);
     in_force.voltages_V = voltages_V.data();
-    in_force.meter = meter.data();
+    if (r.log.power) in_force.meter = meter.data();
     storage.kernel(block, in_force, plan, 0, r.steps[k], nullptr);
     carry(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
     double* to = &samples[k * kSignals * kVehicles];
@@ -234,23 +264,26 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
       to[kStrokeLeft * kVehicles + lane] = kept.rows[kStroke][lane];
       to[kStrokeRight * kVehicles + lane] = kept.rows[kStroke + 1][lane];
     }
-    if (has_power_)
-      read_power(in_force.set != 0 ? meter.data() : nullptr,
-                 &voltages_V[static_cast<std::size_t>(r.steps[k] - 1) * 2 * kVehicles], kept, candidates, to);
+    for (; metered < power_step_.size() && power_step_[metered] < step; ++metered) {
+      const auto* from =
+          &meter[(power_step_[metered] + static_cast<std::size_t>(r.steps[k]) - step) * kMetered * kVehicles];
+      for (std::size_t lane = 0; lane < kVehicles; ++lane)
+        power.push_back(r.log.header.power->battery_nominal_V * from[lane]);
+      power.insert(power.end(), from + kVehicles, from + kMetered * kVehicles);
+    }
   }
 
   Rows together(r.beats * kCoefficients * kSignals * kVehicles, 0);
   imu_.project(samples.data(), kSignals * kVehicles, together.data());
+  Rows metered_together(r.log.power ? r.beats * kCoefficients * kMetered * kVehicles : 0, 0);
+  if (r.log.power) power_.project(power.data(), kMetered * kVehicles, metered_together.data());
   std::vector<Rows> result(candidates.size());
   for (std::size_t lane = 0; lane < candidates.size(); ++lane) {
     if (batch.status(lane) & sim::kFrozen) continue;
     Rows& rows = result[lane];
     rows.resize(r.beats * kRowsPerBeat);
-    for (std::size_t j = 0; j < r.beats; ++j)
-      for (std::size_t c = 0; c < kCoefficients; ++c)
-        for (std::size_t s = 0; s < kSignals; ++s)
-          rows[j * kRowsPerBeat + s * kCoefficients + c] =
-              together[((j * kCoefficients + c) * kSignals + s) * kVehicles + lane];
+    put_channels(together, r.beats, kSignals, kVehicles, lane, 0, rows);
+    if (r.log.power) put_channels(metered_together, r.beats, kMetered, kVehicles, lane, kBattery, rows);
   }
   return result;
 }

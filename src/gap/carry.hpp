@@ -22,9 +22,9 @@ enum Channel : int {
   kForceZ,  ///< specific force at the IMU, m/s^2, B
   kStrokeLeft,
   kStrokeRight,  ///< rad, where logged
+  kBattery,      ///< V, where logged, as the next
   kCurrentLeft,
-  kCurrentRight,  ///< of the motors, A, where logged
-  kBattery,       ///< V, where logged
+  kCurrentRight,  ///< of the motors, A
   // what motion capture says against the IMU alone, no vehicle: the mean only
   kPathX,
   kPathY,
@@ -74,15 +74,16 @@ class CarriedFlight {
  private:
   Rows rows_of(const std::vector<double>& samples) const;
 
-  void read_power(const double* meter, const double* volts, const CarriedBlock& kept,
-                  const std::vector<const Candidate*>& candidates, double* samples) const;
+  void lay_power(std::size_t first_beat);
+  void put_power(const std::vector<double>& samples, Rows& rows) const;
   void compare_streams();
 
   Recording recording_;
 
   BeatProjection imu_, wings_, power_;
   std::vector<char> compared_;  ///< beats
-  bool has_wings_ = false, has_power_ = false;
+  bool has_wings_ = false;
+  std::vector<std::size_t> power_sample_, power_step_;  ///< of power.csv on the grid; the step that begins with it
   Rows measured_, signal_;
 };
 

@@ -43,8 +43,6 @@ void carry_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& 
       store(transpose_times(halfway, force), kept.rows + kForce, first);
       x.left.stroke_rad.store(kept.rows[kStroke] + first);
       x.right.stroke_rad.store(kept.rows[kStroke + 1] + first);
-      x.left.stroke_rate_rad_s.store(kept.rows[kStrokeRate] + first);
-      x.right.stroke_rate_rad_s.store(kept.rows[kStrokeRate + 1] + first);
       x.body_rate_rad_s = x.body_rate_rad_s + missed;
     } else {
       x.body_rate_rad_s = vector(to.body_rate_rad_s);

@@ -17,8 +17,7 @@ enum CarriedRow : int {
   kTurnRate = 0,  ///< mean over the interval, recorded less flown, rad/s, B: 3 rows
   kForce = 3,     ///< mean specific force at the IMU, m/s^2, B as half-way: 3 rows
   kStroke = 6,    ///< at the end, left and right
-  kStrokeRate = 8,
-  kCarriedRows = 10
+  kCarriedRows = 8
 };
 
 /// What a block keeps from one interval to the next.

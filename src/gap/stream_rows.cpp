@@ -73,7 +73,9 @@ std::vector<StreamRow> differences(const Recording& r, const std::vector<double>
     StreamRow& row = list[j];
     row.valid = true;
     row.path_m_s2 = (mean(j + kSpan, 0) - 2 * mean(j, 0) + mean(j - kSpan, 0)) / (span_s * span_s);
-    row.turn_rad_s = (mean(j + kSpan, 3) - mean(j - kSpan, 3)) / (2 * span_s);
+    // in W, for there what has drifted apart stays as it is while the body turns
+    row.turn_rad_s = r.track.at(r.regimes[j].t_s).attitude.conjugate() *
+                     Vector3d((mean(j + kSpan, 3) - mean(j - kSpan, 3)) / (2 * span_s));
     sum += row.turn_rad_s;
     n += 1;
   }
@@ -107,7 +109,7 @@ std::vector<StreamRow> stream_rows(const Recording& r) {
     const Quaterniond seen(m.qw[i], m.qx[i], m.qy[i], m.qz[i]);
     const Vector3d path = Vector3d(m.x_m[i], m.y_m[i], m.z_m[i]) + r.track.at(t_s).attitude * arm -
                           (x.position_m[k] + dt * x.velocity_m_s[k] + dt * dt / 2 * a);
-    const Vector3d off = flight::logarithm(reckoned.conjugate() * seen);
+    const Vector3d off = flight::logarithm(seen * reckoned.conjugate());
     pose_s.push_back(t_s);
     samples.insert(samples.end(), {path.x(), path.y(), path.z(), off.x(), off.y(), off.z()});
   }

@@ -2,7 +2,7 @@
 // a path and an attitude that drift; over a few beats they must bend and turn as the seen ones do:
 //   path  second difference over kSpan beats of (seen - reckoned) origin / span^2, in W: wrong verticals, a marker that is not
 //         at the origin, late poses, an accelerometer turned or biased
-//   turn  central difference of the turn from reckoned to seen attitude / (2 span), in B, less its mean over the flight: a
+//   turn  central difference of the turn from reckoned to seen attitude / (2 span), taken in W, seen in B, less its mean over the flight: a
 //         gyro whose bias changes, late poses
 #pragma once
 

@@ -164,6 +164,17 @@ struct Acting<true, T> {
   BodyLoad<T> body;
 };
 
+/// What the motors draw.
+template <class T>
+FLAPPY_INLINE void read_meter(const Surroundings<T>& s, const Sides<Hinges<T>>& hinges, Element<T>* meter, int stride) {
+  const auto current = [](const Hinges<T>& h, const SideFigures<T>& f, const SideState<T>& x) {
+    return T(T(h.voltage_V - f.back_emf_V_s * x.stroke_rate_rad_s) / h.resistance_ohm);
+  };
+  hinges.left.source_share.store(meter);
+  current(hinges.left, s.figures.left, s.x.left).store(meter + stride);
+  current(hinges.right, s.figures.right, s.x.right).store(meter + 2 * stride);
+}
+
 /// Stage by stage, in the order of effect.hpp.
 template <class T>
 FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<true, T>& a) {
@@ -174,6 +185,7 @@ FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<true, T
                     auto& change) requires requires { effect.hinges(q, s, state, change); } {
         effect.hinges(q, s, state, change);
       });
+  if (effects.meter != nullptr) read_meter(s, a.hinges, effects.meter, effects.stride);
   put_hinges(a.hinges.left, s.p.left, a.p.left);
   put_hinges(a.hinges.right, s.p.right, a.p.right);
   a.voltages = {a.hinges.left.voltage_V, a.hinges.right.voltage_V};
@@ -218,10 +230,6 @@ FLAPPY_INLINE void remember(const ActiveEffects<T>& effects, Acting<true, T>& a)
                     const auto& hinges) requires requires { effect.after(q, a.s, state, hinges); } {
         effect.after(q, a.s, state, hinges);
       });
-  if (effects.meter == nullptr) return;
-  const Hinges<T>&l = a.hinges.left, &r = a.hinges.right;
-  const T read[kMeterRows] = {l.source_share, l.voltage_V, r.voltage_V, l.resistance_ohm, r.resistance_ohm};
-  for (int i = 0; i < kMeterRows; ++i) read[i].store(effects.meter + i * effects.stride);
 }
 
 /// A held body goes where its support is. A standing one leaves when its wings carry it: true for lanes still held.

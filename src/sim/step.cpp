@@ -183,6 +183,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
       }
       prefetch.step();
       physics_step<with_effects>(p, x, voltages, com_m, effects, k);
+      if (with_effects && effects.meter != nullptr) effects.meter += kMeterRows * kLanes<T>;
     }
     finish(x, com_m, voltages, p, plan, block, first);
     if constexpr (with_effects) forget_frozen(in_force, block, first);
@@ -192,7 +193,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
 template <class T>
 void step_any_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first, int steps,
                     const Block<T>* next) {
-  if (in_force.set == 0) step_block<false>(block, in_force, plan, first, steps, next);
+  if (in_force.set == 0 && in_force.meter == nullptr) step_block<false>(block, in_force, plan, first, steps, next);
   else step_block<true>(block, in_force, plan, first, steps, next);
 }
 

@@ -24,12 +24,12 @@ struct BlockEffects {
   T* states = nullptr;
   /// Voltages in place of the driver's, where there are any: two rows, left and right, for every update from the first on.
   const T* voltages_V = nullptr;
-  /// Where effects are in force: what the motors had in the last step, kMeterRows rows, if wanted.
+  /// Where every step is to write what its motors drew, kMeterRows rows, if anywhere. Needs `rows`, whatever the set.
   T* meter = nullptr;
 };
 
-/// Rows of a meter: the source's voltage as a share of its nominal one, volts and ohms of the left and of the right motor.
-inline constexpr int kMeterRows = 5;
+/// Rows of a meter: the source's voltage as a share of its nominal one, currents of the left and of the right motor, A.
+inline constexpr int kMeterRows = 3;
 
 /// Advances all lanes of a block by `steps` physics steps, of which the first is number `first` of the batch.
 /// `next`: the block to be fetched from memory meanwhile, if any.
