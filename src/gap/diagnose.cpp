@@ -23,19 +23,35 @@ constexpr double kVanished = 0.005;
 /// How well an entry's equation describes the effect of its name: share of its own signature.
 constexpr double kForm = 0.15;
 /// Shares of the signal that a term which no entry explains may have.
-constexpr double kUnexplained[] = {0.01, 0.04, 0.16};
+constexpr double kUnexplained[] = {0.003, 0.01, 0.03, 0.1};
 constexpr int kMostTerms = 12;
 /// What was thought before any flight: how often a gap is of each kind.
 constexpr double kPriorNone = 0.15, kPriorParameters = 0.35, kPriorEffect = 0.35, kPriorUnknown = 0.15;
 /// For every further effect.
 constexpr double kPriorFurther = 0.1;
 
-/// What every real vehicle has a little of, in units of the effect's first coordinate: stops are never hard.
+/// Every real vehicle has a little of every effect, or of something that looks like it: sd of the coordinates of its sizes,
+/// found on development robots without any, as the floors were (gap/regime_basis.cpp). Only more than that is an effect.
 struct Background {
   const char* effect;
   double sd;
 };
-constexpr Background kBackground[] = {{"stop_compliance", 0.13}};
+constexpr Background kBackground[] = {{"body_drag", 0.19},        {"wing_inertia", 0.18},     {"wake_capture", 0.16},
+                                      {"coulomb_friction", 0.13}, {"stop_compliance", 0.09},  {"clap_and_fling", 0.08},
+                                      {"wall_effect", 0.06},      {"wing_flexibility", 0.05}, {"wind", 0.05},
+                                      {"tether", 0.04},           {"gyro_bias", 0.04},        {"ceiling_effect", 0.035},
+                                      {"marker_offset", 0.03}};
+constexpr double kLeastBackground = 0.02;
+double background_sd(const std::string& effect) {
+  for (const Background& b : kBackground)
+    if (b.effect == effect) return b.sd;
+  return kLeastBackground;
+}
+/// How much more or less than usual models may be mistaken about a vehicle, and how often that is so.
+struct Mistaken {
+  double factor, probability;
+};
+constexpr Mistaken kMistaken[] = {{0.7, 0.25}, {1, 0.4}, {1.4, 0.25}, {2, 0.1}};
 
 class Diagnoser {
  public:
@@ -44,6 +60,7 @@ class Diagnoser {
       : uncertain_(uncertain),
         options_(options),
         threads_(options.threads > 0 ? options.threads : omp_get_num_procs()),
+        shared_(Hypothesis(uncertain, {}).shared()),
         all_(flights.size(), 1),
         evidence_(flights),
         fitter_(flights, evidence_, threads_) {}
@@ -55,14 +72,15 @@ class Diagnoser {
     const Linearised nominal = fit_parameters(plain);
     d.parameters = parameters_;
     progress(0.3, "screening effects");
-    add_background(plain);
-    d.answers.push_back(weigh(Answer::Kind::none, {}, nominal, {}, std::log(kPriorNone)));
-    d.answers.push_back(weigh(Answer::Kind::parameters, {}, parameters_.point, {}, std::log(kPriorParameters)));
-    d.answers.push_back(explain_freely());
+    const std::vector<Column> columns = effect_columns({}, parameters_);
+    for (const Column& c : columns) background_.push_back(background_sd(c.effect) * c.change);
+    d.answers.push_back(weigh(Answer::Kind::none, {}, nominal, std::log(kPriorNone)));
+    d.answers.push_back(weigh(Answer::Kind::parameters, {}, parameters_.point, std::log(kPriorParameters)));
+    Answer unknown = explain_freely(parameters_.point, std::log(kPriorUnknown));
     const double parameters = d.answers[1].log_evidence;
 
     std::vector<Answer> singles;
-    d.screened = screen({}, parameters_);
+    d.screened = screen(columns, parameters_);
     for (std::size_t i = 0; i < d.screened.size() && static_cast<int>(i) < options_.finalists; ++i) {
       if (d.screened[i].gain < kLeastGain) break;
       progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + d.screened[i].effect);
@@ -75,7 +93,7 @@ class Diagnoser {
       Answer best = singles.front();
       for (int n = 2; n <= options_.most_effects; ++n) {
         progress(0.7 + 0.1 * n, "looking beside " + best.effects.back());
-        const auto beside = screen(best.effects, best.fit);
+        const auto beside = screen(effect_columns(best.effects, best.fit), best.fit);
         if (beside.empty() || beside.front().gain < kLeastFurther) break;
         std::vector<Screened> set = screened_of(best);
         set.push_back(beside.front());
@@ -85,6 +103,14 @@ class Diagnoser {
         best = std::move(more);
       }
     }
+    // what looks like an entry at first, and leaves more than that entry's form may
+    if (!singles.empty()) {
+      const Answer& best = *std::ranges::max_element(singles, {}, &Answer::log_evidence);
+      const double log_prior = std::log(kPriorUnknown / static_cast<double>(model::effects().size()));
+      Answer beside = explain_freely(best.fit.point, log_prior);
+      if (!beside.terms.empty() && beside.log_evidence > unknown.log_evidence) unknown = std::move(beside);
+    }
+    d.answers.push_back(std::move(unknown));
     for (Answer& a : singles) d.answers.push_back(std::move(a));
     normalise(d);
     d.nominal = nominal.residual;
@@ -107,17 +133,6 @@ class Diagnoser {
     evidence_.learn_noise(fit.point.residual);
     parameters_ = fitter_.refit(plain, fit, 6);
     return fitter_.linearise(plain, plain.start(), none);
-  }
-
-  void add_background(const Hypothesis& plain) {
-    for (const Background& b : kBackground) {
-      const Hypothesis h(uncertain_, {b.effect});
-      VectorXd at = h.start();
-      at.head(plain.size()) = parameters_.point.at;
-      at[plain.size()] = b.sd;
-      Smooth column = change(parameters_.point.residual, fitter_.residuals({h.candidate(at)})[0], 1);
-      if (column.size() > 0) background_.push_back(std::move(column));
-    }
   }
 
   /// Of a prediction, from what is left before and after it moved by `span`; empty where it came apart.
@@ -154,20 +169,32 @@ class Diagnoser {
     return Evidence::posterior(evidence_.reduce(l.statistics, c.columns, use, sd), c.chosen, c.mean());
   }
 
-  /// Floor, and what the equations of effects get wrong of themselves.
-  Smooth eta_sd(const Linearised& l, Index shared) const {
-    Smooth sd = evidence_.floor();
-    Smooth own = Smooth::Zero(sd.rows(), sd.cols());
-    for (std::size_t k = static_cast<std::size_t>(shared); k < l.columns.size(); ++k)
-      if (l.columns[k].size() > 0) own += l.at[static_cast<Index>(k)] * l.columns[k];
-    return (sd.array().square() + (kForm * own).array().square()).sqrt();
+  /// Whatever models are mistaken by. `own`: of the effects in the hypothesis.
+  double log_evidence(const Linearised& l, const Columns& c, const std::vector<char>& use, const Smooth& own) const {
+    const Smooth floor = evidence_.floor();
+    std::vector<double> each;
+    for (const Mistaken& m : kMistaken)
+      each.push_back(std::log(m.probability) + posterior(l, c, use, together(m.factor * floor, own)).log_evidence);
+    const double most = *std::ranges::max_element(each);
+    double sum = 0;
+    for (const double e : each) sum += std::exp(e - most);
+    return most + std::log(sum);
   }
 
-  Answer weigh(Answer::Kind kind, std::vector<std::string> effects, const Linearised& l, const Smooth& given_sd,
-               double log_prior) const {
+  static Smooth together(const Smooth& a, const Smooth& b) { return (a.array().square() + b.array().square()).sqrt(); }
+
+  /// What the equations of effects get wrong of themselves.
+  Smooth form_error(const Linearised& l, Index shared) const {
+    Smooth own = Smooth::Zero(kGroups, evidence_.basis().size());
+    for (std::size_t k = static_cast<std::size_t>(shared); k < l.columns.size(); ++k)
+      if (l.columns[k].size() > 0) own += kForm * l.at[static_cast<Index>(k)] * l.columns[k];
+    return own.cwiseAbs();
+  }
+
+  Answer weigh(Answer::Kind kind, std::vector<std::string> effects, const Linearised& l, double log_prior) const {
     const Columns c = columns_of(l);
-    const Smooth sd = given_sd.size() > 0 ? given_sd : evidence_.floor();
-    const auto of = [&](const std::vector<char>& use) { return posterior(l, c, use, sd).log_evidence; };
+    const Smooth own = form_error(l, shared_);
+    const auto of = [&](const std::vector<char>& use) { return log_evidence(l, c, use, own); };
     Answer a;
     a.kind = kind;
     a.effects = std::move(effects);
@@ -182,10 +209,10 @@ class Diagnoser {
   }
 
   /// Gives single functions of the regime in single channels more room than every model needs, as long as that pays.
-  Answer explain_freely() const {
-    const Linearised& l = parameters_.point;
+  Answer explain_freely(const Linearised& l, double log_prior) const {
     const Columns c = columns_of(l);
-    Smooth sd = evidence_.floor();
+    const Smooth own = form_error(l, shared_);
+    Smooth sd = together(evidence_.floor(), own);
     const Index q = evidence_.basis().size();
     const Posterior before = posterior(l, c, all_, sd);
     double now = before.log_evidence;
@@ -218,24 +245,25 @@ class Diagnoser {
       terms.push_back(best);
     }
     a.terms = std::move(terms);
-    a.log_evidence = now + std::log(kPriorUnknown);
+    // what the terms gain, beside what is known without them
+    a.log_evidence = log_evidence(l, c, all_, own) + now - before.log_evidence + log_prior;
     return a;
   }
 
-  /// What every effect would gain beside others, as far as a linear model sees: sizes step from 0, shapes stay.
-  std::vector<Screened> screen(const std::vector<std::string>& beside, const Fit& fit) const {
-    struct Column {
-      std::size_t effect;
-      Index unknown;
-      Smooth change;
-    };
-    std::vector<std::string> names;
-    std::vector<std::vector<Unknown>> unknowns;
+  /// What a size of an effect changes.
+  struct Column {
+    std::string effect;
+    Index unknown;  ///< of the effect's
+    Smooth change;  ///< for a unit
+  };
+
+  /// Of every entry, beside others: sizes step from 0, shapes stay.
+  std::vector<Column> effect_columns(const std::vector<std::string>& beside, const Fit& fit) const {
     std::vector<Column> columns;
     std::vector<Candidate> candidates;
     for (const model::EffectEntry& e : model::effects()) {
       const std::string id = e.info.id;
-      if (std::ranges::count(options_.withheld, id) || std::ranges::count(beside, id)) continue;
+      if (std::ranges::count(beside, id)) continue;
       std::vector<std::string> set = beside;
       set.push_back(id);
       const Hypothesis h(uncertain_, set);
@@ -246,41 +274,47 @@ class Diagnoser {
         if (!h.unknowns()[static_cast<std::size_t>(i)].size) continue;
         VectorXd there = at;
         there[i] = kEffectReach;
-        columns.push_back({names.size(), i - first, {}});
+        columns.push_back({id, i - first, {}});
         candidates.push_back(h.candidate(there));
       }
-      names.push_back(id);
-      unknowns.push_back(unknowns_of(id));
     }
     std::vector<Signature> rows = fitter_.residuals(candidates);
+    for (std::size_t i = 0; i < columns.size(); ++i)
+      columns[i].change = change(fit.point.residual, std::move(rows[i]), kEffectReach);
+    std::erase_if(columns, [](const Column& c) { return c.change.size() == 0; });
+    return columns;
+  }
+
+  /// What every effect would gain beside others, as far as a linear model sees.
+  std::vector<Screened> screen(const std::vector<Column>& columns, const Fit& fit) const {
     Columns c = columns_of(fit.point);
     const std::vector<int> base = c.chosen;
-    std::vector<int> column_of(columns.size(), -1);
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      columns[i].change = change(fit.point.residual, std::move(rows[i]), kEffectReach);
-      if (columns[i].change.size() == 0) continue;
-      column_of[i] = static_cast<int>(c.columns.size());
-      c.add(columns[i].change, 0);
+    std::vector<std::string> names;
+    for (const Column& column : columns) {
+      c.add(column.change, 0);
+      const bool new_name = names.empty() || names.back() != column.effect;
+      if (new_name && !std::ranges::count(options_.withheld, column.effect)) names.push_back(column.effect);
     }
     const Reduced reduced = evidence_.reduce(fit.point.statistics, c.columns, all_, evidence_.floor());
     const VectorXd mean = c.mean();
     const auto solve = [&](const std::vector<std::size_t>& own) {
       std::vector<int> chosen = base;
-      for (const std::size_t i : own) chosen.push_back(column_of[i]);
+      for (const std::size_t i : own) chosen.push_back(static_cast<int>(base.size() + i));
       return Evidence::posterior(reduced, chosen, mean(chosen));
     };
     const double without = solve({}).log_evidence;
     std::vector<Screened> ranking;
-    for (std::size_t e = 0; e < names.size(); ++e) {
+    for (const std::string& name : names) {
+      const std::vector<Unknown> unknowns = unknowns_of(name);
       std::vector<std::size_t> own;
       for (std::size_t i = 0; i < columns.size(); ++i)
-        if (columns[i].effect == e && column_of[i] >= 0) own.push_back(i);
-      Screened s{names[e], 0, VectorXd::Zero(static_cast<Index>(unknowns[e].size()))};
+        if (columns[i].effect == name) own.push_back(i);
+      Screened s{name, 0, VectorXd::Zero(static_cast<Index>(unknowns.size()))};
       while (!own.empty()) {
         const Posterior p = solve(own);
         const auto value = [&](std::size_t k) { return p.mean[static_cast<Index>(base.size() + k)]; };
         const auto one_sided = [&](std::size_t k) {
-          return unknowns[e][static_cast<std::size_t>(columns[own[k]].unknown)].low >= 0;
+          return unknowns[static_cast<std::size_t>(columns[own[k]].unknown)].low >= 0;
         };
         // of sizes with one sign, the one that comes out farthest on the other is none
         std::size_t worst = own.size();
@@ -355,7 +389,7 @@ class Diagnoser {
       const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
       if (u.size && u.low >= 0) log_prior += std::log(2.0);
     }
-    Answer a = weigh(Answer::Kind::effect, effects, fit.point, eta_sd(fit.point, h.shared()), log_prior);
+    Answer a = weigh(Answer::Kind::effect, effects, fit.point, log_prior);
     a.fit = std::move(fit);
     return a;
   }
@@ -382,7 +416,7 @@ class Diagnoser {
     for (Answer& a : d.answers)
       if (a.kind == Answer::Kind::effect) {
         const Hypothesis h(uncertain_, a.effects);
-        add(h, a.fit.point, eta_sd(a.fit.point, h.shared()), a.left);
+        add(h, a.fit.point, together(evidence_.floor(), form_error(a.fit.point, shared_)), a.left);
       }
     std::vector<Signature> rows = fitter_.residuals(candidates);
     for (std::size_t i = 0; i < of.size(); ++i)
@@ -407,6 +441,7 @@ class Diagnoser {
   const sim::Randomisation& uncertain_;
   const DiagnoseOptions& options_;
   int threads_;
+  Index shared_;  ///< of all hypotheses' unknowns
   std::vector<char> all_;
   mutable Evidence evidence_;
   Fitter fitter_;

@@ -7,23 +7,36 @@ namespace {
 
 /// How far what is near a surface reaches: a wing's length.
 constexpr double kReach_m = 0.07;
-/// What two good models of one vehicle differ by, as a share of the signal: of the constant, and of what changes with an
-/// input, by channel and harmonic. Found between this simulator and the blind robot on development vehicles, after the fit of
+/// What two good models of one vehicle differ by, as a share of the signal: of the constant, of what changes with an
+/// input, and with the velocity, by channel and harmonic. Found between this simulator and the blind robot on development vehicles, after the fit of
 /// parameters, as the variance that makes their residuals most probable; a quarter larger here (docs/gap.md).
 struct Shares {
-  double steady[kHarmonics + 1], changing[kHarmonics + 1];
+  double steady[kHarmonics + 1], changing[kHarmonics + 1], velocity[kHarmonics + 1];
 };
-constexpr Shares kTorque[3] = {{{0.0031, 0.0108, 0.0139, 0.0059, 0.0254}, {0.0012, 0.0014, 0.0018, 0.0021, 0.0037}},
-                               {{0.0015, 0.0337, 0.0032, 0.0209, 0.0039}, {0.0008, 0.0012, 0.0014, 0.0020, 0.0016}},
-                               {{0.0022, 0.0038, 0.0014, 0.0021, 0.0015}, {0.0005, 0.0010, 0.0005, 0.0008, 0.0006}}};
-constexpr Shares kForce[3] = {{{0.0009, 0.0158, 0.0039, 0.0090, 0.0042}, {0.0005, 0.0006, 0.0006, 0.0011, 0.0007}},
-                              {{0.0015, 0.0055, 0.0100, 0.0084, 0.0108}, {0.0007, 0.0012, 0.0012, 0.0010, 0.0016}},
-                              {{0.0185, 0.0108, 0.0433, 0.0098, 0.0115}, {0.0010, 0.0010, 0.0014, 0.0013, 0.0020}}};
-constexpr Shares kDrive = {{0.01, 0.01, 0.01, 0.01, 0.01}, {0.001, 0.001, 0.001, 0.001, 0.001}};
-constexpr Shares kPath = {{0.0033, 0, 0, 0, 0}, {0.0012, 0, 0, 0, 0}};
-constexpr Shares kTurn = {{0.0007, 0, 0, 0, 0}, {0.0007, 0, 0, 0, 0}};
+constexpr Shares kTorque[3] = {{{0.0013, 0.0059, 0.0047, 0.0020, 0.0109},
+                                {0.0010, 0.0009, 0.0012, 0.0014, 0.0023},
+                                {0.0018, 0.0036, 0.0055, 0.0043, 0.0156}},
+                               {{0.0012, 0.0220, 0.0023, 0.0093, 0.0014},
+                                {0.0004, 0.0008, 0.0009, 0.0011, 0.0012},
+                                {0.0050, 0.0033, 0.0085, 0.0097, 0.0026}},
+                               {{0.0015, 0.0026, 0.0017, 0.0010, 0.0009},
+                                {0.0005, 0.0007, 0.0005, 0.0006, 0.0006},
+                                {0.0005, 0.0105, 0.0007, 0.0055, 0.0006}}};
+constexpr Shares kForce[3] = {{{0.0009, 0.0112, 0.0015, 0.0057, 0.0030},
+                               {0.0005, 0.0005, 0.0005, 0.0007, 0.0006},
+                               {0.0005, 0.0021, 0.0012, 0.0029, 0.0007}},
+                              {{0.0010, 0.0077, 0.0025, 0.0066, 0.0086},
+                               {0.0007, 0.0011, 0.0007, 0.0009, 0.0013},
+                               {0.0008, 0.0035, 0.0062, 0.0011, 0.0061}},
+                              {{0.0091, 0.0054, 0.0236, 0.0078, 0.0091},
+                               {0.0007, 0.0008, 0.0009, 0.0009, 0.0013},
+                               {0.0027, 0.0010, 0.0042, 0.0013, 0.0056}}};
+constexpr Shares kDrive = {
+    {0.01, 0.01, 0.01, 0.01, 0.01}, {0.001, 0.001, 0.001, 0.001, 0.001}, {0.002, 0.002, 0.002, 0.002, 0.002}};
+constexpr Shares kPath = {{0.0021}, {0.0010}, {0.0024}};
+constexpr Shares kTurn = {{0.0006}, {0.0006}, {0.0006}};
 /// Against what changes with an input.
-constexpr double kConstant = 0, kInput = 1, kVelocity = 2.4, kRate = 0.7, kProduct = 0.6, kSquare = 1.5, kPlace = 0.6;
+constexpr double kConstant = 0, kVelocity = -1, kInput = 1, kRate = 0.85, kProduct = 0.7, kSquare = 1.9, kPlace = 0.75;
 
 const Shares& shares_of(int channel) {
   if (channel <= kTorqueZ) return kTorque[channel - kTorqueX];
@@ -41,7 +54,8 @@ double RegimeBasis::floor(int group, int i) const {
   const Shares& s = shares_of(group / kCoefficients);
   const int harmonic = (group % kCoefficients + 1) / 2;
   const double kind = kinds_[static_cast<std::size_t>(i)];
-  return kind == kConstant ? s.steady[harmonic] : kind * s.changing[harmonic];
+  if (kind == kConstant) return s.steady[harmonic];
+  return kind == kVelocity ? s.velocity[harmonic] : kind * s.changing[harmonic];
 }
 
 RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
