@@ -51,9 +51,9 @@ Json number(const std::optional<double>& value) { return value ? Json(*value) : 
 
 std::string unit_of(const std::string& name) {
   static const std::pair<const char*, const char*> kUnits[] = {
-      {"m", "m"},   {"s", "s"},       {"V", "V"},     {"K", "K"},     {"W", "W"},     {"ohm", "ohm"},   {"C", "C"},
-      {"N", "N"},   {"Nm", "Nm"},    {"kg", "kg"},   {"rad", "rad"}, {"m2", "m^2"},  {"m3", "m^3"},    {"s2", "s^2"},
-      {"A", "A"},   {"rad2", "rad^2"}};
+      {"m", "m"},    {"s", "s"},    {"V", "V"},   {"K", "K"},       {"W", "W"},     {"ohm", "ohm"},
+      {"C", "C"},    {"N", "N"},    {"Nm", "Nm"}, {"kg", "kg"},     {"rad", "rad"}, {"m2", "m^2"},
+      {"m3", "m^3"}, {"s2", "s^2"}, {"A", "A"},   {"rad2", "rad^2"}};
   // words from the end, as long as they are units: the first of them over the others
   std::vector<std::string> units;
   std::string rest = name;
@@ -88,8 +88,8 @@ Report report_of(const std::vector<std::string>& names, const std::vector<Carrie
   std::vector<Reported> others;
   for (const Answer& a : d.answers) {
     const bool effect = a.kind == Answer::Kind::effect;
-    Reported c{a.kind, a.effects, effect ? pool_name(a.effects) : kind_name(a.kind), a.probability, a.log_evidence,
-               {},     {},        {}};
+    Reported c{a.kind, a.effects, effect ? pool_name(a.effects) : kind_name(a.kind), a.probability, a.log_evidence, {},
+               {},     {}};
     if (effect) {
       c.sizes = sizes_of(a, uncertain);
       const Losses left = losses_of(around, a.left);
@@ -109,7 +109,8 @@ Report report_of(const std::vector<std::string>& names, const std::vector<Carrie
   }
   r.candidates.insert(r.candidates.end(), others.begin(), others.end());
   const Answer& concluded = d.answers[r.conclusion.answer];
-  if (concluded.kind == Answer::Kind::effect) r.moved = moved_by(concluded.fit, Hypothesis(uncertain, concluded.effects));
+  if (concluded.kind == Answer::Kind::effect)
+    r.moved = moved_by(concluded.fit, Hypothesis(uncertain, concluded.effects));
   else r.moved = moved_by(d.parameters, Hypothesis(uncertain, {}));
   const Signature* stages[] = {&d.nominal, &d.refit, best != nullptr ? &best->left : nullptr};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -141,9 +142,7 @@ Json diagnosis_json(const Report& r) {
                           {"parameters", parameters},
                           {"closure", c.closure ? Json(c.closure->value) : Json(nullptr)}});
   }
-  const auto closure = [&](double Closure::*part) {
-    return r.closure ? Json((*r.closure).*part) : Json(nullptr);
-  };
+  const auto closure = [&](double Closure::*part) { return r.closure ? Json((*r.closure).*part) : Json(nullptr); };
   return {{"schema", 1},
           {"flights", r.flights},
           {"data_faults", faults},

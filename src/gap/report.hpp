@@ -50,7 +50,7 @@ struct Unexplained {
 
 struct Report {
   std::vector<std::string> flights;
-  std::vector<DataFault> faults;     ///< any: nothing else was looked at
+  std::vector<DataFault> faults;  ///< any: nothing else was looked at
   Conclusion conclusion;
   std::vector<Reported> candidates;  ///< effects, the most probable first; then the kinds without one
   std::vector<Unexplained> unexplained;

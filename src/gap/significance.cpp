@@ -10,7 +10,8 @@
 namespace flappy::gap {
 namespace {
 
-constexpr std::size_t kLeastBlocks = 5, kLeastWhiteness = 20;
+constexpr std::size_t kLeastWhiteness = 20;
+constexpr double kLeastBlocks = 5;
 
 /// Regularised incomplete beta function by its continued fraction (Abramowitz and Stegun 26.5.8, by Lentz's method).
 double incomplete_beta(double a, double b, double x) {
@@ -66,17 +67,18 @@ std::optional<Slope> slope_test(const std::vector<double>& x, const std::vector<
   for (std::size_t i = 0; i < x.size(); ++i) squares += x[i] * x[i], products += x[i] * y[i];
   if (!(squares > 0)) return std::nullopt;
   Slope s{products / squares, 1};
-  std::map<int, double> sums;
+  std::map<int, double> sums, weights;
   for (std::size_t i = 0; i < x.size(); ++i)
-    if (x[i] != 0) sums[block[i]] += x[i] * (y[i] - s.slope * x[i]);
-  if (sums.size() < kLeastBlocks) return std::nullopt;
-  double alone = 0, neighbours = 0;
+    if (x[i] != 0) sums[block[i]] += x[i] * (y[i] - s.slope * x[i]), weights[block[i]] += x[i] * x[i] / squares;
+  double uneven = 0, alone = 0, neighbours = 0;
+  for (const auto& [b, w] : weights) uneven += w * w;
+  const double n = 1 / uneven;
+  if (n < kLeastBlocks) return std::nullopt;
   for (auto b = sums.begin(); b != sums.end(); ++b) {
     alone += b->second * b->second;
     const auto next = std::next(b);
     if (next != sums.end() && next->first == b->first + 1) neighbours += b->second * next->second;
   }
-  const double n = static_cast<double>(sums.size());
   const double variance = n / (n - 1) * (alone + 2 * std::max(0.0, neighbours)) / (squares * squares);
   if (variance > 0) s.p_value = t_tail(s.slope / std::sqrt(variance), n - 1);
   else s.p_value = s.slope == 0 ? 1 : 0;

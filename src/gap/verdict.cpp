@@ -54,8 +54,7 @@ Conclusion conclude(const std::vector<Answer>& answers) {
   }
   Conclusion c;
   if (pools.empty()) return c;
-  const auto& [name, pool] =
-      *std::ranges::max_element(pools, {}, [](const auto& named) { return named.second.mass; });
+  const auto& [name, pool] = *std::ranges::max_element(pools, {}, [](const auto& named) { return named.second.mass; });
   const Answer& best = answers[pool.best];
   c.answer = pool.best;
   c.probability = best.probability;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include "gap/significance.hpp"
 
@@ -13,12 +14,19 @@ namespace {
 constexpr int kBlock = 16;
 /// For whiteness: short, yet longer than the hats of beats.
 constexpr int kShortBlock = 8;
-constexpr std::size_t kNoiseCourses = 4;
+constexpr double kMostMemory = 0.95;
 /// Ends of all bands but the highest.
 constexpr double kBandEnds_Hz[] = {0.5, 1, 2, 4, 8};
 
 /// A coefficient's part in the mean square of its waveform.
 double share_of(int coefficient) { return coefficient == 0 ? 1 : 0.5; }
+
+/// How much of the variance of noise that remembers the beat before lies below a frequency, as a share of half the beats': the
+/// integral of (1 - past^2) / |1 - past exp(i pi f)|^2.
+double share_below(double frequency, double past) {
+  if (frequency >= 1) return 1;
+  return 2 / std::numbers::pi * std::atan((1 + past) / (1 - past) * std::tan(std::numbers::pi / 2 * frequency));
+}
 
 std::string in_short(double value) {
   char text[32];
@@ -34,7 +42,7 @@ struct Beat {
 class ChannelRows {
  public:
   ChannelRows(const Surroundings& around, const Signature& residual, int channel, const std::string& stage)
-      : around_(around), residual_(residual), channel_(channel), stage_(stage) {
+      : around_(around), channel_(channel), stage_(stage) {
     const std::vector<int> all = blocks_of(around.beats, kBlock), fine = blocks_of(around.beats, kShortBlock);
     std::size_t i = 0;
     for (std::size_t f = 0; f < around.beats.size(); ++f)
@@ -46,7 +54,9 @@ class ChannelRows {
         }
     for (int c = 0; c < kCoefficients; ++c) {
       rows_.emplace_back();
-      for (const Beat& b : beats_) rows_.back().push_back(row(residual, b, c));
+      for (const Beat& b : beats_)
+        rows_.back().push_back(
+            residual[b.flight][b.beat * kRowsPerBeat + static_cast<std::size_t>(channel * kCoefficients + c)]);
     }
   }
 
@@ -65,10 +75,6 @@ class ChannelRows {
   }
 
  private:
-  double row(const Signature& s, const Beat& b, int coefficient) const {
-    return s[b.flight][b.beat * kRowsPerBeat +
-                       static_cast<std::size_t>(channel_ * kCoefficients + coefficient)];
-  }
   double noise_sd(int coefficient) const {
     return around_.noise_sd[static_cast<std::size_t>(channel_ * kCoefficients + coefficient)];
   }
@@ -119,33 +125,58 @@ class ChannelRows {
     }
   }
 
+  /// Of noise that remembers the beat before, from neighbours within blocks, whose means are taken off: what is slow is no noise. A mean
+  /// of so few takes some of the memory along (Kendall 1954).
+  double memory() const {
+    std::vector<double> sums(1, 0), counts(1, 0);
+    const std::vector<double>& y = rows_[0];
+    std::vector<std::size_t> index;
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      if (i > 0 && block_[i] != block_[i - 1]) sums.push_back(0), counts.push_back(0);
+      sums.back() += y[i], counts.back() += 1;
+      index.push_back(sums.size() - 1);
+    }
+    const auto off = [&](std::size_t i) { return y[i] - sums[index[i]] / counts[index[i]]; };
+    double products = 0, squares = 0;
+    for (std::size_t i = 1; i < y.size(); ++i) {
+      if (index[i] != index[i - 1] || beats_[i].beat != beats_[i - 1].beat + 1) continue;
+      products += off(i) * off(i - 1);
+      squares += (off(i) * off(i) + off(i - 1) * off(i - 1)) / 2;
+    }
+    if (!(squares > 0)) return 0;
+    return std::clamp((products / squares + 1.0 / kBlock) / (1 - 3.0 / kBlock), -kMostMemory, kMostMemory);
+  }
+
   void test_bands(std::vector<Place>& places) const {
     std::vector<double> ends(std::begin(kBandEnds_Hz), std::end(kBandEnds_Hz));
     ends.push_back(*std::ranges::max_element(around_.beats_Hz) / 2);
-    Bands left, noise;
-    const auto sum = [&](const Signature& s, Bands& to) {
-      for (std::size_t f = 0; f < around_.beats.size(); ++f) {
-        std::vector<double> y(around_.beats[f], 0);
-        for (const Beat& b : beats_)
-          if (b.flight == f) y[b.beat] = row(s, b, 0);
-        add_bands(y, around_.beats_Hz[f], ends, to);
+    const double past = memory();
+    Bands left;
+    std::vector<double> noise(ends.size(), 0);  // mean square of noise of variance 1, by band
+    for (std::size_t f = 0; f < around_.beats.size(); ++f) {
+      std::vector<double> y(around_.beats[f], 0);
+      double covered = 0;
+      for (const Beat& b : beats_)
+        if (b.flight == f) y[b.beat] = rows_[0][static_cast<std::size_t>(&b - beats_.data())], covered += 1;
+      if (covered == 0) continue;
+      add_bands(y, around_.beats_Hz[f], ends, left);
+      double from = 0;
+      for (std::size_t b = 0; b < ends.size(); ++b) {
+        const double to = std::min(1.0, 2 * ends[b] / around_.beats_Hz[f]);
+        noise[b] += (share_below(to, past) - share_below(from, past)) * covered / static_cast<double>(beats_.size());
+        from = to;
       }
-    };
-    sum(residual_, left);
-    for (const Signature& course : around_.noise) sum(course, noise);
-    double total = 0;
-    for (const double p : noise.power) total += p;
-    const std::size_t highest = ends.size() - 1;
-    if (!(noise.power[highest] > 0) || !(left.power[highest] > 0)) return;
-    const double scale = left.power[highest] / noise.power[highest];
-    for (std::size_t b = 0; b < highest; ++b) {
-      if (!(noise.power[b] > 0)) continue;
-      add("frequency", (b == 0 ? "0" : in_short(ends[b - 1])) + " to " + in_short(ends[b]) + " Hz",
-          std::sqrt(left.power[b] / static_cast<double>(beats_.size())), noise_sd(0) * std::sqrt(noise.power[b] / total),
-          f_tail(left.power[b] / noise.power[b] / scale, 2 * static_cast<double>(left.bins[b]),
-                 2 * static_cast<double>(noise.bins[b])),
-          places);
     }
+    const std::size_t highest = ends.size() - 1;
+    if (!(left.power[highest] > 0)) return;
+    const double scale = left.power[highest] / noise[highest];
+    for (std::size_t b = 0; b < highest; ++b)
+      if (left.bins[b] > 0)
+        add("frequency", (b == 0 ? "0" : in_short(ends[b - 1])) + " to " + in_short(ends[b]) + " Hz",
+            std::sqrt(left.power[b] / static_cast<double>(beats_.size())), noise_sd(0) * std::sqrt(noise[b]),
+            f_tail(left.power[b] / noise[b] / scale, 2 * static_cast<double>(left.bins[b]),
+                   2 * static_cast<double>(left.bins[highest])),
+            places);
   }
 
   void test_input(const Quantity& q, std::vector<Place>& places) const {
@@ -181,7 +212,6 @@ class ChannelRows {
   }
 
   const Surroundings& around_;
-  const Signature& residual_;
   int channel_;
   const std::string& stage_;
   std::vector<Beat> beats_;
@@ -201,7 +231,6 @@ const char* channel_unit(int channel) {
 Surroundings surroundings_of(const std::vector<CarriedFlight>& flights, std::vector<double> noise_sd) {
   Surroundings s;
   s.noise_sd = std::move(noise_sd);
-  s.noise.resize(kNoiseCourses);
   const auto quantity = [&](const char* name, const char* unit, auto&& value) {
     Quantity q{name, unit, {}};
     for (const CarriedFlight& f : flights) {
@@ -216,8 +245,6 @@ Surroundings surroundings_of(const std::vector<CarriedFlight>& flights, std::vec
     s.covered.emplace_back();
     for (std::size_t j = 0; j < f.beats(); ++j)
       for (int channel = 0; channel < kChannels; ++channel) s.covered.back().push_back(f.covers(j, channel) ? 1 : 0);
-    for (std::size_t i = 0; i < kNoiseCourses; ++i)
-      s.noise[i].push_back(f.declared_noise(100 + i + kNoiseCourses * s.noise[i].size()));
   }
   using R = const Recording&;
   using B = const Regime&;
@@ -251,8 +278,7 @@ Surroundings surroundings_of(const std::vector<CarriedFlight>& flights, std::vec
 
 std::vector<Place> locate(const Surroundings& around, const Signature& residual, const std::string& stage) {
   std::vector<Place> places;
-  for (int channel = 0; channel < kChannels; ++channel)
-    ChannelRows(around, residual, channel, stage).test_all(places);
+  for (int channel = 0; channel < kChannels; ++channel) ChannelRows(around, residual, channel, stage).test_all(places);
   std::vector<double> p_values;
   for (const Place& p : places) p_values.push_back(p.p_value);
   const std::vector<char> found = discoveries(p_values, kFalseDiscoveries);
@@ -264,7 +290,8 @@ std::vector<Place> largest_discoveries(const std::vector<Place>& places, const s
   std::vector<Place> list;
   for (const Place& p : places)
     if (p.stage == stage && p.discovered && p.test != "input" && p.test != "whiteness") list.push_back(p);
-  std::ranges::stable_sort(list, std::greater{}, [](const Place& p) { return p.gap / std::max(p.noise_floor, 1e-300); });
+  std::ranges::stable_sort(list, std::greater{},
+                           [](const Place& p) { return p.gap / std::max(p.noise_floor, 1e-300); });
   if (list.size() > most) list.resize(most);
   return list;
 }

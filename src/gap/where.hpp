@@ -4,7 +4,7 @@
 //   channel     all beats
 //   regime      a third of the beats: low, middle and high ones of height, speed, ...
 //   phase       mean or one harmonic of the beats: where in the stroke
-//   frequency   a band of the beats' means, against the declared noise's spectrum and the highest band, so that its scale needs no belief
+//   frequency   a band of the beats' means, against the highest band and the spectrum of noise that remembers one beat
 //   input       what is proportional to an input
 //   whiteness   whether blocks of beats remember the blocks before; not of motion capture, whose rows are differences
 // The first three and inputs test mean rows in blocks of beats (gap/significance.hpp), the most telling coefficient of a channel standing for
@@ -32,8 +32,7 @@ struct Surroundings {
   std::vector<double> beats_Hz;            ///< of each flight
   std::vector<std::vector<char>> covered;  ///< [flight][beat][channel]
   std::vector<Quantity> regimes, inputs;
-  std::vector<double> noise_sd;            ///< [group]
-  std::vector<Signature> noise;            ///< courses of declared noise, for its spectrum
+  std::vector<double> noise_sd;  ///< [group]
   bool covers(std::size_t flight, std::size_t beat, int channel) const {
     return covered[flight][beat * kChannels + static_cast<std::size_t>(channel)] != 0;
   }

@@ -32,10 +32,11 @@ void draw(const std::filesystem::path& path, const std::string& script) {
 /// Residual over noise by channel: a group of bars for each, one for each stage.
 std::string residual_script(const Report& r) {
   const std::size_t stages = r.effect ? 3 : 2;
-  std::string script = style("residuals") +
-                       "set grid ytics lc '#dddddd' lt 1\nset key outside top center horizontal\nset style fill solid\n"
-                       "set style data histogram\nset style histogram clustered gap 1\nset boxwidth 0.9\nset logscale y\n"
-                       "set ylabel 'rms of residual over noise'\nset xtics rotate by -40\n$rows << end_of_rows\n";
+  std::string script =
+      style("residuals") +
+      "set grid ytics lc '#dddddd' lt 1\nset key outside top center horizontal\nset style fill solid\n"
+      "set style data histogram\nset style histogram clustered gap 1\nset boxwidth 0.9\nset logscale y\n"
+      "set ylabel 'rms of residual over noise'\nset xtics rotate by -40\n$rows << end_of_rows\n";
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if (!(r.over_noise[0][channel] > 0)) continue;
     script += channel_name(static_cast<int>(channel));
@@ -45,8 +46,8 @@ std::string residual_script(const Report& r) {
   script += "end_of_rows\nplot ";
   const char* const titles[] = {"nominal", "parameters refitted", "with the best effect"};
   for (std::size_t s = 0; s < stages; ++s)
-    script += std::string(s == 0 ? "" : ", ") + "$rows using " + std::to_string(s + 2) +
-              ":xtic(strcol(1)) lc '" + kColours[s] + "' title '" + titles[s] + "'";
+    script += std::string(s == 0 ? "" : ", ") + "$rows using " + std::to_string(s + 2) + ":xtic(strcol(1)) lc '" +
+              kColours[s] + "' title '" + titles[s] + "'";
   return script + ", 1 with lines lc '#a63603' title 'noise alone'\n";
 }
 
@@ -85,22 +86,23 @@ void write_tables(const std::filesystem::path& folder, const Report& r) {
       "unit\n";
   for (std::size_t i = 0; i < r.candidates.size(); ++i) {
     const Reported& c = r.candidates[i];
-    const std::string first = std::to_string(i + 1) + "," + kind_name(c.kind) + "," + joined(c.effects, "+") + "," +
-                              c.group + "," + digits(c.probability) + "," + digits(c.log_evidence) + "," +
-                              digits(c.loss) + "," +
-                              (c.closure ? digits(c.closure->value) + "," + digits(c.closure->low) + "," +
-                                               digits(c.closure->high)
-                                         : std::string(",,")) +
-                              ",";
+    const std::string first =
+        std::to_string(i + 1) + "," + kind_name(c.kind) + "," + joined(c.effects, "+") + "," + c.group + "," +
+        digits(c.probability) + "," + digits(c.log_evidence) + "," + digits(c.loss) + "," +
+        (c.closure ? digits(c.closure->value) + "," + digits(c.closure->low) + "," + digits(c.closure->high)
+                   : std::string(",,")) +
+        ",";
     if (c.sizes.empty()) candidates += first + ",,,,\n";
     for (const Size& s : c.sizes)
-      candidates += first + s.name + "," + digits(s.value) + "," + digits(s.low) + "," + digits(s.high) + "," + s.unit + "\n";
+      candidates +=
+          first + s.name + "," + digits(s.value) + "," + digits(s.low) + "," + digits(s.high) + "," + s.unit + "\n";
   }
   io::write_atomically(folder / "candidates.csv", candidates);
 
   std::string terms = "channel,function,share_of_signal,gain_nats\n";
   for (const Unexplained& u : r.unexplained)
-    terms += std::string(channel_name(u.channel)) + "," + u.function + "," + digits(u.share) + "," + digits(u.gain) + "\n";
+    terms +=
+        std::string(channel_name(u.channel)) + "," + u.function + "," + digits(u.share) + "," + digits(u.gain) + "\n";
   io::write_atomically(folder / "unexplained.csv", terms);
 }
 

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cstdarg>
 #include <cstdio>
+#include <filesystem>
 
 namespace flappy::gap {
 namespace {
 
-constexpr std::size_t kSizes = 8, kRunnersUp = 3, kPlaces = 3, kMoved = 4, kTerms = 3;
+constexpr std::size_t kSizes = 12, kRunnersUp = 3, kMoved = 4, kTerms = 3;
 
 __attribute__((format(printf, 1, 2))) std::string text(const char* format, ...) {
   char line[400];
@@ -47,7 +48,8 @@ std::string verdict_line(const Conclusion& c) {
 }
 
 std::string next_line(const Conclusion& c, const std::string& out) {
-  const std::string vehicle = (out.empty() ? "DIR" : out) + "/vehicle_corrected.toml";
+  const std::string vehicle =
+      (out.empty() ? "DIR" : std::filesystem::absolute(out).lexically_normal().string()) + "/vehicle_corrected.toml";
   switch (c.kind) {
     case Conclusion::Kind::effect:
     case Conclusion::Kind::parameters:
@@ -64,9 +66,20 @@ std::string next_line(const Conclusion& c, const std::string& out) {
   return "";
 }
 
-const char* answer_of(const Reported& c, std::string& space) {
-  space = c.kind == Answer::Kind::effect ? listed(c.effects, "and") : "(" + c.group + ")";
-  return space.c_str();
+/// What stands out most in the stroke, in what the vehicle did and in frequency.
+std::vector<Place> one_of_each_test(const Report& r) {
+  std::vector<Place> list;
+  for (const char* test : {"phase", "regime", "frequency"})
+    for (const Place& p : largest_discoveries(r.places, "refit", r.places.size()))
+      if (p.test == test) {
+        list.push_back(p);
+        break;
+      }
+  return list;
+}
+
+std::string name_of(const Reported& c) {
+  return c.kind == Answer::Kind::effect ? listed(c.effects, "and") : "(" + c.group + ")";
 }
 
 }  // namespace
@@ -74,7 +87,7 @@ const char* answer_of(const Reported& c, std::string& space) {
 std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   std::vector<std::string> lines = {verdict_line(r.conclusion)};
   if (r.conclusion.kind == Conclusion::Kind::data) {
-    for (std::size_t i = 0; i < r.faults.size() && i + 2 < kSummaryLines; ++i)
+    for (std::size_t i = 0; i < r.faults.size() && i + 3 < kSummaryLines; ++i)
       lines.push_back(text("  %s:%d: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
     lines.push_back(next_line(r.conclusion, out));
     return lines;
@@ -87,7 +100,8 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   const Reported* concluded = nullptr;
   for (const Reported* c : ranked)
     if (concluded == nullptr && named && c->kind == Answer::Kind::effect &&
-        std::ranges::all_of(c->effects, [&](const std::string& e) { return std::ranges::count(r.conclusion.effects, e) > 0; }))
+        std::ranges::all_of(c->effects,
+                            [&](const std::string& e) { return std::ranges::count(r.conclusion.effects, e) > 0; }))
       concluded = c;
   if (concluded != nullptr) {
     lines.push_back("size, with its 90 % interval:");
@@ -100,28 +114,28 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   if (r.conclusion.kind == Conclusion::Kind::unknown && !r.unexplained.empty()) {
     lines.push_back("what is left depends on:");
     for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
-      lines.push_back(text("  %s on %s, %.0f %% of the signal or so (%.0f nats)", channel_name(r.unexplained[i].channel),
-                           r.unexplained[i].function.c_str(), 100 * r.unexplained[i].share, r.unexplained[i].gain));
+      lines.push_back(text("  %s on %s, %.0f %% of the signal or so (%.0f nats)",
+                           channel_name(r.unexplained[i].channel), r.unexplained[i].function.c_str(),
+                           100 * r.unexplained[i].share, r.unexplained[i].gain));
   }
-  std::string space;
   std::string others;
   std::size_t shown = 0;
   for (const Reported* c : ranked) {
     const bool is = named ? c == concluded : kind_name(c->kind) == std::string(kind_name(r.conclusion.kind));
     if (is || shown == kRunnersUp) continue;
-    others += text("%s%s %.2g", shown == 0 ? "" : ", ", answer_of(*c, space), c->probability);
+    others += text("%s%s %.2g", shown == 0 ? "" : ", ", name_of(*c).c_str(), c->probability);
     ++shown;
   }
   lines.push_back("runners-up: " + others);
-  const std::vector<Place> places = largest_discoveries(r.places, "refit", kPlaces);
+  const std::vector<Place> places = one_of_each_test(r);
   lines.push_back(places.empty() ? "with parameters refitted nothing stands out of the noise"
                                  : "where the gap lies, with parameters refitted (rms, that of noise):");
   for (const Place& p : places)
-    lines.push_back(text("  %-12s %-34s %8.3g, noise %.3g %s (p %.1g)", channel_name(p.channel), p.regime.c_str(), p.gap,
-                         p.noise_floor, channel_unit(p.channel), p.p_value));
+    lines.push_back(text("  %-12s %-34s %8.3g, noise %.3g %s (p %.1g)", channel_name(p.channel), p.regime.c_str(),
+                         p.gap, p.noise_floor, channel_unit(p.channel), p.p_value));
   const auto loss = [](const std::optional<double>& e) { return e ? text("%.3g", *e) : std::string("-"); };
-  lines.push_back("mean loss in flights held out: vehicle's file " + loss(r.nominal) + ", parameters refitted " + loss(r.refit) +
-                  ", with the best effect " + loss(r.effect) + ", noise alone " + loss(r.noise_floor));
+  lines.push_back("mean loss in flights held out: vehicle's file " + loss(r.nominal) + ", parameters refitted " +
+                  loss(r.refit) + ", with the best effect " + loss(r.effect) + ", noise alone " + loss(r.noise_floor));
   if (r.closure)
     lines.push_back(text("the best effect closes %.0f %% of what refitting leaves (90 %%: %.0f to %.0f %%)",
                          100 * r.closure->value, 100 * r.closure->low, 100 * r.closure->high));
@@ -132,7 +146,6 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
       lines.push_back(text("  %-36s %+10.2f", r.moved[i].name.c_str(), r.moved[i].prior_sd));
   }
   lines.push_back(next_line(r.conclusion, out));
-  if (lines.size() > kSummaryLines) lines.resize(kSummaryLines);
   return lines;
 }
 

@@ -1,4 +1,4 @@
-// A diagnosis in at most kSummaryLines lines that a person can act on.
+// A diagnosis in fewer than kSummaryLines lines that a person can act on.
 #pragma once
 
 #include <string>
