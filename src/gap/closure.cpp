@@ -45,7 +45,7 @@ Losses losses_of(const Surroundings& around, const Signature& residual) {
         double sum = 0, n = 0;
         for (int c = 0; c < kCoefficients; ++c) {
           if (!has_rows(channel, c)) continue;
-          const auto g = static_cast<std::size_t>(channel * kCoefficients + c);
+          const std::size_t g = group_of(channel, c);
           sum += huber_loss(residual[f][j * kRowsPerBeat + g] / around.noise_sd[g]);
           n += 1;
         }

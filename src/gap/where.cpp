@@ -55,8 +55,7 @@ class ChannelRows {
     for (int c = 0; c < kCoefficients; ++c) {
       rows_.emplace_back();
       for (const Beat& b : beats_)
-        rows_.back().push_back(
-            residual[b.flight][b.beat * kRowsPerBeat + static_cast<std::size_t>(channel * kCoefficients + c)]);
+        rows_.back().push_back(residual[b.flight][b.beat * kRowsPerBeat + group_of(channel, c)]);
     }
   }
 
@@ -75,9 +74,7 @@ class ChannelRows {
   }
 
  private:
-  double noise_sd(int coefficient) const {
-    return around_.noise_sd[static_cast<std::size_t>(channel_ * kCoefficients + coefficient)];
-  }
+  double noise_sd(int coefficient) const { return around_.noise_sd[group_of(channel_, coefficient)]; }
   void add(const char* test, const std::string& regime, double gap, double floor, double p,
            std::vector<Place>& places) const {
     places.push_back({stage_, test, channel_, regime, gap, floor, p, false});

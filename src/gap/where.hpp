@@ -20,6 +20,10 @@ namespace flappy::gap {
 
 inline constexpr double kFalseDiscoveries = 0.05;
 
+constexpr std::size_t group_of(int channel, int coefficient) {
+  return static_cast<std::size_t>(channel) * kCoefficients + static_cast<std::size_t>(coefficient);
+}
+
 /// What beats are sorted by, [flight][beat].
 struct Quantity {
   std::string name, unit;

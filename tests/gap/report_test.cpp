@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -272,7 +273,7 @@ TEST(Where, FindsWhatDependsOnHeight) {
   const auto low = [&](std::size_t flight, std::size_t j) { return f.around.regimes[0].values[flight][j] < -0.43; };
   for (std::size_t flight = 0; flight < 3; ++flight)
     for (std::size_t j = 0; j < 340; ++j)
-      if (low(flight, j)) f.residual[flight][j * kRowsPerBeat + kForceZ * kCoefficients] += 6;
+      if (low(flight, j)) f.residual[flight][j * kRowsPerBeat + group_of(kForceZ, 0)] += 6;
   const std::vector<Place> places = locate(f.around, f.residual, "refit");
   const Place& below = place(places, "regime", kForceZ, "height below");
   EXPECT_TRUE(below.discovered);
@@ -301,7 +302,7 @@ TEST(Where, FindsWhatFollowsAnInput) {
   Flown f = flown(2, 0.3);
   for (std::size_t flight = 0; flight < 3; ++flight)
     for (std::size_t j = 0; j < 340; ++j)
-      f.residual[flight][j * kRowsPerBeat + kTorqueY * kCoefficients + 1] += f.around.inputs[0].values[flight][j];
+      f.residual[flight][j * kRowsPerBeat + group_of(kTorqueY, 1)] += f.around.inputs[0].values[flight][j];
   const std::vector<Place> places = locate(f.around, f.residual, "refit");
   const Place& p = place(places, "input", kTorqueY, "input");
   EXPECT_TRUE(p.discovered);
@@ -436,6 +437,39 @@ TEST(Report, SaysWhatToDoInThirtyLines) {
   EXPECT_NE(all().find("imu.csv:7: degrees"), std::string::npos);
 }
 
+TEST(Report, JsonTellsNoGapByNull) {
+  Report r;
+  r.flights = {"a"};
+  r.faults = {{"imu.csv", 3, "degrees"}};
+  r.conclusion = {Conclusion::Kind::data, {}, 1, 0};
+  r.refit = 0.6;
+  Reported c;
+  c.effects = {"wind"};
+  c.group = "world_force";
+  c.sizes = {{"wind.x_m_s", 0.3, 0.1, 0.5, "m/s"}};
+  r.candidates = {c};
+  for (int i = 0; i < 30; ++i)
+    r.places.push_back({i < 2 ? "effect" : "refit", i == 2 ? "input" : "regime", kForceZ, "height below 1 m",
+                        static_cast<double>(i), 1, 0.01, i != 29});
+  nlohmann::ordered_json j = diagnosis_json(r);
+  EXPECT_EQ(j["data_faults"].dump(), R"([{"file":"imu.csv","line":3,"what":"degrees"}])");
+  EXPECT_EQ(j["verdict"].dump(), R"({"kind":"data","effects":[],"probability":1.0})");
+  EXPECT_EQ(
+      j["candidates"].dump(),
+      R"([{"effects":["wind"],"group":"world_force","probability":0.0,"parameters":{"wind.x_m_s":{"value":0.3,"low":0.1,"high":0.5,"unit":"m/s"}},"closure":null}])");
+  EXPECT_TRUE(j["gap"]["nominal"].is_null());
+  EXPECT_EQ(j["gap"]["refit"], 0.6);
+  EXPECT_TRUE(j["gap"]["closure_low"].is_null());
+  ASSERT_EQ(j["where"].size(), 20u);
+  EXPECT_EQ(j["where"][0].dump(),
+            R"({"channel":"force_z","regime":"height below 1 m","gap":28.0,"noise_floor":1.0,"p_value":0.01})");
+  r.closure = Closure{0.9, 0.8, 0.95};
+  r.candidates[0].closure = r.closure;
+  j = diagnosis_json(r);
+  EXPECT_EQ(j["gap"]["closure_high"], 0.95);
+  EXPECT_EQ(j["candidates"][0]["closure"], 0.9);
+}
+
 std::string contents(const std::filesystem::path& path) { return io::read_text(path); }
 
 /// `kind` and numbers of the types that the schema has.
@@ -489,7 +523,19 @@ TEST(RunDiagnose, ReadsNoTruth) {
   const std::string line = honest.substr(lie.size(), honest.find('\n', lie.size()) + 1 - lie.size());
   for (int i = 0; i < 100; ++i) lie += std::to_string(i) + line.substr(line.find(','));
   std::ofstream(truth) << lie;
+  // and, in one go, without gnuplot: a line of warning, all else written
+  for (const char* figure : {"residuals.svg", "probabilities.svg"}) {
+    EXPECT_TRUE(contents(folder / "out" / figure).ends_with("</svg>\n\n")) << figure;
+    std::filesystem::remove(folder / "out" / figure);
+  }
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", "/nowhere", 1);
+  testing::internal::CaptureStderr();
   EXPECT_EQ(result(), with_truth) << "beside a lie";
+  setenv("PATH", path.c_str(), 1);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "warning: " + (folder / "out/residuals.svg").string() + ": is not written: gnuplot is not installed\n");
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/residuals.svg"));
 }
 
 }  // namespace

@@ -21,8 +21,8 @@ std::string digits(const std::optional<double>& value) { return value ? io::shor
 std::string digits(double value) { return io::shortest_digits(value); }
 
 std::string style(const char* name) {
-  return "set terminal svg size 760,420 dynamic background '#ffffff' font 'sans-serif,14' name '" + std::string(name) +
-         "'\nset encoding utf8\nset border 3 lc '#444444'\nset tics nomirror\n";
+  return "set terminal svg size 760,420 dynamic noenhanced background '#ffffff' font 'sans-serif,14' name '" +
+         std::string(name) + "'\nset encoding utf8\nset border 3 lc '#444444'\nset tics nomirror\n";
 }
 
 void draw(const std::filesystem::path& path, const std::string& script) {
@@ -32,11 +32,11 @@ void draw(const std::filesystem::path& path, const std::string& script) {
 /// Residual over noise by channel: a group of bars for each, one for each stage.
 std::string residual_script(const Report& r) {
   const std::size_t stages = r.effect ? 3 : 2;
-  std::string script =
-      style("residuals") +
-      "set grid ytics lc '#dddddd' lt 1\nset key outside top center horizontal\nset style fill solid\n"
-      "set style data histogram\nset style histogram clustered gap 1\nset boxwidth 0.9\nset logscale y\n"
-      "set ylabel 'rms of residual over noise'\nset xtics rotate by -40\n$rows << end_of_rows\n";
+  std::string script = style("residuals") +
+                       "set grid ytics lc '#dddddd' lt 1\nset key outside top center horizontal\nset style fill solid\n"
+                       "set style data histogram\nset style histogram clustered gap 1\nset boxwidth 0.9\nset logscale "
+                       "y\nset yrange [0.5:*]\n"
+                       "set ylabel 'rms of residual over noise'\nset xtics rotate by -40\n$rows << end_of_rows\n";
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if (!(r.over_noise[0][channel] > 0)) continue;
     script += channel_name(static_cast<int>(channel));
