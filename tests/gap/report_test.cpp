@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -179,6 +180,8 @@ TEST(Significance, SeesAMeanAndASlope) {
   EXPECT_NEAR(slope_test(x, tilted, block)->slope, 0.5, 0.25);
   EXPECT_LT(slope_test(x, tilted, block)->p_value, 1e-5);
   EXPECT_FALSE(slope_test(std::vector<double>(1000, 0), y, block));
+  EXPECT_FALSE(slope_test(std::vector<double>(70, 1), std::vector<double>(y.begin(), y.begin() + 70), block))
+      << "four blocks and a bit";
   // flights do not touch: the last block of one and the first of the next
   EXPECT_GT(block[500], block[499] + kWhitenessLags);
 }
@@ -260,10 +263,18 @@ const Place& place(const std::vector<Place>& places, const std::string& test, in
 
 TEST(Where, FindsNothingInNoise) {
   int found = 0;
+  std::map<std::string, std::pair<double, double>> low;  // p below 0.05, of all
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const Flown f = flown(seed, 0.3);
-    for (const Place& p : locate(f.around, f.residual, "refit")) found += p.discovered;
+    for (const Place& p : locate(f.around, f.residual, "refit")) {
+      found += p.discovered;
+      low[p.test].first += p.p_value < 0.05;
+      low[p.test].second += 1;
+    }
   }
+  // of 160 whiteness tests and 280 and more of each other kind: 5 % +- 2 % and 1.3 %, as above some more
+  for (const auto& [test, n] : low) EXPECT_LT(n.first, 0.1 * n.second) << test;
+  EXPECT_EQ(low.size(), 6u);
   // without a gap any discovery is false: one table in twenty may have some, and the tests are within a few percent of exact
   EXPECT_LE(found, 4);
 }
