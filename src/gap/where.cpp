@@ -30,7 +30,7 @@ double share_below(double frequency, double past) {
 
 std::string in_short(double value) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
+  std::snprintf(text, sizeof text, "%.4g", value);
   return text;
 }
 
