@@ -91,3 +91,7 @@ file(REMOVE ${WORK}/bad/flight.toml)
 expect_refused("${WORK}/bad/flight.toml: cannot be read: No such file or directory" check ${WORK}/bad)
 expect_refused("flappy-gap: A subcommand is required; see flappy-gap --help")
 expect_refused("flappy-gap: flight is required; see flappy-gap --help" check)
+set(diagnose diagnose --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --priors ${SOURCE}/configs/gap/priors.toml
+  --flights ${WORK}/good)
+expect_refused("command line: --withhold: no effect \"gale\"; accepted: identifiers of docs/effects.md" ${diagnose} --withhold gale)
+expect_refused("--out: ${WORK}/good/imu.csv: Not a directory; accepted: a folder" ${diagnose} --out ${WORK}/good/imu.csv)

@@ -10,7 +10,7 @@ namespace flappy::gap {
 struct DiagnoseCommand {
   std::string vehicle, priors = "configs/gap/priors.toml";
   std::vector<std::string> flights, withheld;
-  std::string out;  ///< folder for vehicle_corrected.toml; empty: none
+  std::string out;  ///< folder for all files; empty: none
   int threads = 0;  ///< 0: one for each processor
 };
 

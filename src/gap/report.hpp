@@ -1,0 +1,79 @@
+// What a diagnosis has to tell: a verdict, sizes, where the gap lies and how far it shrinks; diagnosis.json.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gap/closure.hpp"
+#include "gap/verdict.hpp"
+
+namespace flappy::gap {
+
+struct DataFault {
+  std::string file;
+  int line = 0;
+  std::string what;
+};
+
+/// What an effect's parameter is, with its 90 % interval.
+struct Size {
+  std::string name;  ///< effect.parameter
+  double value = 0, low = 0, high = 0;
+  std::string unit;
+};
+
+/// An answer as reported.
+struct Reported {
+  Answer::Kind kind = Answer::Kind::effect;
+  std::vector<std::string> effects;
+  std::string group;  ///< of no effect: its kind
+  double probability = 0, log_evidence = 0;
+  std::vector<Size> sizes;
+  std::optional<double> loss;  ///< E
+  std::optional<Closure> closure;
+};
+
+/// By how much the fit moved a parameter of the vehicle.
+struct Moved {
+  std::string name;
+  double prior_sd = 0;
+};
+
+/// A function of the regime that nothing of the catalogue explains.
+struct Unexplained {
+  int channel = 0;
+  std::string function;
+  double share = 0, gain = 0;
+};
+
+struct Report {
+  std::vector<std::string> flights;
+  std::vector<DataFault> faults;  ///< any: nothing else was looked at
+  Conclusion conclusion;
+  std::vector<Reported> candidates;  ///< effects, the most probable first; then the kinds without one
+  std::vector<Unexplained> unexplained;
+  std::vector<Moved> moved;  ///< parameters beside the concluded effects, the farthest first
+  std::vector<Place> places;
+  std::optional<double> nominal, refit, effect;  ///< E; the effect: of the best candidate with one
+  double noise_floor = 0;
+  std::optional<Closure> closure;
+  std::vector<double> over_noise[3];  ///< by stage: rms of residual over noise, [channel], 0 where there is none
+};
+
+/// Names of the stages of places.
+inline constexpr const char* kStages[] = {"nominal", "refit", "effect"};
+
+/// `names`: of the flights' folders.
+Report report_of(const std::vector<std::string>& names, const std::vector<CarriedFlight>& flights,
+                 const sim::Randomisation& uncertain, const Diagnosis& diagnosis);
+
+/// Its candidates without effects stand for parameters, none and unknown, whose name is their group: all add up to 1.
+/// `closed_loop` and `next_experiment` are left empty.
+nlohmann::ordered_json diagnosis_json(const Report& report);
+
+/// Of an effect's parameter, from its name: "kg/m" of line_kg_m, "" where it has none.
+std::string unit_of(const std::string& name);
+
+}  // namespace flappy::gap

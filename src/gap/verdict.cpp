@@ -1,0 +1,87 @@
+#include "gap/verdict.hpp"
+
+#include <algorithm>
+#include <map>
+
+#include "model/effects/registry.hpp"
+
+namespace flappy::gap {
+namespace {
+
+/// One set is named when it holds so much of everything, or of its pool.
+constexpr double kOfAll = 0.5, kOfPool = 0.8;
+/// Of its pool, what is worth a name in a group.
+constexpr double kLeastShare = 0.05;
+
+}  // namespace
+
+const char* kind_name(Conclusion::Kind kind) {
+  static const char* const kNames[] = {"effect", "group", "parameters", "none", "unknown", "data"};
+  return kNames[static_cast<int>(kind)];
+}
+
+const char* kind_name(Answer::Kind kind) {
+  static const char* const kNames[] = {"none", "parameters", "effect", "unknown"};
+  return kNames[static_cast<int>(kind)];
+}
+
+std::string pool_name(const std::vector<std::string>& effects) {
+  std::vector<std::string> groups;
+  for (const std::string& e : effects) {
+    const int index = model::effect_index(e.c_str());
+    const std::string group = index < 0 ? "" : model::effects()[static_cast<std::size_t>(index)].info.group;
+    groups.push_back(group.empty() ? e : group);
+  }
+  std::ranges::sort(groups);
+  std::string name;
+  for (const std::string& g : groups) name += (name.empty() ? "" : "+") + g;
+  return name;
+}
+
+Conclusion conclude(const std::vector<Answer>& answers) {
+  struct Pool {
+    double mass = 0;
+    std::size_t best = 0;
+  };
+  std::map<std::string, Pool> pools;  // no effect has the name of another kind
+  const auto key = [](const Answer& a) {
+    return a.kind == Answer::Kind::effect ? pool_name(a.effects) : "/" + std::string(kind_name(a.kind));
+  };
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const auto [at, fresh] = pools.try_emplace(key(answers[i]), Pool{0, i});
+    at->second.mass += answers[i].probability;
+    if (answers[i].probability > answers[at->second.best].probability) at->second.best = i;
+  }
+  Conclusion c;
+  if (pools.empty()) return c;
+  const auto& [name, pool] = *std::ranges::max_element(pools, {}, [](const auto& named) { return named.second.mass; });
+  const Answer& best = answers[pool.best];
+  c.answer = pool.best;
+  c.probability = best.probability;
+  c.effects = best.effects;
+  switch (best.kind) {
+    case Answer::Kind::none:
+      c.kind = Conclusion::Kind::none;
+      return c;
+    case Answer::Kind::parameters:
+      c.kind = Conclusion::Kind::parameters;
+      return c;
+    case Answer::Kind::unknown:
+      c.kind = Conclusion::Kind::unknown;
+      return c;
+    case Answer::Kind::effect:
+      break;
+  }
+  c.kind = Conclusion::Kind::effect;
+  if (best.probability >= kOfAll || best.probability >= kOfPool * pool.mass) return c;
+  c.kind = Conclusion::Kind::group;
+  c.probability = pool.mass;
+  for (const Answer& a : answers) {
+    if (key(a) != name || a.probability < kLeastShare * pool.mass) continue;
+    for (const std::string& e : a.effects)
+      if (!std::ranges::count(c.effects, e)) c.effects.push_back(e);
+  }
+  return c;
+}
+
+}  // namespace flappy::gap

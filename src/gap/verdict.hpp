@@ -1,0 +1,27 @@
+// What the probabilities of a diagnosis come to.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gap/diagnose.hpp"
+
+namespace flappy::gap {
+
+/// The largest mass, rivals that such flights often cannot separate (EffectInfo::group) pooled: a set of effects pools with those whose
+/// effects are of the same groups. Of a pool the most probable set is named where it holds half of everything or four fifths of its
+/// pool; otherwise the pool is, and its verdict is `group`.
+struct Conclusion {
+  enum class Kind { effect, group, parameters, none, unknown, data } kind = Kind::unknown;
+  std::vector<std::string> effects;  ///< of a group: of its sets that hold a twentieth of it
+  double probability = 0;            ///< of a group: all of it
+  std::size_t answer = 0;            ///< the most probable one of what is concluded
+};
+Conclusion conclude(const std::vector<Answer>& answers);
+const char* kind_name(Conclusion::Kind kind);
+const char* kind_name(Answer::Kind kind);
+
+/// Groups of the effects, an effect without one being its own: "drive_lag", "body_drag+world_force".
+std::string pool_name(const std::vector<std::string>& effects);
+
+}  // namespace flappy::gap
