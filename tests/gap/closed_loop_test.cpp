@@ -103,9 +103,23 @@ TEST(ClosedLoop, AConfigurationFliesItsOwnPathAndExcitation) {
   EXPECT_GT(std::abs(own["mean_bias_V"].nominal - own["mean_bias_V"].recorded), 0.5);
 }
 
-TEST(ClosedLoop, WhatCannotFlyIsNoNumber) {
+TEST(ClosedLoop, HeadingCountsWholeTurns) {
+  const flight::FlyConfig turn =
+      flight::read_fly_config(source_path("configs/gap/experiments/yaw_turn.toml"), {"flight.duration_s=5.9"});
   std::vector<CarriedFlight> flights;
-  flights.push_back(flown(hover(), nominal(), 4));
+  flights.push_back(flown(turn, nominal(), 2));
+  auto rows = by_quantity(predict_closed_loop(flights, nominal(), nominal(), hover()));
+  // the last second is nearly once round
+  EXPECT_GT(std::abs(rows["yaw_drift_rad"].recorded), 5.5);
+  EXPECT_NEAR(rows["yaw_drift_rad"].corrected, rows["yaw_drift_rad"].recorded, 0.15);
+}
+
+TEST(ClosedLoop, WhatCannotFlyIsNoNumber) {
+  flight::FlyConfig high = hover();  // nothing below: it falls for as long as it is asked to hover
+  high.fleet.batch.world.ground_z_m = -1000;
+  high.fleet.task.start.kind = sim::Start::flying;
+  std::vector<CarriedFlight> flights;
+  flights.push_back(flown(high, nominal(), 4));
   model::Vehicle lead = nominal();
   lead.torso.mass_kg *= 3;
   for (const ClosedLoop& r : predict_closed_loop(flights, nominal(), lead, hover())) {
