@@ -8,7 +8,10 @@ namespace {
 /// Times without the last digits that products of steps leave.
 double tidy(double t_s) { return std::round(t_s * 1e9) / 1e9; }
 
-std::string crash(const Robot& robot, const Room& room) {
+/// Of programmes: farther over, the pilot has lost it.
+constexpr double kLeastUpright = 0.17;
+
+std::string crash(const Robot& robot, const Room& room, double least_upright) {
   const Torso& t = robot.torso();
   const Vector3d& p = t.position_m;
   const double up = 1 - 2 * (t.attitude.x() * t.attitude.x() + t.attitude.y() * t.attitude.y());
@@ -17,7 +20,7 @@ std::string crash(const Robot& robot, const Room& room) {
   if (p.z() > room.ceiling_z_m - 0.019) return "touched the ceiling";
   const Wall& w = room.wall;
   if ((p.x() - w.x_m) * w.normal_x + (p.y() - w.y_m) * w.normal_y < 0.084) return "touched the wall";
-  if (up < 0.17) return "turned over";
+  if (up < least_upright) return "turned over";
   if (p.head<2>().squaredNorm() > 9) return "flew away";
   return {};
 }
@@ -101,11 +104,37 @@ flight::FlightHeader header_of(const Case& c, const SensorSet& sensors, const Ro
 Room flight_room() { return {}; }
 
 Flight fly(const Case& c, std::size_t flight) {
+  const Plan plan(c.programme, flight, flight_room(), c.seed);
+  Pilot pilot(c.vehicle.driver, c.seed, flight);
+
+  // It learns to trim a metre up, in two fifths of the time, and goes where the log begins.
+  const Waypoint home = plan.start();
+  constexpr double kTrimHeight_m = 1;
+  Torso start;
+  start.position_m = {home.position_m.x(), home.position_m.y(), kTrimHeight_m};
+  const auto aim_at = [&](double t_s) {
+    Aim aim = plan.at(std::max(t_s, 0.0));
+    if (t_s < 0) {
+      const double s = std::clamp((t_s + 0.6 * kTrim_s) / (0.3 * kTrim_s), 0.0, 1.0);
+      aim.position_m.z() = kTrimHeight_m + s * s * (3 - 2 * s) * (home.position_m.z() - kTrimHeight_m);
+    }
+    return aim;
+  };
+  double farthest_m = 0;
+  Flight f = fly(c, flight, start, kFlight_s, kLeastUpright, [&](double t_s, double, const Torso& torso) {
+    const Aim aim = aim_at(t_s);
+    if (t_s >= 0) farthest_m = std::max(farthest_m, std::sqrt((torso.position_m - aim.position_m).squaredNorm()));
+    return pilot.steer(torso, aim, plan.excitation(t_s));
+  });
+  f.farthest_m = farthest_m;
+  return f;
+}
+
+Flight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
+           const Steer& steer) {
   const Room room = flight_room();
   const SensorSet sensors = sensors_of(c.seed, c.power, c.wings);
-  const Plan plan(c.programme, flight, room, c.seed);
   Robot robot(c.vehicle, room, c.sizes, c.seed, flight);
-  Pilot pilot(c.vehicle.driver, c.seed, flight);
   Imu imu(sensors, c.sizes, c.seed, flight, kStep_s);
   Mocap mocap(sensors, c.sizes, c.seed, flight);
   Random power_random(c.seed, 100 * flight + 161), wings_random(c.seed, 100 * flight + 162);
@@ -117,23 +146,10 @@ Flight fly(const Case& c, std::size_t flight) {
   if (sensors.wings) f.log.wings.emplace();
   f.truth.resize(flight::kMotionNames.size());
 
-  // It learns to trim a metre up, in two fifths of the time, and goes where the log begins.
-  const Waypoint home = plan.start();
-  constexpr double kTrimHeight_m = 1;
-  Torso start;
-  start.position_m = {home.position_m.x(), home.position_m.y(), kTrimHeight_m};
   robot.place_torso(start);
-  const auto aim_at = [&](double t_s) {
-    Aim aim = plan.at(std::max(t_s, 0.0));
-    if (t_s < 0) {
-      const double s = std::clamp((t_s + 0.6 * kTrim_s) / (0.3 * kTrim_s), 0.0, 1.0);
-      aim.position_m.z() = kTrimHeight_m + s * s * (3 - 2 * s) * (home.position_m.z() - kTrimHeight_m);
-    }
-    return aim;
-  };
 
   const auto steps_of = [](double s) { return static_cast<std::int64_t>(std::lround(s / kStep_s)); };
-  const std::int64_t trim = steps_of(kTrim_s), end = trim + steps_of(kFlight_s), control = steps_of(kControl_s),
+  const std::int64_t trim = steps_of(kTrim_s), end = trim + steps_of(duration_s), control = steps_of(kControl_s),
                      hold = steps_of(c.vehicle.driver.hold_s);
   std::array<double, 2> volts{};
   Inputs inputs;
@@ -147,16 +163,16 @@ Flight fly(const Case& c, std::size_t flight) {
     const std::int64_t step = n - trim;
     const double t_s = static_cast<double>(step) * kStep_s;
     const bool logged = step >= 0;
+    const double turns = static_cast<double>(n) * kStep_s * c.vehicle.driver.flapping_Hz,
+                 beat = turns - std::floor(turns);
     if (n % control == 0) {
-      const Aim aim = aim_at(t_s);
-      inputs = pilot.steer(robot.torso(), aim, plan.excitation(t_s));
+      inputs = steer(t_s, beat, robot.torso());
       if (logged) {
         add_truth(f.truth, t_s, robot, imu.constant_bias_rad_s());
-        f.farthest_m = std::max(f.farthest_m, std::sqrt((robot.torso().position_m - aim.position_m).squaredNorm()));
         f.most_tilt_rad = std::max(f.most_tilt_rad,
                                    std::acos(std::clamp(robot.torso().attitude.toRotationMatrix()(2, 2), -1.0, 1.0)));
       }
-      f.how = crash(robot, room);
+      f.how = crash(robot, room, least_upright);
       if (!f.how.empty()) {
         char text[40];
         std::snprintf(text, sizeof text, " at %.2f s", t_s);
@@ -166,8 +182,6 @@ Flight fly(const Case& c, std::size_t flight) {
       }
     }
     if (n % hold == 0) {
-      const double turns = static_cast<double>(n) * kStep_s * c.vehicle.driver.flapping_Hz,
-                   beat = turns - std::floor(turns);
       volts = {Pilot::voltage(inputs, 0, beat, c.vehicle.left.motor.voltage_limit_V),
                Pilot::voltage(inputs, 1, beat, c.vehicle.right.motor.voltage_limit_V)};
       if (logged) add_command(f.log, t_s, volts, inputs, 2 * kPi * beat);

@@ -1,6 +1,7 @@
 // Whole flights of the blind robot, as logs.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -33,5 +34,14 @@ Room flight_room();
 
 /// Flight 0, 1 or 2 of a case: it learns to trim, then the log begins. The same bytes for the same case.
 Flight fly(const Case& c, std::size_t flight);
+
+/// Who steers: asked once each control period, from kTrim_s before the log begins; `t_s` is on the log's clock, `beat` the
+/// fraction of the beat in [0, 1).
+using Steer = std::function<Inputs(double t_s, double beat, const Torso& torso)>;
+
+/// A flight of `duration_s` from `start` on. It has crashed where it touches something, flies away, or its z axis comes
+/// below `least_upright` over the level (sine of the angle).
+Flight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
+           const Steer& steer);
 
 }  // namespace flappy::blind

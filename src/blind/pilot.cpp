@@ -1,6 +1,6 @@
 #include "blind/pilot.hpp"
 
-#include "flight/pid.hpp"
+#include "blind/view.hpp"
 
 namespace flappy::blind {
 namespace {
@@ -115,29 +115,17 @@ struct Pilot::Memory {
   flight::PidConstants<double> constants = gains();
   flight::Pid<double> pid{};
   model::Driver driver;
-  Random random;
-  Vector3d gyro_bias, position_drift = Vector3d::Zero();
+  View view;
 };
 
 Pilot::Pilot(const model::Driver& driver, std::uint64_t seed, std::uint64_t flight)
-    : memory_(new Memory{.driver = driver, .random = Random(seed, 100 * flight + 151), .gyro_bias = Vector3d::Zero()}) {
-  memory_->gyro_bias = 0.01 * memory_->random.normals();
-}
+    : memory_(new Memory{.driver = driver, .view = View(seed, flight)}) {}
 Pilot::~Pilot() = default;
 
 Inputs Pilot::steer(const Torso& torso, const Aim& aim, const Inputs& excitation) {
   Memory& m = *memory_;
-  // What a filter on mocap and IMU would leave: white noise, a bias of the gyro, a position that wanders by 1 mm.
-  m.position_drift += 0.1e-3 * m.random.normals() - 0.01 * m.position_drift;
+  const flight::Estimate<double> seen = m.view.see(torso);
   const auto vec3 = [](const Vector3d& v) { return model::Vec3<double>{v.x(), v.y(), v.z()}; };
-  const Quaterniond q = torso.attitude * turned_by(0.003 * m.random.normals());
-  const Vector3d velocity = torso.velocity_m_s + 0.01 * m.random.normals();
-  const Vector3d rate = torso.rate_rad_s + m.gyro_bias + 0.05 * m.random.normals();
-  flight::Estimate<double> seen{};
-  seen.position_m = vec3(torso.position_m + m.position_drift);
-  seen.attitude = {q.w(), q.x(), q.y(), q.z()};
-  seen.velocity_m_s = vec3(velocity);
-  seen.body_rate_rad_s = vec3(rate);
   const Turn heading = turn_of(aim.heading_rad);
   flight::Setpoint<double> wanted{};
   wanted.position_m = vec3(aim.position_m);
@@ -146,12 +134,15 @@ Inputs Pilot::steer(const Torso& torso, const Aim& aim, const Inputs& excitation
   wanted.heading = {heading.sin, heading.cos};
   wanted.heading_rate_rad_s = aim.heading_rad_s;
   const auto u = flight::control(m.constants, m.pid, seen, wanted);
-  const model::Driver& d = m.driver;
+  return clipped({u.amplitude_V + excitation.amplitude_V, u.difference_V + excitation.difference_V,
+                  u.bias_V + excitation.bias_V, u.split_cycle + excitation.split_cycle},
+                 m.driver);
+}
+
+Inputs clipped(const Inputs& u, const model::Driver& d) {
   const auto within = [](double x, double most) { return std::clamp(x, -most, most); };
-  return {std::clamp(u.amplitude_V + excitation.amplitude_V, 0.0, d.amplitude_limit_V),
-          within(u.difference_V + excitation.difference_V, d.difference_limit_V),
-          within(u.bias_V + excitation.bias_V, d.bias_limit_V),
-          within(u.split_cycle + excitation.split_cycle, d.split_cycle_limit)};
+  return {std::clamp(u.amplitude_V, 0.0, d.amplitude_limit_V), within(u.difference_V, d.difference_limit_V),
+          within(u.bias_V, d.bias_limit_V), within(u.split_cycle, d.split_cycle_limit)};
 }
 
 double Pilot::voltage(const Inputs& inputs, std::size_t side, double beat, double limit_V) {

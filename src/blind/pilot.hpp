@@ -18,6 +18,9 @@ struct Inputs {
   double amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
 };
 
+/// As the driver clips them.
+Inputs clipped(const Inputs& inputs, const model::Driver& driver);
+
 struct Waypoint {
   double t_s = 0;
   Vector3d position_m = Vector3d::Zero();

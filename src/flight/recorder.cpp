@@ -134,7 +134,7 @@ struct Recorder<T>::Storage {
     if (h.power) log.power.emplace(), power = TickSampler(h.power->rate_hz);
     if (h.wings) log.wings.emplace(), wings = TickSampler(h.wings->rate_hz);
     state = f.batch().state(i);
-    add_truth(0);
+    add_truth(time_s(f.batch().storage().steps));
   }
 
   double time_s(std::int64_t step) const { return static_cast<double>(step) / step_hz; }
@@ -291,6 +291,12 @@ Recorder<T>& Recorder<T>::operator=(Recorder&&) noexcept = default;
 template <class T>
 void Recorder<T>::record() {
   storage_->record();
+}
+
+template <class T>
+std::optional<FlightLog> Recorder<T>::log() const {
+  if (!storage_->complete()) return {};
+  return storage_->log;
 }
 
 template <class T>

@@ -28,7 +28,7 @@ ImuHeader imu_header(const ImuSensor& imu);
 template <class T>
 class Recorder {
  public:
-  /// `i` of `fleet`, before its first period; `vehicle` is its own.
+  /// `i` of `fleet`, before the first period that it is to see; `vehicle` is its own.
   Recorder(const FlyConfig& config, Fleet<T>& fleet, std::size_t i, const model::Vehicle& vehicle);
   ~Recorder();
   Recorder(Recorder&&) noexcept;
@@ -36,6 +36,8 @@ class Recorder {
 
   /// After each control period.
   void record();
+  /// What was recorded so far; nothing before every stream has samples at one time.
+  std::optional<FlightLog> log() const;
   /// Writes log and truth. False, and no log, if the flight ended before every stream had samples at one time.
   bool write(const std::filesystem::path& folder) const;
 

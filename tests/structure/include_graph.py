@@ -24,7 +24,7 @@ ROOMS = {
 # Rooms that may include no more than these files of others, and io: the blind robot shares neither physics nor effects
 # with what it is a test of, only plain data, the log, and what flies.
 ONLY = {
-    "blind": {"flight/flight_log.hpp", "flight/pid.hpp", "flight/excitation.hpp", "model/wing_beat.hpp", "sim/randomise.hpp",
+    "blind": {"flight/flight_log.hpp", "flight/pid.hpp", "flight/episode.hpp", "flight/excitation.hpp", "model/wing_beat.hpp", "sim/randomise.hpp",
               "flappy/vehicle.hpp", "flappy/vehicle_file.hpp"},
 }
 # Which room declares itself in which public header.

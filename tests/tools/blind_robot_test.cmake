@@ -44,3 +44,22 @@ file(GLOB left ${WORK}/c*)
 expect_equal("files left by a refusal" "${left}" "")
 file(WRITE ${WORK}/note.txt "")
 expect_refused("${WORK}/note.txt: is a file; accepted: a folder, or a name for a new one" ${fly} --out ${WORK}/note.txt)
+
+# Escapes under a policy that adds nothing: nobody arrives, and whoever left the bounds is counted.
+file(WRITE ${WORK}/policy.h "#define FLAPPY_POLICY_OBS 29\n#define FLAPPY_POLICY_ACT 4\n"
+  "static void flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT]) {\n"
+  "  action[0] = action[1] = action[2] = action[3] = 0 * obs[0];\n}\n"
+  "static int flappy_policy_selftest(void) { return 0; }\n")
+set(escape escape --vehicle ${vehicle} --seed 1 --count 2)
+run(${escape} --policy ${WORK}/policy.h --out ${WORK}/escapes --json ${WORK}/escapes.json)
+expect_equal("exit code of escape: ${err}" "${code}" 0)
+expect_match("escape" "${out}" "^2 escapes: success 0.0 % \\(0.0 to [0-9.]+\\), captured the goal 0.0 %\n  out of bounds: [0-9]; crashed: [0-9]\n$")
+expect_keys(${WORK}/escapes.json escapes=NUMBER success_rate=NUMBER success_low=NUMBER success_high=NUMBER captured_rate=NUMBER
+  time_to_capture_median_s=NULL out_of_bounds=NUMBER crashed=NUMBER)
+if(NOT EXISTS ${WORK}/escapes/escape_2/imu.csv)
+  message(SEND_ERROR "no escape_2/imu.csv")
+endif()
+expect_refused("${WORK}/note.txt: is no policy; accepted: an actor (.json), TorchScript (.pt) or a C header (.h)"
+  ${escape} --policy ${WORK}/note.txt)
+expect_refused("${SOURCE}/configs/fly/hover.toml: is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal that stands still and a success"
+  ${escape} --policy ${WORK}/policy.h --config ${SOURCE}/configs/fly/hover.toml)

@@ -1,0 +1,40 @@
+// Which robot flies: what the commands of flappy-blind-robot share.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "blind/flights.hpp"
+#include "io/program.hpp"
+#include "sim/randomise.hpp"
+
+namespace flappy::blind {
+
+inline constexpr std::uint64_t kTries = 20;  ///< robots drawn until one does not crash
+
+struct RobotOptions {
+  std::string vehicle, randomise = "none", out;
+  std::uint64_t seed = 0;
+  std::vector<std::string> effects;
+  bool power = false, wings = false, no_truth = false;
+};
+
+void add_robot_options(CLI::App& command, RobotOptions& o);
+
+/// The robots of a seed.
+class Robots {
+ public:
+  explicit Robots(const RobotOptions& o);
+  Case robot(std::uint64_t draw) const;
+
+ private:
+  Case declared_;
+  std::uint64_t seed_;
+  sim::Randomisation randomisation_;
+};
+
+/// A folder for logs; io::InputError where `out` cannot be one.
+void make_folder(const std::string& out);
+void write(const Flight& f, const std::filesystem::path& to, bool truth);
+
+}  // namespace flappy::blind
