@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gap/model_error.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
@@ -29,29 +30,6 @@ constexpr int kMostTerms = 12;
 constexpr double kPriorNone = 0.15, kPriorParameters = 0.35, kPriorEffect = 0.35, kPriorUnknown = 0.15;
 /// For every further effect.
 constexpr double kPriorFurther = 0.1;
-
-/// Every real vehicle has a little of every effect, or of something that looks like it: sd of the coordinates of its sizes,
-/// found on development robots without any, as the floors were (gap/regime_basis.cpp). Only more than that is an effect.
-struct Background {
-  const char* effect;
-  double sd;
-};
-constexpr Background kBackground[] = {{"body_drag", 0.19},        {"wing_inertia", 0.18},     {"wake_capture", 0.16},
-                                      {"coulomb_friction", 0.13}, {"stop_compliance", 0.09},  {"clap_and_fling", 0.08},
-                                      {"wall_effect", 0.06},      {"wing_flexibility", 0.05}, {"wind", 0.05},
-                                      {"tether", 0.04},           {"gyro_bias", 0.04},        {"ceiling_effect", 0.035},
-                                      {"marker_offset", 0.03}};
-constexpr double kLeastBackground = 0.02;
-double background_sd(const std::string& effect) {
-  for (const Background& b : kBackground)
-    if (b.effect == effect) return b.sd;
-  return kLeastBackground;
-}
-/// How much more or less than usual models may be mistaken about a vehicle, and how often that is so.
-struct Mistaken {
-  double factor, probability;
-};
-constexpr Mistaken kMistaken[] = {{0.7, 0.25}, {1, 0.4}, {1.4, 0.25}, {2, 0.1}};
 
 class Diagnoser {
  public:

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "gap/carry.hpp"
+#include "gap/model_error.hpp"
 
 namespace flappy::gap {
 
@@ -38,7 +38,7 @@ class RegimeBasis {
 
  private:
   std::vector<std::string> names_;
-  std::vector<double> kinds_;  ///< how much likelier than the inputs they are mistaken in; 0: the constant
+  std::vector<Function> kinds_;
   std::vector<Eigen::MatrixXd> values_;
 };
 
