@@ -195,7 +195,8 @@ std::string find_mistake(Context& c) {
 }
 
 void check_gyro(Context& c) {
-  const Pairs pairs = pair_up(c.motion, c.windows, Order::wxyz, c.lag);
+  const Pairs means = pair_up(c.motion, c.windows, Order::wxyz, c.lag);
+  const Pairs pairs = with_turns(c.motion, c.windows, means, c.lag);
   const Gains fit = fit_gains(pairs, c.rate_noise, c.gyro_noise);
   Values values;
   for (int i = 0; i < 3; ++i) {
@@ -227,15 +228,18 @@ void check_gyro(Context& c) {
       else c.say(name, Verdict::not_tested, "too little rotation");
     }
     // Bias: the difference of the means, whose noise averages out.
-    Vector3d bias = Vector3d::Zero(), rate = Vector3d::Zero();
+    Vector3d bias = Vector3d::Zero(), rate = Vector3d::Zero(), coning = Vector3d::Zero();
     const double n = static_cast<double>(pairs.mocap.size());
     for (std::size_t i = 0; i < pairs.mocap.size(); ++i)
-      bias += (pairs.gyro[i] - pairs.mocap[i]) / n, rate += pairs.mocap[i] / n;
+      bias += (pairs.gyro[i] - pairs.mocap[i]) / n, rate += pairs.mocap[i] / n,
+          coning += (pairs.gyro[i] - means.gyro[i]) / n;
+    // A first-order low-pass takes this share of what the beat's rates, once and twice a beat, turn by coning.
+    const double beat = 1.5 * c.log.header.flapping_Hz / c.log.header.imu.bandwidth_hz, hidden = beat * beat;
     std::string wrong;
     for (int i = 0; i < 3; ++i) {
       const double sd =
           std::hypot(c.log.header.imu.gyro_bias_sd_rad_s[static_cast<std::size_t>(i)], c.rate_noise / std::sqrt(n));
-      const double allowed = kSigmas * sd + 0.1 * rate.norm() + 0.005;
+      const double allowed = kSigmas * sd + 0.1 * rate.norm() + hidden * std::abs(coning(i)) + 0.005;
       if (std::abs(bias(i)) > allowed)
         wrong +=
             (wrong.empty() ? "" : ", ") + format("%c %.3g rad/s (at most %.2g expected)", kAxes[i], bias(i), allowed);
