@@ -85,6 +85,15 @@ struct Extent {
   double around_m = 0;  ///< to the farthest point sideways
 };
 
+/// What measurements left uncertain of a vehicle: a normal distribution of parameters. Several may move together, one
+/// cause behind them.
+struct Posterior {
+  std::vector<std::string> names;               ///< paths of parameters, those of effects among them
+  std::vector<double> means;                    ///< one for each, in its unit
+  std::vector<std::vector<double>> covariance;  ///< symmetric, positive semidefinite; in their units
+  bool operator==(const Posterior&) const = default;
+};
+
 struct Vehicle {
   std::string name;
   RigidBody torso;
@@ -94,6 +103,7 @@ struct Vehicle {
   double air_density_kg_m3 = 0;
   /// Effects beyond the base model: identifier -> parameter -> value (src/model/effects).
   std::map<std::string, std::map<std::string, double>> effects;
+  std::optional<Posterior> posterior;  ///< of the file it was read from; a vehicle drawn at random has none
 };
 
 /// One leaf of a vehicle: where it is, and what is accepted there (closed interval).

@@ -1,5 +1,10 @@
-// Vehicle files: TOML with `schema = 1`, one number for every entry of parameters(), and `[effects.<id>]`
-// tables.
+// Vehicle files: TOML with `schema = 1`, one number for every entry of parameters(), `[effects.<id>]` tables, and, where
+// something is known of how far these figures can be trusted,
+//
+//   [posterior]
+//   names = ["torso.mass_kg", "effects.ground_effect.gain"]
+//   means = [0.0121, 0.18]
+//   covariance = [[1.6e-7, 0.0], [0.0, 0.0025]]              # in the units of the parameters
 #pragma once
 
 #include <filesystem>

@@ -150,7 +150,15 @@ class Reader {
     c_.fleet.task = read("task", [&](const io::Table& t) { return read_task(t, 1 / c_.fleet.control_hz); });
     c_.fleet.sensors = read("sensors", read_sensors);
     c_.fleet.controller = read("controller", read_controller);
-    if (root_.has("randomisation")) {
+    if (root_.has("randomisation") && root_.string("randomisation") == "posterior") {
+      if (!c_.vehicle.posterior)
+        root_.fail("randomisation", "the vehicle has no [posterior]",
+                   "a file of [[randomise]] tables, or a vehicle that flappy-gap corrected");
+      if (!to_["randomisation"].empty())
+        root_.fail("randomisation", "is \"posterior\", but overridden", "a file of [[randomise]] tables");
+      c_.randomisation = sim::Randomisation::of_posterior(c_.vehicle);
+      c_.vehicle_sha256.clear();
+    } else if (root_.has("randomisation")) {
       c_.randomisation =
           read("randomisation", [&](const io::Table& t) { return sim::read_randomisation(c_.vehicle, t); });
       c_.vehicle_sha256.clear();

@@ -87,6 +87,12 @@ std::size_t index_before(const std::vector<double>& times, double t) {
   return after == times.begin() ? times.size() : static_cast<std::size_t>(after - times.begin()) - 1;
 }
 
+std::size_t line_at(const Column& t_s, double after_s) {
+  const auto at = std::ranges::lower_bound(t_s, t_s.front() + after_s);
+  // below the line of names, counted from 1
+  return static_cast<std::size_t>(std::min(at, t_s.end() - 1) - t_s.begin()) + 2;
+}
+
 StreamStatistics stream_statistics(const std::string& name, const Column& t_s, std::optional<double> declared_hz) {
   StreamStatistics s;
   s.name = name;
@@ -155,6 +161,7 @@ CheckReport check_flight(const FlightLog& log) {
   check_motion(log, report.findings);
   check_space(log, report.findings);
   check_command(log, report.findings);
+  check_beat(log, report.findings);
   check_power(log, report.findings);
   check_wings(log, report.findings);
   return report;

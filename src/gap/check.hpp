@@ -21,11 +21,18 @@ struct StreamStatistics {
   std::optional<double> declared_hz;
 };
 
+/// Where a fault of the data first shows: a file of the log and its line.
+struct Place {
+  std::string file;  ///< empty: no such fault
+  std::size_t line = 2;
+};
+
 struct Finding {
   std::string check;
   Verdict verdict = Verdict::ok;
   std::string text;  ///< what was seen; of a warning also what was expected and the likely cause
   std::vector<std::pair<std::string, double>> values;  ///< the figures behind it
+  Place fault = {};  ///< of a warning that forbids a diagnosis: no physics explains it
 };
 
 struct CheckReport {

@@ -57,7 +57,9 @@ Wave fit_wave(const Column& phase_rad, const Column& volts) {
 void check_frequency(const FlightLog& log, Findings& findings) {
   const std::string name = "flapping frequency";
   const double declared = log.header.flapping_Hz, per_beat = 1 / (declared * median_interval(log.command.t_s));
-  const auto say = [&](Verdict verdict, const std::string& text) { findings.push_back({name, verdict, text, {}}); };
+  const auto say = [&](Verdict verdict, const std::string& text, Place fault = {}) {
+    findings.push_back({name, verdict, text, {}, std::move(fault)});
+  };
   if (per_beat < 4)
     return say(Verdict::not_tested, format("command.csv has %.2g samples a beat, 4 are needed", per_beat));
   const auto left = beat_frequency(log.command.t_s, log.command.left_voltage_V);
@@ -66,7 +68,7 @@ void check_frequency(const FlightLog& log, Findings& findings) {
   const std::string seen =
       format("voltages beat at %.4g Hz left, %.4g Hz right, %.4g Hz declared", *left, *right, declared);
   const double worst = std::max(std::abs(*left / declared - 1), std::abs(*right / declared - 1));
-  if (worst > kFrequencyTolerance) say(Verdict::warning, seen + ": another beat, or t_s not in seconds");
+  if (worst > kFrequencyTolerance) say(Verdict::warning, seen + ": another beat, or t_s not in seconds", {kCommand});
   else say(Verdict::ok, seen);
   findings.back().values = {{"left_Hz", *left}, {"right_Hz", *right}};
 }
@@ -79,7 +81,9 @@ void check_phase(const FlightLog& log, Findings& findings) {
   Column volts(u.t_s.size());
   // The split cycle shifts left and right apart; their sum keeps the phase.
   for (std::size_t i = 0; i < volts.size(); ++i) volts[i] = u.left_voltage_V[i] + u.right_voltage_V[i];
-  const auto say = [&](Verdict verdict, const std::string& text) { findings.push_back({name, verdict, text, {}}); };
+  const auto say = [&](Verdict verdict, const std::string& text) {
+    findings.push_back({name, verdict, text, {}, verdict == Verdict::warning ? Place{kCommand} : Place{}});
+  };
   if (f * interval > 0.25 || rms(volts) < 0.1)
     return say(Verdict::not_tested, "too few samples a beat, or hardly any voltage");
   Column speeds;
@@ -114,12 +118,16 @@ void check_inputs(const FlightLog& log, Findings& findings) {
   if (!u.inputs) return;
   const flight::BeatInputs& in = *u.inputs;
   double beyond = 0, worst = 0, worst_t_s = 0;
+  std::size_t first = u.t_s.size();
   for (std::size_t i = 0; i < u.t_s.size(); ++i) {
     const double left = std::abs(u.left_voltage_V[i] - in.bias_V[i]) - std::abs(in.amplitude_V[i] + in.difference_V[i]);
     const double right =
         std::abs(u.right_voltage_V[i] - in.bias_V[i]) - std::abs(in.amplitude_V[i] - in.difference_V[i]);
     const double excess = std::max(left, right);
-    beyond += excess > 0.01 * std::abs(in.amplitude_V[i]) + 0.02;  // rounding, and a digit dropped when logging
+    if (excess > 0.01 * std::abs(in.amplitude_V[i]) + 0.02) {  // rounding, and a digit dropped when logging
+      ++beyond;
+      first = std::min(first, i);
+    }
     if (excess > worst) worst = excess, worst_t_s = u.t_s[i];
   }
   // An input that changes within a beat may be logged a sample early or late.
@@ -131,7 +139,8 @@ void check_inputs(const FlightLog& log, Findings& findings) {
          format("%.1f %% of the voltages exceed bias_V +- (amplitude_V +- difference_V), by %.3g V at %.6g s: "
                 "inputs of another instant, left and right swapped, or the amplitude peak to peak",
                 100 * share, worst, worst_t_s),
-         {{"share", share}}});
+         {{"share", share}},
+         {kCommand, first + 2}});
   else
     findings.push_back({"wing-beat inputs",
                         Verdict::ok,
@@ -188,7 +197,8 @@ void check_power(const FlightLog& log, Findings& findings) {
   findings.push_back({"battery",
                       near ? Verdict::ok : Verdict::warning,
                       near ? seen : seen + ", within 25 % expected: another number of cells, or another unit",
-                      {{"battery_V", battery}}});
+                      {{"battery_V", battery}},
+                      near ? Place{} : Place{kPower}});
 
   const Column* const currents[] = {&p.left_current_A, &p.right_current_A};
   const Column* const volts[] = {&log.command.left_voltage_V, &log.command.right_voltage_V};
@@ -208,10 +218,13 @@ void check_power(const FlightLog& log, Findings& findings) {
     const std::vector<std::pair<std::string, double>> values = {{"mean_power_W", mean}, {"current_rms_A", current}};
     // A motor that lifts 6 g draws below an ampere.
     if (current > 10)
-      findings.push_back({name, Verdict::warning, figures + ", below 10 A expected: likely in mA", values});
+      findings.push_back({name, Verdict::warning, figures + ", below 10 A expected: likely in mA", values, {kPower}});
     else if (mean < -least)
-      findings.push_back({name, Verdict::warning,
-                          figures + ", positive expected: the current's sign, or left and right swapped", values});
+      findings.push_back({name,
+                          Verdict::warning,
+                          figures + ", positive expected: the current's sign, or left and right swapped",
+                          values,
+                          {kPower}});
     else if (mean <= least) findings.push_back({name, Verdict::not_tested, "no power beyond the noise", values});
     else findings.push_back({name, Verdict::ok, figures, values});
   }
@@ -227,13 +240,16 @@ void check_wings(const FlightLog& log, Findings& findings) {
     const std::vector<std::pair<std::string, double>> values = {{"amplitude_rad", a}};
     // Stops hold strokes within 1.7 rad and rotations within 1.5.
     if (a > std::numbers::pi)
-      findings.push_back({name, Verdict::warning, seen + ", below 1.8 rad expected: likely in degrees", values});
+      findings.push_back(
+          {name, Verdict::warning, seen + ", below 1.8 rad expected: likely in degrees", values, {kWings}});
     else if (a > 1.8 + kSigmas * noise)
       findings.push_back({name, Verdict::warning, seen + ", below 1.8 rad expected", values});
     else if (driven && a < 0.05 + kSigmas * noise)
-      findings.push_back({name, Verdict::warning,
+      findings.push_back({name,
+                          Verdict::warning,
                           seen + ", at least 0.05 rad expected while driven: another wing, unit, or a dead channel",
-                          values});
+                          values,
+                          {kWings}});
     else findings.push_back({name, Verdict::ok, seen, values});
   };
   look("left stroke", w.left_stroke_rad);

@@ -12,6 +12,9 @@ namespace flappy::gap {
 /// What a deviation must exceed to be no accident, in standard deviations: one in 16,000.
 inline constexpr double kSigmas = 4;
 
+using flight::log_file::kCommand, flight::log_file::kImu, flight::log_file::kMocap, flight::log_file::kPower,
+    flight::log_file::kWings;
+
 using Findings = std::vector<Finding>;
 
 /// As printf.
@@ -21,6 +24,9 @@ double median(std::vector<double> values);
 
 /// Index of the last time not after t; times.size() where there is none.
 std::size_t index_before(const std::vector<double>& times, double t);
+
+/// The line of a stream's file at a time since its first sample.
+std::size_t line_at(const flight::Column& t_s, double after_s);
 
 StreamStatistics stream_statistics(const std::string& name, const flight::Column& t_s,
                                    std::optional<double> declared_hz);
@@ -32,6 +38,8 @@ std::optional<double> beat_frequency(const flight::Column& t_s, const flight::Co
 void check_motion(const flight::FlightLog& log, Findings& findings);
 /// Positions against the ground, the ceiling and the walls.
 void check_space(const flight::FlightLog& log, Findings& findings);
+/// The beat of the other streams against that of the voltages: their clocks.
+void check_beat(const flight::FlightLog& log, Findings& findings);
 /// Voltages against the frequency, inputs and phase of the beat.
 void check_command(const flight::FlightLog& log, Findings& findings);
 void check_power(const flight::FlightLog& log, Findings& findings);

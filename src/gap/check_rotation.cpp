@@ -39,6 +39,11 @@ std::string describe_axes(const std::string& sensor, const Matrix3d& axes) {
 
 // ---- the clock
 
+/// Delays up to this are an effect that a diagnosis finds (mocap_delay, 0.02 s); beyond it clocks are apart.
+constexpr double kLargestDelay_s = 0.03;
+/// Crystals agree to 1e-4; beyond ten times that a clock is wrong.
+constexpr double kLargestDrift = 1e-3;
+
 /// The whole lag at `start`'s middle, from a first one.
 std::optional<Estimate> refine_from(const Context& c, const std::vector<Window>& windows, const Lag& start) {
   auto lag = refine_lag(c.motion, windows, c.frame, start, c.rate_noise);
@@ -81,7 +86,8 @@ bool check_clock(Context& c) {
           format("rates of the gyro (%s rad/s rms) and of mocap (%s) are alike by %.2f at most, in any frame and "
                  "within a second; "
                  "above %.2f expected: a dead axis, another body or flight, or clocks far apart",
-                 per_axis(here.gyro).c_str(), per_axis(here.mocap).c_str(), sync ? sync->correlation : 0.0, least));
+                 per_axis(here.gyro).c_str(), per_axis(here.mocap).c_str(), sync ? sync->correlation : 0.0, least),
+          {}, {kImu});
     return false;
   }
   if (!early || early->frame != sync->frame) early = sync;
@@ -113,10 +119,12 @@ bool check_clock(Context& c) {
   const std::string seen = format("gyro comes %.1f ms after mocap", 1e3 * (lag->value + declared_s));
   const std::string expected =
       format(", %.1f +- %.1f ms expected from latencies and bandwidth", 1e3 * (declared_s + filter_s), 1e3 * allowed_s);
-  const bool good = std::abs(lag->value - filter_s) <= allowed_s;
+  const double off_s = std::abs(lag->value - filter_s);
+  const bool good = off_s <= allowed_s;
   c.say("clock", good ? Verdict::ok : Verdict::warning,
         seen + expected + (good ? "" : ": clocks apart, or a wrong latency"),
-        {{"lag_s", lag->value}, {"lag_sd_s", lag->sd}, {"correlation", sync->correlation}});
+        {{"lag_s", lag->value}, {"lag_sd_s", lag->sd}, {"correlation", sync->correlation}},
+        off_s > allowed_s + kLargestDelay_s && !drifts ? Place{kImu} : Place{});
 
   // A millisecond over a flight is a fifth of a radian of the beat, which no check here minds.
   if (!drifts && (!first || !last || std::hypot(first->sd, last->sd) > 0.0025)) {
@@ -128,7 +136,9 @@ bool check_clock(Context& c) {
         format("gyro against mocap moves by %.2f ms in %.3g s, at most %.2f ms expected", 1e3 * change_s,
                end_s - begin_s, 1e3 * noticed_s()) +
             (drifts ? format(": clocks run at different speeds, by %.0f ppm", 1e6 * per_s) : ""),
-        {{"change_s", change_s}, {"per_s", per_s}});
+        {{"change_s", change_s}, {"per_s", per_s}},
+        drifts && std::abs(per_s) > kLargestDrift ? Place{kImu, line_at(c.log.imu.t_s, noticed_s() / std::abs(per_s))}
+                                                  : Place{});
   return true;
 }
 
@@ -172,8 +182,8 @@ std::vector<Hypothesis> mistakes() {
   return list;
 }
 
-/// The mistake that explains the rates, if any does; leaves the frame.
-std::string find_mistake(Context& c) {
+/// The mistake that explains the rates, if any does, and in which file; leaves the frame.
+std::pair<std::string, Place> find_mistake(Context& c) {
   const std::vector<Hypothesis> all = mistakes();
   std::vector<double> left;
   double total = 0, noise = 0;
@@ -187,15 +197,16 @@ std::string find_mistake(Context& c) {
   const double least = *std::ranges::min_element(left);
   const auto near = [&](double r) { return r <= 2 * least + 2 * noise; };
   const double declared = remainder(pair_up(c.motion, c.windows, Order::wxyz, c.lag), Matrix3d::Identity(), 1);
-  if (least > 0.5 * total || near(declared)) return "";
+  if (least > 0.5 * total || near(declared)) return {};
   const auto found = std::ranges::find_if(left, near);
   const Hypothesis& h = all[static_cast<std::size_t>(found - left.begin())];
   c.frame = h.frame;
-  return h.text;
+  return {h.text, {h.frame.order == Order::wxyz ? kImu : kMocap}};
 }
 
 void check_gyro(Context& c) {
-  const Pairs pairs = pair_up(c.motion, c.windows, Order::wxyz, c.lag);
+  const Pairs means = pair_up(c.motion, c.windows, Order::wxyz, c.lag);
+  const Pairs pairs = with_turns(c.motion, c.windows, means, c.lag);
   const Gains fit = fit_gains(pairs, c.rate_noise, c.gyro_noise);
   Values values;
   for (int i = 0; i < 3; ++i) {
@@ -227,15 +238,18 @@ void check_gyro(Context& c) {
       else c.say(name, Verdict::not_tested, "too little rotation");
     }
     // Bias: the difference of the means, whose noise averages out.
-    Vector3d bias = Vector3d::Zero(), rate = Vector3d::Zero();
+    Vector3d bias = Vector3d::Zero(), rate = Vector3d::Zero(), coning = Vector3d::Zero();
     const double n = static_cast<double>(pairs.mocap.size());
     for (std::size_t i = 0; i < pairs.mocap.size(); ++i)
-      bias += (pairs.gyro[i] - pairs.mocap[i]) / n, rate += pairs.mocap[i] / n;
+      bias += (pairs.gyro[i] - pairs.mocap[i]) / n, rate += pairs.mocap[i] / n,
+          coning += (pairs.gyro[i] - means.gyro[i]) / n;
+    // A first-order low-pass takes this share of what the beat's rates, once and twice a beat, turn by coning.
+    const double beat = 1.5 * c.log.header.flapping_Hz / c.log.header.imu.bandwidth_hz, hidden = beat * beat;
     std::string wrong;
     for (int i = 0; i < 3; ++i) {
       const double sd =
           std::hypot(c.log.header.imu.gyro_bias_sd_rad_s[static_cast<std::size_t>(i)], c.rate_noise / std::sqrt(n));
-      const double allowed = kSigmas * sd + 0.1 * rate.norm() + 0.005;
+      const double allowed = kSigmas * sd + 0.1 * rate.norm() + hidden * std::abs(coning(i)) + 0.005;
       if (std::abs(bias(i)) > allowed)
         wrong +=
             (wrong.empty() ? "" : ", ") + format("%c %.3g rad/s (at most %.2g expected)", kAxes[i], bias(i), allowed);
@@ -254,14 +268,14 @@ void check_gyro(Context& c) {
       seen += (seen.empty() ? "" : ", ") + format("%.3g x gyro_%c about %c", fit.gain(i, j), kAxes[j], kAxes[i]);
   }
   if (seen.empty() && odd.empty()) return c.say("gyro", Verdict::not_tested, "too little rotation");
-  const std::string cause = good ? "" : find_mistake(c);
+  const auto [cause, fault] = good ? std::pair<std::string, Place>() : find_mistake(c);
   if (good) c.frame = {};
   c.say("gyro", Verdict::warning,
         (good ? odd : "mocap turns " + seen + ", 1 x about the same axis expected") + ": " +
             (!cause.empty() ? cause
              : good         ? "attitude_noise_rad is too small, or markers moved"
                             : "axes, units or a bent mount"),
-        values);
+        values, fault);
 }
 
 }  // namespace

@@ -54,8 +54,8 @@ std::optional<Matrix3d> check_gravity(Context& c) {
   const std::string seen = format("mean specific force (%.2f, %.2f, %.2f) m/s^2 in W", up(0), up(1), up(2));
   const std::string expected = format(", (0, 0, %.2f) +- %.1f expected: ", gravity, allowed);
   const auto is_up = [&](const Vector3d& v) { return (v - weight).norm() <= allowed; };
-  const auto warn = [&](const std::string& cause) {
-    c.say("accelerometer", Verdict::warning, seen + expected + cause, values);
+  const auto warn = [&](const std::string& cause, const std::string& file = kImu) {
+    c.say("accelerometer", Verdict::warning, seen + expected + cause, values, {file});
   };
   if (is_up(up)) {
     c.say("accelerometer", Verdict::ok, seen, values);
@@ -88,8 +88,9 @@ std::optional<Matrix3d> check_gravity(Context& c) {
   if (found != signed_permutations().end() && axis_name(body) != "+z") warn("wrong axes: " + points);
   else if (std::abs(up.norm() - gravity) <= allowed)
     warn("attitude and accelerometer disagree about up by " +
-         format("%.0f deg: ", std::acos(std::clamp(up(2) / up.norm(), -1.0, 1.0)) / kDegree) +
-         "W is not z up, or the attitude is of another body");
+             format("%.0f deg: ", std::acos(std::clamp(up(2) / up.norm(), -1.0, 1.0)) / kDegree) +
+             "W is not z up, or the attitude is of another body",
+         kMocap);
   else warn("another unit, or a wrong scale");
   return std::nullopt;
 }
@@ -160,7 +161,8 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
   if (is(1000)) cause = "likely in mm, not m";
   if (is(100)) cause = "likely in cm, not m";
   if (is(1 / 0.0254)) cause = "likely in inches, not m";
-  c.say("position scale", Verdict::warning, seen + ", 1 expected: " + cause, values);
+  c.say("position scale", Verdict::warning, seen + ", 1 expected: " + cause, values,
+        alike > 0.9 ? Place{kMocap} : Place{});
 }
 
 void check_speed(Context& c) {
@@ -179,7 +181,8 @@ void check_speed(Context& c) {
   const std::string seen = format("up to %.3g m/s", largest),
                     expected = seen + format(", at most %.3g expected: ", fastest);
   if (usual > fastest)
-    c.say("speed", Verdict::warning, expected + "positions likely in mm, not m, or t_s not in seconds", values);
+    c.say("speed", Verdict::warning, expected + "positions likely in mm, not m, or t_s not in seconds", values,
+          {kMocap});
   else if (largest > fastest)
     c.say("speed", Verdict::warning, expected + "positions jump; markers mistaken for one another?", values);
   else c.say("speed", Verdict::ok, seen, values);
@@ -196,7 +199,8 @@ void check_upright(Context& c) {
   if (tilt < std::numbers::pi / 3) c.say("upright", Verdict::ok, seen, {{"tilt_rad", tilt}});
   else
     c.say("upright", Verdict::warning,
-          seen + ", along " + axis_name(up) + ", below 60 expected: W is not z up, or B is not", {{"tilt_rad", tilt}});
+          seen + ", along " + axis_name(up) + ", below 60 expected: W is not z up, or B is not", {{"tilt_rad", tilt}},
+          {kMocap});
 }
 
 }  // namespace

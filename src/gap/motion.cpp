@@ -129,6 +129,25 @@ std::optional<Vector3d> Motion::mean_rate(double begin_s, double end_s) const {
   return (gyro_integral(last, end_s) - gyro_integral(first, begin_s)) / (end_s - begin_s);
 }
 
+Vector3d Motion::gyro_at(std::size_t k, double t_s) const {
+  const double share = (t_s - imu_t_s_[k]) / (imu_t_s_[k + 1] - imu_t_s_[k]);
+  return gyro_rad_s_[k] + share * (gyro_rad_s_[k + 1] - gyro_rad_s_[k]);
+}
+
+std::optional<Vector3d> Motion::mean_turn(double begin_s, double end_s) const {
+  if (!mean_rate(begin_s, end_s)) return std::nullopt;
+  Quaterniond turn = Quaterniond::Identity();
+  double from_s = begin_s;
+  for (std::size_t k = index_before(imu_t_s_, begin_s); from_s < end_s; ++k) {
+    const double to_s = std::min(end_s, imu_t_s_[k + 1]), dt = to_s - from_s;
+    const Vector3d first = gyro_at(k, from_s), last = gyro_at(k, to_s);
+    // of a rate on a line, coning within the interval included: Savage, J. Guidance, Control and Dynamics 21 (1998)
+    turn = turn * flight::exponential((first + last) * (dt / 2) + first.cross(last) * (dt * dt / 12));
+    from_s = to_s;
+  }
+  return flight::logarithm(turn) / (end_s - begin_s);
+}
+
 double Motion::roughness_rad() const {
   double squares = 0, count = 0;
   for (std::size_t i = 1; i + 1 < mocap_t_s_.size(); ++i) {
@@ -180,6 +199,16 @@ Pairs pair_up(const Motion& motion, const std::vector<Window>& windows, Order or
     pairs.window.push_back(i);
   }
   return pairs;
+}
+
+Pairs with_turns(const Motion& motion, const std::vector<Window>& windows, const Pairs& pairs, const Lag& lag) {
+  Pairs turned = pairs;
+  for (std::size_t i = 0; i < pairs.gyro.size(); ++i) {
+    const Window& w = windows[pairs.window[i]];
+    const double shift = lag.at(w.middle_s());
+    if (const auto turn = motion.mean_turn(w.begin_s + shift, w.end_s + shift)) turned.gyro[i] = *turn;
+  }
+  return turned;
 }
 
 std::optional<Sync> find_lag(const Motion& motion, const std::vector<Window>& windows) {
@@ -273,6 +302,12 @@ Gains fit_gains(const Pairs& pairs, double mocap_noise, double gyro_noise) {
     const double variance = inverse.diagonal().maxCoeff(&worst);
     if (mocap_noise * std::sqrt(variance) <= kLargestSd) break;
     axes.erase(axes.begin() + worst);
+  }
+  // What an axis turns that is not tested goes along with what others turn: it is taken as it stands.
+  for (int i = 0; i < 3; ++i) {
+    if (std::ranges::find(axes, i) != axes.end()) continue;
+    fit.gain(i, i) = 1;
+    cross.row(i) -= square.row(i);
   }
   if (!axes.empty()) {
     const Eigen::MatrixXd solved = Eigen::MatrixXd(cross(Eigen::all, axes)) * inverse;

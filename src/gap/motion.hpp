@@ -40,8 +40,11 @@ class Motion {
   double roughness_rad() const;
   /// Mean of the gyro over an interval; nothing across a gap or outside.
   std::optional<Vector3d> mean_rate(double begin_s, double end_s) const;
+  /// The turn that the gyro made of an interval, as a rotation vector over its time; nothing as above.
+  std::optional<Vector3d> mean_turn(double begin_s, double end_s) const;
 
  private:
+  Vector3d gyro_at(std::size_t k, double t_s) const;
   Vector3d gyro_integral(std::size_t k, double t_s) const;
   /// The mocap samples around an instant.
   std::optional<std::size_t> bracket(double t_s) const;
@@ -89,6 +92,13 @@ struct Sync {
   Frame frame;             ///< at which it is best
 };
 
+/// `pairs` with the gyro's turns in place of its mean rates, where it has them.
+//
+// A body that shakes about two axes out of phase turns about the third though its mean rate there is 0 (coning): the
+// rotation vector p of a rate w has p' = w + p x w / 2 + ... (Bortz, IEEE Trans. AES-7, 1971), so that a beat of rates
+// a cos and b sin about two axes adds a b / (2 x 2 pi f) to the third: 0.1 rad/s where these are 7 rad/s at 34 Hz.
+Pairs with_turns(const Motion& motion, const std::vector<Window>& windows, const Pairs& pairs, const Lag& lag);
+
 /// The lag, within a second, and frame at which mocap follows the gyro best; nothing without common windows.
 std::optional<Sync> find_lag(const Motion& motion, const std::vector<Window>& windows);
 
@@ -102,7 +112,7 @@ std::optional<Estimate> refine_lag(const Motion& motion, const std::vector<Windo
 /// Sum of squares that mocap's rates keep once `scale x axes x gyro` and a constant are taken off.
 double remainder(const Pairs& pairs, const Matrix3d& axes, double scale);
 
-/// mocap = gain x gyro + offset, by least squares; a gyro axis with too little rotation has no gain.
+/// mocap = gain x gyro + offset, by least squares; a gyro axis with too little rotation is taken as it stands.
 struct Gains {
   Matrix3d gain = Matrix3d::Zero();
   Vector3d gain_sd = Vector3d::Zero();  ///< of each column

@@ -3,6 +3,7 @@
 #include "io/config.hpp"
 #include "io/toml_writer.hpp"
 #include "model/effects/registry.hpp"
+#include "model/posterior.hpp"
 
 namespace flappy::model {
 namespace {
@@ -37,6 +38,7 @@ Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::s
   vehicle.name = root.string("name");
   for (const Parameter& p : parameters(vehicle)) *p.value = root.number(p.path, {p.low, p.high});
   if (const auto table = root.optional_table("effects")) read_effects(*table, vehicle);
+  if (const auto table = root.optional_table("posterior")) vehicle.posterior = read_posterior(*table, vehicle);
   root.finish();
   if (const std::optional<PhysicalFault> fault = physical_fault(vehicle))
     root.fail(fault->path, fault->what, fault->accepted);
@@ -49,6 +51,7 @@ std::string vehicle_text(const Vehicle& vehicle) {
   for (const Parameter& p : parameters(copy)) text += p.path + " = " + io::toml_number(*p.value) + "\n";
   for (const auto& [id, values] : vehicle.effects)
     if (values.empty()) text += "effects." + id + " = {}\n";  // in force at its typical size
+  if (vehicle.posterior) text += posterior_text(*vehicle.posterior);
   return text;
 }
 

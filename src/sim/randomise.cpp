@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "model/posterior.hpp"
 
 namespace flappy::sim {
 namespace {
@@ -16,7 +20,7 @@ std::string six_digits(double value) {
 
 }  // namespace
 
-Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : nominal_(std::move(nominal)) {
+Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : Randomisation(std::move(nominal)) {
   model::Vehicle vehicle = nominal_;
   const std::vector<model::Parameter> parameters = model::parameters(vehicle);
   std::vector<Reach> reach;
@@ -26,6 +30,21 @@ Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : 
     check_reach(table, draws_.back(), parameters, reach);
     check_bodies(table, draws_.back());
   }
+}
+
+Randomisation Randomisation::of_posterior(model::Vehicle vehicle) {
+  if (!vehicle.posterior) throw std::invalid_argument("a vehicle without posterior");
+  const model::Posterior posterior = *std::exchange(vehicle.posterior, std::nullopt);
+  const auto factor = model::lower_factor(posterior);
+  if (!factor) throw std::invalid_argument("a covariance that is none");
+  Randomisation r(std::move(vehicle));
+  const std::vector<model::Parameter> parameters = model::parameters(r.nominal_);
+  for (std::size_t i = 0; i < posterior.names.size(); ++i) {
+    const auto at = std::ranges::find(parameters, posterior.names[i], &model::Parameter::path);
+    if (at == parameters.end()) throw std::invalid_argument("no parameter " + posterior.names[i]);
+    r.posterior_.push_back({static_cast<std::size_t>(at - parameters.begin()), posterior.means[i], (*factor)[i]});
+  }
+  return r;
 }
 
 Randomisation::Draw Randomisation::read_draw(const io::Table& table, const std::vector<model::Parameter>& parameters) {
@@ -115,6 +134,11 @@ double Randomisation::apply(const Draw& draw, double nominal, double variate) {
 
 model::Vehicle Randomisation::sample(RandomKey key) const {
   key.stream = Stream::vehicle;
+  if (!posterior_.empty()) {
+    std::vector<double> variates;
+    for (std::uint32_t i = 0; i < posterior_.size(); ++i) variates.push_back(normal(key, i));
+    return from_posterior(std::move(variates));
+  }
   model::Vehicle vehicle = nominal_;
   if (draws_.empty()) return vehicle;
   const std::vector<model::Parameter> parameters = model::parameters(vehicle);
@@ -135,16 +159,36 @@ model::Vehicle Randomisation::sample(RandomKey key) const {
   return vehicle;
 }
 
+model::Vehicle Randomisation::from_posterior(std::vector<double> variates) const {
+  model::Vehicle vehicle = nominal_;
+  const std::vector<model::Parameter> parameters = model::parameters(vehicle);
+  // A draw that gives a body an inertia that none has is drawn in towards the mean: possible inertias are a convex set.
+  for (int tries = 0; tries < 60; ++tries) {
+    for (const Uncertain& u : posterior_) {
+      double value = u.mean;
+      for (std::size_t k = 0; k < u.row.size(); ++k) value += u.row[k] * variates[k];
+      const model::Parameter& p = parameters[u.parameter];
+      *p.value = std::clamp(value, p.low, p.high);
+    }
+    if (!model::physical_fault(vehicle)) break;
+    for (double& v : variates) v *= 0.75;
+  }
+  return vehicle;
+}
+
 bool Randomisation::is_uniform(std::size_t draw) const {
+  if (!posterior_.empty()) return false;
   return draws_[draw].law == Law::scale_uniform || draws_[draw].law == Law::replace_uniform;
 }
 
 std::string Randomisation::name(std::size_t draw) const {
   model::Vehicle vehicle = nominal_;
-  return model::parameters(vehicle)[draws_[draw].parameters.front()].path;
+  const std::size_t first = posterior_.empty() ? draws_[draw].parameters.front() : posterior_[draw].parameter;
+  return model::parameters(vehicle)[first].path;
 }
 
 model::Vehicle Randomisation::at(const std::vector<double>& variates) const {
+  if (!posterior_.empty()) return from_posterior(variates);
   model::Vehicle vehicle = nominal_;
   const std::vector<model::Parameter> parameters = model::parameters(vehicle);
   for (std::size_t d = 0; d < draws_.size(); ++d) {

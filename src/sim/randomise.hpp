@@ -8,6 +8,9 @@
 //
 // With n a normal draw and u a uniform one: scale_normal x (1 + sd n), scale_half_normal x (1 + |sd n|),
 // replace_normal mean + sd n, add_normal + sd n, scale_uniform x u, replace_uniform u in [low, high].
+//
+// Or the posterior of a vehicle file: its parameters are drawn together from one normal distribution, whatever their
+// nominal figures, and kept within their accepted ranges.
 #pragma once
 
 #include <vector>
@@ -21,18 +24,21 @@ namespace flappy::sim {
 class Randomisation {
  public:
   /// No randomisation: every vehicle is the nominal one.
-  explicit Randomisation(model::Vehicle nominal) : nominal_(std::move(nominal)) {}
+  explicit Randomisation(model::Vehicle nominal) : nominal_(std::move(nominal)) { nominal_.posterior.reset(); }
 
   /// Reads the array `randomise` of a configuration. io::InputError where a parameter is unknown, or a draw could
   /// leave its accepted range or give a body an inertia that no body has.
   Randomisation(model::Vehicle nominal, const io::Table& config);
+
+  /// Draws from the posterior of `vehicle`, which it must have; std::invalid_argument where its covariance is none.
+  static Randomisation of_posterior(model::Vehicle vehicle);
 
   const model::Vehicle& nominal() const { return nominal_; }
   /// The vehicle of this key: the same for the same key, whatever else was sampled.
   model::Vehicle sample(RandomKey key) const;
 
   /// Draws of the table; each has one variate, standard normal or uniform in [-1, 1].
-  std::size_t draws() const { return draws_.size(); }
+  std::size_t draws() const { return draws_.size() + posterior_.size(); }
   bool is_uniform(std::size_t draw) const;
   /// Path of its first parameter.
   std::string name(std::size_t draw) const;
@@ -54,10 +60,19 @@ class Randomisation {
   static void check_reach(const io::Table& table, const Draw& draw, const std::vector<model::Parameter>& parameters,
                           std::vector<Reach>& reach);
   void check_bodies(const io::Table& table, const Draw& draw) const;
+  model::Vehicle from_posterior(std::vector<double> variates) const;
   static double apply(const Draw& draw, double nominal, double variate);
+
+  /// A parameter's mean, and what the variates up to its own add.
+  struct Uncertain {
+    std::size_t parameter;  // index in model::parameters()
+    double mean;
+    std::vector<double> row;
+  };
 
   model::Vehicle nominal_;
   std::vector<Draw> draws_;
+  std::vector<Uncertain> posterior_;  // one or the other
 };
 
 /// Reads all of a file of [[randomise]] tables, as configs/randomisation has them.

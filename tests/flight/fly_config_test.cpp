@@ -50,6 +50,26 @@ TEST(FlyConfig, OverridesReachTheFileTheyName) {
   EXPECT_EQ(c.vehicle_of(0).torso.mass_kg, c.vehicle_of(1).torso.mass_kg);
 }
 
+TEST(FlyConfig, DrawsFromThePosteriorOfTheVehicle) {
+  const Folder folder;
+  model::Vehicle v = test::identified();
+  v.posterior = {{"torso.mass_kg"}, {0.012}, {{1e-8}}};
+  folder.write("v.toml", model::vehicle_text(v));
+  const std::string vehicle = "vehicle=" + (folder / "v.toml").string();
+  const FlyConfig c = read_fly_config(kHover, {vehicle, "randomisation=posterior", "flight.duration_s=0.1"});
+  EXPECT_NE(c.vehicle_of(0).torso.mass_kg, c.vehicle_of(1).torso.mass_kg);
+  EXPECT_NEAR(c.vehicle_of(0).torso.mass_kg, 0.012, 6e-4);  // six of its sd
+  EXPECT_EQ(c.vehicle_sha256, "");
+  for (const auto& [file, text] : c.resolved) folder.write(file, text);
+  EXPECT_EQ(fly(read_fly_config(folder / "fly.toml"), {.count = 2}).hash, fly(c, {.count = 2}).hash);
+  EXPECT_EQ(refusal({"randomisation=posterior"}),
+            "--set randomisation=posterior: randomisation: the vehicle has no [posterior]; accepted: a file of "
+            "[[randomise]] tables, or a vehicle that flappy-gap corrected");
+  EXPECT_EQ(refusal({vehicle, "randomisation=posterior", "randomisation.schema=1"}),
+            "--set randomisation=posterior: randomisation: is \"posterior\", but overridden; accepted: a file of "
+            "[[randomise]] tables");
+}
+
 TEST(FlyConfig, RefusesInOneLine) {
   const std::string pid = source_path("configs/fly/../controllers/pid.toml");
   EXPECT_EQ(

@@ -13,7 +13,7 @@ namespace flappy::gap {
 
 struct SyntheticMotion {
   double duration_s = 20, rotation = 1, translation = 1;  ///< sizes
-  double yaw_offset_rad = 0, shake_rad = 0.01, arm_m = 0.004;
+  double yaw_offset_rad = 0, shake_rad = 0.01, coning_rad = 0, arm_m = 0.004;
   std::uint64_t seed = 1;
 };
 
@@ -62,10 +62,11 @@ class Synthesis {
   }
   Eigen::Quaterniond attitude(double t) const {
     const double shake = motion_.shake_rad * std::sin(2 * kPi * kBeat_Hz * t);
+    const double coning = motion_.coning_rad * std::cos(2 * kPi * kBeat_Hz * t);
     const double k = motion_.rotation;
     return Eigen::AngleAxisd(motion_.yaw_offset_rad + 0.3 * k * at(angles_[2], t), Eigen::Vector3d::UnitZ()) *
            Eigen::AngleAxisd(0.1 * k * at(angles_[1], t) + shake, Eigen::Vector3d::UnitY()) *
-           Eigen::AngleAxisd(0.1 * k * at(angles_[0], t), Eigen::Vector3d::UnitX());
+           Eigen::AngleAxisd(0.1 * k * at(angles_[0], t) + coning, Eigen::Vector3d::UnitX());
   }
   Eigen::Vector3d position(double t) const {
     const double k = 0.2 * motion_.translation;

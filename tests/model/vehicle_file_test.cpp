@@ -12,6 +12,7 @@
 #include "io/files.hpp"
 #include "model/derive.hpp"
 #include "model/effects/registry.hpp"
+#include "model/posterior.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::model {
@@ -239,6 +240,88 @@ TEST_F(VehicleFile, TakesOverrides) {
             "voltage_limit_V; did you mean \"resistance_ohm\"?");
 }
 
+// ---- the posterior
+
+std::string posterior(const std::string& names, const std::string& means, const std::string& covariance) {
+  return "\n[posterior]\nnames = " + names + "\nmeans = " + means + "\ncovariance = " + covariance + "\n";
+}
+const std::string kTwo = "[\"torso.mass_kg\", \"left.motor.resistance_ohm\"]";
+
+TEST_F(VehicleFile, TextKeepsThePosterior) {
+  Vehicle v = test::identified();
+  v.effects["ground_effect"] = {{"gain", 0.2}, {"length_m", 0.05}};
+  EXPECT_EQ(read(vehicle_text(v)).posterior, std::nullopt);
+  v.posterior = {{"torso.mass_kg", "left.motor.resistance_ohm", "effects.ground_effect.gain"},
+                 {0.0109, 0.1 + 12.2, 1.0 / 3},
+                 {{1e-7 / 3, 1e-5, 0}, {1e-5, 0.1, -0.01}, {0, -0.01, 0.0025}}};
+  const Vehicle back = read(vehicle_text(v));
+  EXPECT_EQ(back.posterior, v.posterior);
+  expect_same(back, v);
+}
+
+TEST_F(VehicleFile, RefusesWhatIsNoPosterior) {
+  const std::string means = "[0.011, 12.0]", fine = "[[1e-8, 1e-5], [1e-5, 0.04]]";
+  EXPECT_EQ(with(posterior(kTwo, means, fine)), "accepted");
+  EXPECT_EQ(
+      with(posterior("^[\"torso.mass_kg\", \"left.motor.resistence_ohm\"]", means, fine)),
+      "^: posterior.names: no parameter \"left.motor.resistence_ohm\"; accepted: paths of this file; did you mean "
+      "\"left.motor.resistance_ohm\"?");
+  EXPECT_EQ(with(posterior("^[\"torso.mass_kg\", \"effects.ground_effect.gain\"]", means, fine)).substr(0, 68),
+            "^: posterior.names: no parameter \"effects.ground_effect.gain\"; accep");  // an effect it does not have
+  EXPECT_EQ(with(posterior("^[\"torso.mass_kg\", \"torso.mass_kg\"]", "[0.011, 0.011]", fine)),
+            "^: posterior.names: torso.mass_kg is given twice; accepted: each parameter once");
+  EXPECT_EQ(
+      with(posterior("^[\"driver.hold_s\"]", "[0.001]", "[[0.0]]")),
+      "^: posterior.names: driver.hold_s is the same for a whole batch; accepted: what may differ from flapper to "
+      "flapper");
+  EXPECT_EQ(with(posterior("^[]", "[]", "[]")), "^: posterior.names: is empty; accepted: paths of this file");
+  EXPECT_EQ(with(posterior(kTwo, "^[0.011]", fine)).substr(0, 20), "^: posterior.means: ");
+  EXPECT_EQ(with(posterior(kTwo, "^[0.011, -12.0]", fine)),
+            "^: posterior.means: left.motor.resistance_ohm: -12.0 is out of range; accepted: a number from 0.001 to "
+            "10000.0");
+  EXPECT_EQ(with(posterior(kTwo, means, "^[[1e-8, 1e-5]]")),
+            "^: posterior.covariance: has 1 rows; accepted: 2 rows of 2 numbers, as many as names");
+  EXPECT_NE(with(posterior(kTwo, means, "[[1e-8, 1e-5], [1e-5]]")), "accepted");
+  EXPECT_EQ(
+      with(posterior(kTwo, means, "^[[1e-8, 1e-5], [1.1e-5, 0.04]]")),
+      "^: posterior.covariance: is not symmetric: of left.motor.resistance_ohm and torso.mass_kg; accepted: the same "
+      "number on both sides of the diagonal");
+  const std::string none =
+      "^: posterior.covariance: is not positive semidefinite; accepted: variances of 0 or more, and correlations that "
+      "can "
+      "be together";
+  EXPECT_EQ(with(posterior(kTwo, means, "^[[1e-8, 2.1e-5], [2.1e-5, 0.04]]")), none);   // a correlation of 1.05
+  EXPECT_EQ(with(posterior(kTwo, means, "[[1e-8, 2e-5], [2e-5, 0.04]]")), "accepted");  // of 1
+  EXPECT_EQ(with(posterior(kTwo, means, "^[[-1e-8, 0], [0, 0.04]]")), none);
+  EXPECT_EQ(with(posterior(kTwo, means, "^[[0, 1e-5], [1e-5, 0.04]]")), none);
+  EXPECT_EQ(with(posterior(kTwo, means, "[[0, 0], [0, 0.04]]")), "accepted");
+  EXPECT_NE(with(posterior(kTwo, means, fine) + "sd = 1\n"), "accepted");
+}
+
+// Two springs that one coordinate moves together, a mass that another scales, and an effect at the end of its range.
+TEST(Posterior, OfAFitIsThatOfItsParameters) {
+  const Vehicle nominal = test::nominal();
+  const double stiffness = nominal.left.spring.stiffness_positive_Nm_rad, mass = nominal.torso.mass_kg;
+  const auto vehicle_of = [&](const std::vector<double>& x) {
+    Vehicle v = nominal;
+    v.left.spring.stiffness_positive_Nm_rad = v.left.spring.stiffness_negative_Nm_rad = stiffness * (1 + 0.1 * x[0]);
+    v.torso.mass_kg = mass * (1 + 0.2 * x[1]);
+    v.effects["ground_effect"] = {{"gain", std::max(0.0, 0.3 * x[2])}, {"length_m", 0.05}};
+    return v;
+  };
+  const Posterior p =
+      posterior_of(vehicle_of, {0.5, -1, 0, 7}, {{0.04, 0.03, 0, 0}, {0.03, 0.09, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}});
+  EXPECT_EQ(p.names, (std::vector<std::string>{"torso.mass_kg", "left.spring.stiffness_positive_Nm_rad",
+                                               "left.spring.stiffness_negative_Nm_rad", "effects.ground_effect.gain"}));
+  EXPECT_EQ(p.means, (std::vector<double>{mass * 0.8, stiffness * 1.05, stiffness * 1.05, 0}));
+  const double s[] = {0.2 * mass, 0.1 * stiffness, 0.1 * stiffness, 0.3};
+  const double c[4][4] = {{0.09, 0.03, 0.03, 0}, {0.03, 0.04, 0.04, 0}, {0.03, 0.04, 0.04, 0}, {0, 0, 0, 1}};
+  for (std::size_t i = 0; i < 4; ++i)
+    for (std::size_t j = 0; j < 4; ++j)  // differences of numbers of this size, five times
+      EXPECT_NEAR(p.covariance[i][j], s[i] * s[j] * c[i][j], 1e-13 * s[i] * s[j]);
+  EXPECT_TRUE(lower_factor(p)) << "though two of its rows are one";
+}
+
 // ---- what is refused
 
 TEST_F(VehicleFile, RefusesFiguresOutOfRange) {
@@ -277,8 +360,9 @@ TEST_F(VehicleFile, RefusesWhatIsNoVehicle) {
             "^: air.density_kg_m3: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(edited("[torso]", "mass_kg = 10.9067e-3", "^mass_g = 10.9067"),
             "^: torso.mass_g: unknown key; accepted here with another unit: \"mass_kg\"");
-  EXPECT_EQ(edited("", "[air]", "[^wind]\nspeed_m_s = 1.0\n\n[air]"),
-            "^: wind: unknown key; accepted: air, driver, effects, extent, left, name, right, schema, torso");
+  EXPECT_EQ(
+      edited("", "[air]", "[^wind]\nspeed_m_s = 1.0\n\n[air]"),
+      "^: wind: unknown key; accepted: air, driver, effects, extent, left, name, posterior, right, schema, torso");
   EXPECT_EQ(edited("[left.motor]", "gear_ratio = 10.0", "gear_ratio = 10.0\ngear_ratio = ^10.0"),
             "^: not valid TOML: Error while parsing key-value pair: cannot redefine existing floating-point "
             "'gear_ratio'");

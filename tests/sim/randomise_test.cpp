@@ -132,6 +132,88 @@ TEST(Laws, AreCutWhereTheTableSays) {
   EXPECT_LE(moments(x).high, 1.1 * nominal);
 }
 
+// ---- the posterior of a vehicle file
+
+using Rows = std::vector<std::vector<double>>;
+
+/// A mass and a pair of stiffnesses that vary together, and the size of an effect.
+model::Vehicle with_posterior() {
+  model::Vehicle v = test::nominal();
+  v.effects["ground_effect"] = {{"gain", 0.9}, {"length_m", 0.05}};
+  const double m = 4e-4, k = 1e-3, g = 0.05, mk = 0.6 * m * k;
+  v.posterior = {{"effects.ground_effect.gain", "torso.mass_kg", "left.spring.stiffness_positive_Nm_rad",
+                  "left.spring.stiffness_negative_Nm_rad"},
+                 {0.5, 0.012, 0.013, 0.013},
+                 {{g * g, 0, 0, 0}, {0, m * m, mk, mk}, {0, mk, k * k, k * k}, {0, mk, k * k, k * k}}};
+  return v;
+}
+std::vector<double> drawn(const model::Vehicle& v) {
+  return {v.effects.at("ground_effect").at("gain"), v.torso.mass_kg, v.left.spring.stiffness_positive_Nm_rad,
+          v.left.spring.stiffness_negative_Nm_rad};
+}
+
+TEST(Posterior, IsWhatIsDrawn) {
+  const model::Vehicle v = with_posterior();
+  const Randomisation r = Randomisation::of_posterior(v);
+  const std::size_t n = v.posterior->names.size();
+  std::vector<double> sum(n);
+  Rows products(n, std::vector<double>(n));
+  for (std::uint32_t i = 0; i < kDraws; ++i) {
+    const model::Vehicle one = r.sample({.seed = 5, .flapper = i});
+    const std::vector<double> x = drawn(one);
+    EXPECT_DOUBLE_EQ(x[2], x[3]) << "one cause moves both";
+    for (std::size_t a = 0; a < n; ++a) {
+      sum[a] += x[a] - v.posterior->means[a];
+      for (std::size_t b = 0; b < n; ++b)
+        products[a][b] += (x[a] - v.posterior->means[a]) * (x[b] - v.posterior->means[b]);
+    }
+  }
+  // standard errors of normal draws: sqrt(c_aa / n) of a mean, sqrt((c_aa c_bb + c_ab^2) / n) of a covariance
+  const Rows& c = v.posterior->covariance;
+  const double count = static_cast<double>(kDraws);
+  for (std::size_t a = 0; a < n; ++a) {
+    EXPECT_NEAR(sum[a] / count, 0, kErrors * std::sqrt(c[a][a] / count));
+    for (std::size_t b = 0; b < n; ++b)
+      EXPECT_NEAR(products[a][b] / count, c[a][b],
+                  kErrors * std::sqrt((c[a][a] * c[b][b] + c[a][b] * c[a][b]) / count));
+  }
+}
+
+TEST(Posterior, HasOneVariateForEachParameter) {
+  const model::Vehicle v = with_posterior();
+  const Randomisation r = Randomisation::of_posterior(v);
+  ASSERT_EQ(r.draws(), 4u);
+  for (std::size_t d = 0; d < 4; ++d) {
+    EXPECT_EQ(r.name(d), v.posterior->names[d]);
+    EXPECT_FALSE(r.is_uniform(d));
+  }
+  EXPECT_EQ(drawn(r.at({0, 0, 0, 0})), v.posterior->means) << "not the nominal ones";
+  const std::vector<double> heavy = drawn(r.at({0, 1, 0, 0}));
+  EXPECT_DOUBLE_EQ(heavy[1], 0.0124);
+  EXPECT_DOUBLE_EQ(heavy[2], 0.013 + 0.6e-3);
+  EXPECT_EQ(drawn(r.at({11, 0, 0, 9}))[0], 1) << "the end of the accepted range";
+  EXPECT_EQ(r.at({0, 0, 0, 9}).left.motor.resistance_ohm, v.left.motor.resistance_ohm);
+  EXPECT_FALSE(r.at({0, 0, 0, 0}).posterior) << "a vehicle that was drawn is certain";
+  const RandomKey key{.seed = 1, .flapper = 2, .episode = 3};
+  EXPECT_EQ(drawn(r.sample(key)), drawn(Randomisation::of_posterior(v).sample(key)));
+  EXPECT_NE(drawn(r.sample(key)), drawn(r.sample({.seed = 1, .flapper = 3, .episode = 3})));
+}
+
+// Of an inertia so uncertain that one draw in three is of no body, every draw is of one.
+TEST(Posterior, DrawsBodiesThatCanBe) {
+  model::Vehicle v = test::nominal();
+  const double xx = v.torso.inertia_kg_m2.xx;
+  v.posterior = {{"torso.inertia_kg_m2.xx"}, {xx}, {{xx * xx}}};
+  const Randomisation r = Randomisation::of_posterior(v);
+  bool differ = false;
+  for (std::uint32_t i = 0; i < 1000; ++i) {
+    const model::Vehicle one = r.sample({.seed = 5, .flapper = i});
+    EXPECT_FALSE(model::physical_fault(one));
+    differ |= one.torso.inertia_kg_m2.xx > 1.3 * xx;
+  }
+  EXPECT_TRUE(differ);
+}
+
 // ---- what a draw depends on
 
 const std::string kMass = table("\"torso.mass_kg\"", "law = \"scale_normal\"\nsd = 0.1");

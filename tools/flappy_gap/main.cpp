@@ -4,6 +4,7 @@
 
 #include "diagnose.hpp"
 #include "gap/check.hpp"
+#include "gap/data_faults.hpp"
 #include "io/program.hpp"
 
 namespace flappy::gap {
@@ -35,16 +36,29 @@ void print(const StreamStatistics& s) {
   std::printf(" %10.3f\n", 1e3 * s.jitter_s);
 }
 
-void print(const std::string& folder, const flight::FlightHeader& header, const CheckReport& report) {
+/// What was found out of one flight.
+struct Checked {
+  flight::FlightHeader header;
+  CheckReport report;
+  std::vector<DataFault> faults;
+};
+
+void print(const std::string& folder, const Checked& checked) {
+  const auto& [header, report, faults] = checked;
   std::printf("%s: %s, %g Hz\n", folder.c_str(), header.vehicle.c_str(), header.flapping_Hz);
   std::printf("  %-8s %9s %9s %9s %9s %12s %17s %10s\n", "stream", "samples", "s", "Hz", "declared", "longest ms",
               "missing", "jitter ms");
   for (const StreamStatistics& s : report.streams) print(s);
   for (const Finding& f : report.findings)
     std::printf("  %-18s %s: %s\n", f.check.c_str(), name_of(f.verdict), f.text.c_str());
+  for (const DataFault& f : faults)
+    std::printf("  forbids a diagnosis: %s:%zu: %s\n", f.file.c_str(), f.line, f.what.c_str());
 }
 
-Json to_json(const std::string& folder, const flight::FlightHeader& header, const CheckReport& report) {
+Json to_json(const std::string& folder, const Checked& checked) {
+  const auto& [header, report, faults] = checked;
+  Json forbidding = Json::array();
+  for (const DataFault& f : faults) forbidding.push_back({{"file", f.file}, {"line", f.line}, {"what", f.what}});
   Json streams = Json::array(), findings = Json::array();
   for (const StreamStatistics& s : report.streams)
     streams.push_back({{"name", s.name},
@@ -65,23 +79,23 @@ Json to_json(const std::string& folder, const flight::FlightHeader& header, cons
           {"warnings", report.count(Verdict::warning)},
           {"not_tested", report.count(Verdict::not_tested)},
           {"streams", streams},
-          {"findings", findings}};
+          {"findings", findings},
+          {"data_faults", forbidding}};
 }
 
 Json check(const std::vector<std::string>& folders) {
-  std::vector<std::pair<flight::FlightHeader, CheckReport>> checked;
+  std::vector<Checked> checked;
   for (const std::string& folder : folders) {
     const flight::FlightLog log = flight::read_flight_log(folder);
-    checked.emplace_back(log.header, check_flight(log));
+    checked.push_back({log.header, check_flight(log), data_faults(log, folder)});
   }
   Json flights = Json::array();
   std::size_t warnings = 0, not_tested = 0;
   for (std::size_t i = 0; i < folders.size(); ++i) {
-    const auto& [header, report] = checked[i];
-    print(folders[i], header, report);
-    flights.push_back(to_json(folders[i], header, report));
-    warnings += report.count(Verdict::warning);
-    not_tested += report.count(Verdict::not_tested);
+    print(folders[i], checked[i]);
+    flights.push_back(to_json(folders[i], checked[i]));
+    warnings += checked[i].report.count(Verdict::warning);
+    not_tested += checked[i].report.count(Verdict::not_tested);
   }
   std::printf("%zu readable, warnings %zu, not tested %zu\n", folders.size(), warnings, not_tested);
   return {{"flights", flights}, {"warnings", warnings}, {"not_tested", not_tested}};

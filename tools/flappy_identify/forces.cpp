@@ -166,12 +166,14 @@ std::string vehicle_file(const Settings& s, const ForceFit& f, const std::string
       f.ends.empty()
           ? "population " + std::to_string(s.fit.population) + ", generations " + std::to_string(s.fit.generations)
           : std::to_string(f.starts_agreed) + " of " + std::to_string(f.ends.size()) + " starts agree";
+  model::Vehicle without_posterior = f.vehicle;  // that of the file before is of other figures
+  without_posterior.posterior.reset();
   return "# Fitted to a measured force map by flappy-identify, commit " + io::commit() + ", method " + s.fit.method +
          "\n# from vehicle " + from + "\n# measured file's sha256 " + measured_sha256 + "\n" + line +
          "# torques about " + s.source.moment_point + ", " + std::to_string(s.hold_out) + " rows held out, " +
          std::to_string(f.left_out.size()) + " left out for jumps\n# configuration's sha256 " +
          io::sha256(io::read_text(s.fit.config)) + "\n# seed " + std::to_string(s.fit.seed) + ", " + search +
-         "\n# parameters fitted:" + fitted + "\n" + model::vehicle_text(f.vehicle);
+         "\n# parameters fitted:" + fitted + "\n" + model::vehicle_text(without_posterior);
 }
 
 Json run(const Settings& s) {
