@@ -3,18 +3,13 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "blind/flights.hpp"
-#include "flappy/vehicle_file.hpp"
+#include "blind/drawn.hpp"
 #include "io/program.hpp"
-#include "io/sha256.hpp"
-#include "sim/randomise.hpp"
 
 namespace flappy::blind {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr std::uint64_t kTries = 20;  ///< robots drawn until one does not crash
 
 struct Options {
   std::string vehicle, randomise = "none", programme = "rich", out;
@@ -38,56 +33,39 @@ std::vector<BlindEffect> effects_of(const std::vector<std::string>& texts) {
 }
 
 Json fly_case(const Options& o) {
-  const model::Vehicle declared = model::read_vehicle(o.vehicle);
-  if (!declared.effects.empty())
-    throw io::InputError(o.vehicle +
-                         ": [effects]: the blind robot has effects of its own; accepted: a vehicle without");
-  sim::Randomisation randomisation(declared);
-  if (o.randomise != "none") randomisation = sim::read_randomisation(declared, io::Config::load(o.randomise).root());
-  const std::filesystem::path vehicle_path(o.vehicle), folder(o.out);
+  Case c = declared_case(o.vehicle);
+  sim::Randomisation randomisation(c.vehicle);
+  if (o.randomise != "none") randomisation = sim::read_randomisation(c.vehicle, io::Config::load(o.randomise).root());
+  const std::filesystem::path folder(o.out);
   std::error_code error;
   if (std::filesystem::exists(folder, error) && !std::filesystem::is_directory(folder, error))
     throw io::InputError(o.out + ": is a file; accepted: a folder, or a name for a new one");
-  Case c{.vehicle = declared,
-         .declared_density_kg_m3 = declared.air_density_kg_m3,
-         .vehicle_file = vehicle_path.filename().string(),
-         .vehicle_sha256 = io::sha256(io::read_text(vehicle_path)),
-         .sizes = Sizes(effects_of(o.effects)),
-         .programme = o.programme == "rich" ? Programme::rich : Programme::hover,
-         .power = o.power,
-         .wings = o.wings};
-  Json crashes = Json::array();
-  for (std::uint64_t draw = 0; draw < kTries; ++draw) {
-    c.seed = o.seed * kTries + draw;
-    c.vehicle = randomisation.sample({c.seed, 0, 0, sim::Stream::vehicle});
-    std::vector<Flight> flights;
-    for (std::size_t k = 0; k < kFlights && (flights.empty() || !flights.back().crashed); ++k)
-      flights.push_back(fly(c, k));
-    if (flights.back().crashed) {
-      std::printf("draw %llu: flight %zu %s; the next draw\n", static_cast<unsigned long long>(draw), flights.size(),
-                  flights.back().how.c_str());
-      crashes.push_back(flights.back().how);
-      continue;
-    }
-    Json list = Json::array();
-    std::filesystem::create_directories(folder, error);
-    if (error)
-      throw io::InputError(o.out + ": cannot be made: " + error.message() +
-                           "; accepted: a folder, or a name for a new one");
-    for (std::size_t k = 0; k < kFlights; ++k) {
-      const std::filesystem::path to = folder / ("flight_" + std::to_string(k + 1));
-      flight::write_flight_log(to, flights[k].log);
-      if (!o.no_truth) flight::write_truth(to, flight::kMotionNames, flights[k].truth);
-      std::printf("%s: %g s, up to %.0f mm off, tilted up to %.0f deg\n", to.c_str(), kFlight_s,
-                  1e3 * flights[k].farthest_m, flights[k].most_tilt_rad * 180 / kPi);
-      list.push_back({{"folder", to.string()},
-                      {"farthest_m", flights[k].farthest_m},
-                      {"most_tilt_rad", flights[k].most_tilt_rad}});
-    }
-    return {{"seed", o.seed}, {"draw", draw}, {"crashes", crashes}, {"flights", list}};
+  c.sizes = Sizes(effects_of(o.effects));
+  c.programme = o.programme == "rich" ? Programme::rich : Programme::hover;
+  c.power = o.power;
+  c.wings = o.wings;
+  const Drawn drawn = fly_drawn(c, randomisation, o.seed);
+  Json crashes = Json::array(), list = Json::array();
+  for (std::size_t draw = 0; draw < drawn.lost.size(); ++draw) {
+    const Crash& lost = drawn.lost[draw];
+    std::printf("draw %zu: flight %zu %s; the next draw\n", draw, lost.flight, lost.how.c_str());
+    crashes.push_back(lost.how);
   }
-  throw io::InputError("--seed " + std::to_string(o.seed) + ": " + std::to_string(kTries) +
-                       " robots in a row crashed; accepted: effects of smaller size, less randomisation");
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw io::InputError(o.out + ": cannot be made: " + error.message() +
+                         "; accepted: a folder, or a name for a new one");
+  for (std::size_t k = 0; k < kFlights; ++k) {
+    const Flight& flight = drawn.flights[k];
+    const std::filesystem::path to = folder / ("flight_" + std::to_string(k + 1));
+    flight::write_flight_log(to, flight.log);
+    if (!o.no_truth) flight::write_truth(to, flight::kMotionNames, flight.truth);
+    std::printf("%s: %g s, up to %.0f mm off, tilted up to %.0f deg\n", to.c_str(), kFlight_s, 1e3 * flight.farthest_m,
+                flight.most_tilt_rad * 180 / kPi);
+    list.push_back(
+        {{"folder", to.string()}, {"farthest_m", flight.farthest_m}, {"most_tilt_rad", flight.most_tilt_rad}});
+  }
+  return {{"seed", o.seed}, {"draw", drawn.draw}, {"crashes", crashes}, {"flights", list}};
 }
 
 }  // namespace

@@ -1,0 +1,29 @@
+// Robots drawn one after another until one flies all its flights.
+#pragma once
+
+#include <filesystem>
+
+#include "blind/flights.hpp"
+#include "sim/randomise.hpp"
+
+namespace flappy::blind {
+
+struct Crash {
+  std::size_t flight;  ///< counted from 1
+  std::string how;
+};
+
+struct Drawn {
+  Case flown;               ///< with the vehicle and the seed of the draw
+  std::uint64_t draw = 0;   ///< which of the seed's
+  std::vector<Crash> lost;  ///< of the draws before
+  std::vector<Flight> flights;
+};
+
+/// The robot as its file declares it. InputError where the file has effects.
+Case declared_case(const std::filesystem::path& vehicle_file);
+
+/// `c`: what all draws share. The same bytes for the same seed. InputError where every one of 20 draws crashes.
+Drawn fly_drawn(Case c, const sim::Randomisation& randomisation, std::uint64_t seed);
+
+}  // namespace flappy::blind
