@@ -1,7 +1,6 @@
 #include "blind/drawn.hpp"
 
 #include "flappy/vehicle_file.hpp"
-#include "io/files.hpp"
 #include "io/sha256.hpp"
 
 namespace flappy::blind {
@@ -37,8 +36,8 @@ Drawn fly_drawn(Case c, const sim::Randomisation& randomisation, std::uint64_t s
     }
     drawn.lost.push_back({drawn.flights.size(), drawn.flights.back().how});
   }
-  throw io::InputError("--seed " + std::to_string(seed) + ": " + std::to_string(kTries) +
-                       " robots in a row crashed; accepted: effects of smaller size, less randomisation");
+  throw NeverFlies("--seed " + std::to_string(seed) + ": " + std::to_string(kTries) +
+                   " robots in a row crashed; accepted: effects of smaller size, less randomisation");
 }
 
 }  // namespace flappy::blind

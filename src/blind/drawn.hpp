@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "blind/flights.hpp"
+#include "io/files.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::blind {
@@ -23,7 +24,13 @@ struct Drawn {
 /// The robot as its file declares it. InputError where the file has effects.
 Case declared_case(const std::filesystem::path& vehicle_file);
 
-/// `c`: what all draws share. The same bytes for the same seed. InputError where every one of 20 draws crashes.
+/// Every one of the draws crashed.
+class NeverFlies : public io::InputError {
+ public:
+  using InputError::InputError;
+};
+
+/// `c`: what all draws share. The same bytes for the same seed. NeverFlies after 20 draws.
 Drawn fly_drawn(Case c, const sim::Randomisation& randomisation, std::uint64_t seed);
 
 }  // namespace flappy::blind

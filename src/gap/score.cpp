@@ -206,7 +206,7 @@ ScoreLine closure_line(const Cases& cases) {
               resampled(values.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
                 std::vector<double> some;
                 for (const std::size_t i : which) some.push_back(values[i]);
-                return median(std::move(some));
+                return quantile(std::move(some), 0.5);
               }));
 }
 
@@ -264,6 +264,12 @@ std::optional<double> closure(const ScoredCase& c) {
   const FittedSet* named = fitted(c.prediction, at_work(c.prediction));
   if (named == nullptr || !named->left) return 0;
   return (*c.prediction.refit - *named->left) / closable;
+}
+
+bool needs_true_fit(const ScoredCase& c) {
+  if (c.truth.part != "singles" && c.truth.part != "typical") return false;
+  const FittedSet* truth = fitted(c.prediction, c.truth.effects);
+  return c.prediction.kind != "data" && (truth == nullptr || !truth->left);
 }
 
 Scores score(const std::vector<ScoredCase>& cases) {

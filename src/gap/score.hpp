@@ -79,4 +79,7 @@ bool right(const Truth& truth, const Prediction& prediction);
 /// verdict without effects; nothing where the true effect's own gain is below two of its sd.
 std::optional<double> closure(const ScoredCase& c);
 
+/// Whether closure is asked of a case whose true effect was not fitted.
+bool needs_true_fit(const ScoredCase& c);
+
 }  // namespace flappy::gap

@@ -22,13 +22,6 @@ class Draws {
   std::mt19937_64 engine_{1};
 };
 
-/// Of sorted values, by linear interpolation.
-double quantile(const std::vector<double>& sorted, double share) {
-  const double at = share * static_cast<double>(sorted.size() - 1);
-  const auto i = static_cast<std::size_t>(at);
-  return i + 1 < sorted.size() ? std::lerp(sorted[i], sorted[i + 1], at - static_cast<double>(i)) : sorted.back();
-}
-
 /// Of claims in the order of their probability.
 double error_of(const std::vector<Claim>& sorted) {
   const std::size_t n = sorted.size(), bins = std::min(n, kBins);
@@ -65,7 +58,6 @@ Score resampled(std::size_t count,
     for (std::size_t& c : cases) c = draws.below(count);
     if (const auto value = statistic(cases)) values.push_back(*value);
   }
-  std::ranges::sort(values);
   score.low = values.empty() ? *score.value : quantile(values, 0.025);
   score.high = values.empty() ? *score.value : quantile(values, 0.975);
   return score;
@@ -84,13 +76,14 @@ double calibrated_error_95(std::vector<Claim> claims) {
     for (Claim& c : claims) c.right = draws.uniform() < c.probability;
     errors.push_back(error_of(claims));
   }
-  std::ranges::sort(errors);
   return quantile(errors, 0.95);
 }
 
-double median(std::vector<double> values) {
+double quantile(std::vector<double> values, double share) {
   std::ranges::sort(values);
-  return quantile(values, 0.5);
+  const double at = share * static_cast<double>(values.size() - 1);
+  const auto i = static_cast<std::size_t>(at);
+  return i + 1 < values.size() ? std::lerp(values[i], values[i + 1], at - static_cast<double>(i)) : values.back();
 }
 
 }  // namespace flappy::gap
