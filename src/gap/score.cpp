@@ -260,7 +260,6 @@ std::optional<double> closure(const ScoredCase& c) {
   if (truth == nullptr || !truth->left || !refit || !c.prediction.refit) return std::nullopt;
   const double closable = *refit - *truth->left;
   if (closable < kSureOfGain * truth->gain_sd || closable <= 0) return std::nullopt;
-  if (!names_effects(c.prediction) || c.prediction.sets.empty()) return 0;
   const FittedSet* named = fitted(c.prediction, at_work(c.prediction));
   if (named == nullptr || !named->left) return 0;
   return (*c.prediction.refit - *named->left) / closable;

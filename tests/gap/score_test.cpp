@@ -186,6 +186,8 @@ TEST(Score, IntervalsCountWhereTheVerdictNamesTheTruth) {
   c.truth.true_values = {{"wind.x_m_s", 0.35}, {"wind.y_m_s", 0.2}, {"wind.z_m_s", 0}};
   EXPECT_EQ(main_score({c}, "interval_coverage").count, 2U);
   EXPECT_DOUBLE_EQ(*main_score({c}, "interval_coverage").value, 0.5);
+  c.truth.true_values["wind.y_m_s"] = -0.2;
+  EXPECT_DOUBLE_EQ(*main_score({c}, "interval_coverage").value, 0.5);
   c.prediction.kind = "parameters";
   EXPECT_FALSE(main_score({c}, "interval_coverage").value);
 }
@@ -249,11 +251,22 @@ TEST(Stlsq, KeepsWhatContributes) {
   // coefficients are good to 0.2/sqrt(500) = 0.009: the truth stands at 0.5, the others far below 0.05
   Regression r = mixture();
   EXPECT_EQ(stlsq(r).named, Names{"tether"});
-  // a parameter is never named, and takes what is its own
   r.effects[1] = "";
-  const Baseline b = stlsq(r);
-  EXPECT_EQ(std::ranges::count(b.named, "tether"), 0);
-  EXPECT_EQ(std::ranges::count(b.named, ""), 0);
+  EXPECT_EQ(stlsq(r).named, Names{}) << "a parameter has no name";
+}
+
+TEST(Stlsq, NeverThresholdsAParameter) {
+  // Of two columns that are alike, -0.009 x a parameter's and 0.0105 x an effect's, without noise: the second is above the
+  // least threshold, 0.01, the first free of it. Without the parameter, 0.0105 - 0.9 x 0.009 would be left of the effect.
+  Eigen::MatrixXd rows(4, 3);
+  const double other = std::sqrt(1 - 0.81);
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    rows(i, 0) = i % 2 == 0 ? 1 : -1;
+    rows(i, 1) = 0.9 * rows(i, 0) + (i < 2 ? other : -other);
+    rows(i, 2) = -0.009 * rows(i, 0) + 0.0105 * rows(i, 1);
+  }
+  EXPECT_EQ(stlsq({{"", "wind"}, {rows.transpose() * rows}, {4}}).named, Names{"wind"});
+  EXPECT_EQ(stlsq({{"tether", "wind"}, {rows.transpose() * rows}, {4}}).named, Names{});
 }
 
 }  // namespace

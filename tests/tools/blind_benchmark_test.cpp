@@ -28,7 +28,9 @@ std::string detectability() {
     text += id == "tether" ? "undetectable = true\n" : "detectable = 0.2\n";
     text += id == "wind" ? "inseparable = [\"tether\"]\n" : "inseparable = []\n";
   }
-  return text;
+  return text +
+         "[outside_slosh]\nundetectable = true\ninseparable = []\n[outside_vortex_ring]\ndetectable = 1.5\n"
+         "inseparable = []\ngain_at_typical = 8.1\nmisfit = 0.1\ncatalogue = { x = 1 }\n";
 }
 
 /// A folder of its own, with the table of detectability in it.
@@ -52,6 +54,11 @@ class Benchmark : public testing::Test {
     c.plan.part = part;
     c.plan.at_most = at_most;
     c.threads = 2;
+    c.true_values = [](const blind::Case& flown, const std::vector<blind::BlindEffect>& effects) {
+      EXPECT_TRUE(flown.sizes.has(blind::Effect::ground_effect) || flown.sizes.has(blind::Effect::ceiling_effect));
+      return std::map<std::string, std::optional<double>>{{effects.front().id + ".gain", 0.1},
+                                                          {effects.front().id + ".length_m", std::nullopt}};
+    };
     return blind_make(c);
   }
 
@@ -98,6 +105,8 @@ TEST_F(Benchmark, PredictsSealsAndScores) {
   EXPECT_EQ(json.at("top1_mocap_imu"), 0.5);
   EXPECT_EQ(json.at("group_top1"), 1.0);
   EXPECT_NEAR(json.at("closure_median").get<double>(), 0.5 * (1 + 0.5 / 0.75), 1e-12);
+  EXPECT_EQ(json.at("interval_coverage"), 1.0);
+  EXPECT_EQ(json.at("interval_coverage_count"), 1);
   EXPECT_TRUE(json.at("top1_current").is_null());
   EXPECT_TRUE(json.at("undetectable") == Json({"tether"}));
   for (const char* key :
@@ -155,6 +164,7 @@ TEST_F(Benchmark, GoesOnWhereItWasStopped) {
 TEST_F(Benchmark, PlansEveryPart) {
   const auto of = read_detectability(root_ / "detectable.toml");
   const std::vector<PlannedCase> plan = plan_cases(of, {});
+  std::size_t outside = 0;
   std::map<std::string, std::size_t> count;
   std::set<std::size_t> numbers;
   std::map<std::uint64_t, std::vector<const PlannedCase*>> by_seed;
@@ -177,6 +187,12 @@ TEST_F(Benchmark, PlansEveryPart) {
     if (c.part == "singles") EXPECT_EQ(c.separable, c.effects[0].id != "wind");
     if (c.part == "withheld" && c.effects[0].id == "wind")
       EXPECT_EQ(std::ranges::count(c.withheld, "tether"), 1) << "of its group";
+    if (c.part == "withheld" && c.withheld.empty()) {
+      EXPECT_TRUE(c.effects[0].id.starts_with("outside_"));
+      EXPECT_NE(c.effects[0].id, "outside_slosh") << "undetectable";
+      EXPECT_DOUBLE_EQ(c.effects[0].size, c.effects[0].id == "outside_vortex_ring" ? 3 : 2) << c.effects[0].id;
+      ++outside;
+    }
     EXPECT_EQ(c.randomised, c.part != "none");
     EXPECT_EQ(c.power, c.part == "singles_current");
     EXPECT_EQ(c.hover, c.part == "hover");
@@ -185,6 +201,7 @@ TEST_F(Benchmark, PlansEveryPart) {
                                                        {"parameters", 40}, {"withheld", 60},         {"pairs", 40},
                                                        {"hover", 30},      {"typical", 90}};
   EXPECT_EQ(count, expected);
+  EXPECT_EQ(outside, 30U);
   EXPECT_EQ(numbers.size(), plan.size());
   EXPECT_EQ(*numbers.rbegin(), plan.size());
   EXPECT_LT(in_order, plan.size() / 3) << "numbers follow parts";
@@ -211,7 +228,7 @@ TEST_F(Benchmark, RefusesATableOfSizesThatIsNone) {
   std::string text = detectability();
   text.replace(text.find("detectable = 0.2"), 16, "detectable = 2.1");
   io::write_atomically(file, text);
-  EXPECT_NE(test::refusal([&] { read_detectability(file); }).find("2.1 is out of range"), std::string::npos);
+  EXPECT_NE(test::refusal([&] { read_detectability(file); }).find("twice that is beyond size 4"), std::string::npos);
 }
 
 }  // namespace

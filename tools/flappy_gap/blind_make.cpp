@@ -75,13 +75,20 @@ class Maker {
       const blind::Drawn flown = blind::fly_drawn(c, p.randomised ? drawn_ : as_declared_, p.seed);
       for (std::size_t k = 0; k < flown.flights.size(); ++k)
         flight::write_flight_log(case_folder(p) / ("flight_" + std::to_string(k + 1)), flown.flights[k].log);
-      label = to_json(Label{
-          p, flown.draw, command_.true_values ? command_.true_values(flown.flown) : std::map<std::string, double>()});
+      label = to_json(Label{p, flown.draw, true_values(p, flown.flown)});
     } catch (const blind::NeverFlies&) {
       label = to_json(Label{p, 0, {}});
       label["never_flies"] = true;
     }
     io::write_atomically(label_file(p), label.dump(1) + "\n");
+  }
+
+  std::map<std::string, double> true_values(const PlannedCase& p, const blind::Case& flown) const {
+    std::map<std::string, double> known;
+    if (!command_.true_values || (p.part != "singles" && p.part != "typical")) return known;
+    for (const auto& [name, value] : command_.true_values(flown, p.effects))
+      if (value) known[name] = *value;
+    return known;
   }
 
   void seal() const {
@@ -102,7 +109,7 @@ class Maker {
       PublicCase c{p.number, p.withheld, {}};
       for (const fs::directory_entry& e : fs::recursive_directory_iterator(case_folder(p)))
         if (e.is_regular_file())
-          c.files[fs::relative(e.path(), command_.out).string()] = io::sha256(io::read_text(e.path()));
+          c.files[e.path().lexically_relative(command_.out).string()] = io::sha256(io::read_text(e.path()));
       m.cases.push_back(std::move(c));
     }
     for (const auto& [id, d] : detectability_)

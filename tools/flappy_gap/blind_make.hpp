@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "blind/flights.hpp"
@@ -17,8 +18,11 @@ struct MakeCommand {
                              detectable = "configs/gap/detectable.toml";
   PlanOptions plan;
   int threads = 0;  ///< 0: one for each processor
-  /// What of the catalogue's parameters comes nearest to the effects of a case, by "effect.parameter"; none: unknown.
-  std::function<std::map<std::string, double>(const blind::Case&)> true_values;
+  /// What of the catalogue's parameters comes nearest to the effects of a case, by "effect.parameter"; null: nothing does.
+  /// Asked of the parts whose intervals are scored; without it none is.
+  std::function<std::map<std::string, std::optional<double>>(const blind::Case&,
+                                                             const std::vector<blind::BlindEffect>&)>
+      true_values;
 };
 
 /// Flies the cases into `out`/cases and seals what they are. Goes on where it was stopped; false where it was stopped again.

@@ -11,9 +11,11 @@ namespace {
 
 /// First seeds. Robots flown by hand and by the oracle have seeds below; a part has 1,000.
 constexpr std::uint64_t kDevelopment = 10001, kReported = 700001, kSeedsOfAPart = 1000;
-constexpr std::size_t kSingles = 5, kNone = 40, kParameters = 40, kWithheld = 30, kOutside = 3, kPairs = 40, kHover = 6,
-                      kTypical = 3;
-constexpr double kOverDetectable = 2, kOutsideSize = 2;
+constexpr std::size_t kSingles = 5, kNone = 40, kParameters = 40, kWithheld = 30, kOutside = 30, kPairs = 40,
+                      kHover = 6, kTypical = 3;
+constexpr double kOverDetectable = 2, kLargest = 4;
+/// Of effects outside the catalogue of which the table says nothing.
+constexpr double kOutsideSize = 2;
 /// What hover alone does not show.
 constexpr const char* kHidden[] = {"ground_effect", "ceiling_effect", "body_drag", "tether", "marker_offset"};
 
@@ -39,6 +41,15 @@ class Planner {
       catalogue_.push_back(id);
       if (!of_.at(id).undetectable) detectable_.push_back(id);
     }
+    for (std::size_t k = catalogue_.size(); k < blind::kEffects; ++k) {
+      const std::string& id = blind::effect_names()[k];
+      const auto known = of_.find(id);
+      if (known == of_.end()) outside_.push_back({id, kOutsideSize});
+      else if (!known->second.undetectable) outside_.push_back(at_twice(id));
+    }
+    if (outside_.empty())
+      throw io::InputError(
+          "--detectable: nothing outside the catalogue is detectable; accepted: a table of the oracle");
     if (detectable_.size() < 2)
       throw io::InputError("--detectable: fewer than two effects are detectable; accepted: a table of the oracle");
   }
@@ -53,13 +64,12 @@ class Planner {
     });
     part("none", kNone, [](std::size_t, PlannedCase& c) { c.randomised = false; });
     part("parameters", kParameters, [](std::size_t, PlannedCase&) {});
-    part("withheld", kWithheld + kOutside * outside(), [&](std::size_t k, PlannedCase& c) {
+    part("withheld", kWithheld + kOutside, [&](std::size_t k, PlannedCase& c) {
       if (k < kWithheld) {
         single(k, c);
         c.withheld = whole_group(c.effects.front().id);
       } else {
-        const std::size_t which = catalogue_.size() + (k - kWithheld) % outside();
-        c.effects = {{blind::effect_names()[which], kOutsideSize}};
+        c.effects = {outside_[(k - kWithheld) % outside_.size()]};
       }
     });
     part("pairs", kPairs, [&](std::size_t, PlannedCase& c) { pair(c); });
@@ -77,8 +87,6 @@ class Planner {
   }
 
  private:
-  std::size_t outside() const { return blind::kEffects - catalogue_.size(); }
-
   static std::uint64_t index_of(const std::string& part) {
     return static_cast<std::uint64_t>(std::ranges::find(kParts, part) - std::begin(kParts));
   }
@@ -132,6 +140,7 @@ class Planner {
   const std::map<std::string, Detectability>& of_;
   const PlanOptions& options_;
   std::vector<std::string> catalogue_, detectable_;
+  std::vector<blind::BlindEffect> outside_;
   std::mt19937_64 random_;
   std::vector<PlannedCase> cases_;
 };
@@ -143,18 +152,24 @@ std::map<std::string, Detectability> read_detectability(const std::filesystem::p
   const io::Table root = config.root();
   root.integer("schema", 1, 1);
   std::map<std::string, Detectability> all;
-  for (const model::EffectEntry& e : model::effects()) {
-    const io::Table t = root.table(e.info.id);
+  for (const std::string& id : blind::effect_names()) {
+    if (model::effect_index(id.c_str()) < 0 && !root.has(id)) continue;
+    const io::Table t = root.table(id);
     Detectability d;
     d.undetectable = t.boolean_or("undetectable", false);
-    if (d.undetectable) d.detectable = t.number_or("detectable", 4, io::non_negative());
-    else d.detectable = t.number("detectable", {0, 4 / kOverDetectable, true});
+    if (!d.undetectable || t.has("detectable")) d.detectable = t.number("detectable", io::positive(kLargest));
+    if (!d.undetectable && kOverDetectable * d.detectable > kLargest)
+      t.fail("detectable", "twice that is beyond size 4", "undetectable = true");
     d.inseparable = t.strings("inseparable");
     for (const std::string& rival : d.inseparable)
       if (model::effect_index(rival.c_str()) < 0)
         t.fail("inseparable", "no effect \"" + rival + "\"", "identifiers of docs/effects.md");
+    // for the reader of the file
     t.number_or("gain_at_typical", 0);
-    all[e.info.id] = std::move(d);
+    t.number_or("misfit", 0);
+    if (const auto values = t.optional_table("catalogue"))
+      for (const std::string& key : values->keys()) values->number(key);
+    all[id] = std::move(d);
   }
   root.finish();
   return all;

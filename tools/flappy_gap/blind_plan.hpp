@@ -19,7 +19,7 @@ struct Detectability {
   std::vector<std::string> inseparable;  ///< rivals that it cannot be told from at twice the size
 };
 
-/// Of every effect of the catalogue. InputError where one is missing.
+/// Of every effect of the catalogue, and of those outside that the table has. InputError where one is missing.
 std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file);
 
 /// One robot and its flights, as only the maker knows them.

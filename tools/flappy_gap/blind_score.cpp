@@ -39,7 +39,7 @@ class Predictions {
         if (io::sha256(io::read_text(command_.folder / file)) != sha256) refuse(command_.folder / file, "has changed");
       for (const fs::path& flight : c.flights(command_.folder))
         for (const fs::directory_entry& e : fs::directory_iterator(flight))
-          if (!c.files.contains(fs::relative(e.path(), command_.folder).string())) refuse(e.path(), "is new");
+          if (!c.files.contains(e.path().lexically_relative(command_.folder).string())) refuse(e.path(), "is new");
     }
   }
 
