@@ -162,9 +162,9 @@ Json lines_json(const std::vector<ScoreLine>& lines) {
   return json;
 }
 
-std::string joined(const std::vector<std::string>& names) {
+std::string joined(const std::vector<std::string>& names, const char* by = "+") {
   std::string text;
-  for (const std::string& n : names) text += (text.empty() ? "" : "+") + n;
+  for (const std::string& n : names) text += (text.empty() ? "" : by) + n;
   return text;
 }
 
@@ -228,7 +228,7 @@ Json blind_score(const ScoreCommand& command) {
   text += "\n" + manifest.set + " seeds, " + std::to_string(cases.size()) + " cases, " +
           std::to_string(truths.at("never_fly").size()) +
           " robots that never fly left out. Undetectable, left out: " + std::to_string(undetectable.size()) +
-          (undetectable.empty() ? "" : " (" + joined(undetectable) + ")") + ".\n";
+          (undetectable.empty() ? "" : " (" + joined(undetectable, ", ") + ")") + ".\n";
   if (commits.size() > 1) text += "Predicted by " + std::to_string(commits.size()) + " different versions.\n";
   std::fputs(text.c_str(), stdout);
   io::write_atomically(command.folder / "score.md", text);
