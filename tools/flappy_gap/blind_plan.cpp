@@ -94,10 +94,8 @@ class Planner {
     return (options_.reported ? kReported : kDevelopment) + kSeedsOfAPart * index_of(part) + k;
   }
 
-  /// What is drawn of a part does not depend on which other parts are made.
   template <class Fill>
   void part(const char* name, std::size_t count, const Fill& fill) {
-    random_.seed(seed_of(name, 0));
     if (!options_.part.empty() && options_.part != name) return;
     if (options_.at_most > 0) count = std::min(count, options_.at_most);
     for (std::size_t k = 0; k < count; ++k) {
