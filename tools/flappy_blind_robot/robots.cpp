@@ -2,9 +2,7 @@
 
 #include <filesystem>
 
-#include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
-#include "io/sha256.hpp"
 
 namespace flappy::blind {
 namespace {
@@ -23,13 +21,6 @@ std::vector<BlindEffect> effects_of(const std::vector<std::string>& texts) {
     effects.push_back({text.substr(0, equals), value});
   }
   return effects;
-}
-
-model::Vehicle read_declared(const std::string& path) {
-  model::Vehicle declared = model::read_vehicle(path);
-  if (!declared.effects.empty())
-    throw io::InputError(path + ": [effects]: the blind robot has effects of its own; accepted: a vehicle without");
-  return declared;
 }
 
 sim::Randomisation read_spread(const model::Vehicle& declared, const std::string& path) {
@@ -53,22 +44,16 @@ void add_robot_options(CLI::App& command, RobotOptions& o) {
 }
 
 Robots::Robots(const RobotOptions& o)
-    : declared_{.vehicle = read_declared(o.vehicle),
-                .vehicle_file = fs::path(o.vehicle).filename().string(),
-                .vehicle_sha256 = io::sha256(io::read_text(o.vehicle)),
-                .sizes = Sizes(effects_of(o.effects)),
-                .power = o.power,
-                .wings = o.wings},
-      seed_(o.seed),
-      randomisation_(read_spread(declared_.vehicle, o.randomise)) {
-  declared_.declared_density_kg_m3 = declared_.vehicle.air_density_kg_m3;
+    : declared_(declared_case(o.vehicle)), seed_(o.seed), randomisation_(read_spread(declared_.vehicle, o.randomise)) {
+  declared_.sizes = Sizes(effects_of(o.effects));
+  declared_.power = o.power;
+  declared_.wings = o.wings;
 }
 
-Case Robots::robot(std::uint64_t draw) const {
+Drawn Robots::fly(Programme programme) const {
   Case c = declared_;
-  c.seed = seed_ * kTries + draw;
-  c.vehicle = randomisation_.sample({c.seed, 0, 0, sim::Stream::vehicle});
-  return c;
+  c.programme = programme;
+  return fly_drawn(c, randomisation_, seed_);
 }
 
 void make_folder(const std::string& out) {

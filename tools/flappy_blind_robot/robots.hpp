@@ -4,13 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "blind/flights.hpp"
+#include "blind/drawn.hpp"
 #include "io/program.hpp"
-#include "sim/randomise.hpp"
 
 namespace flappy::blind {
-
-inline constexpr std::uint64_t kTries = 20;  ///< robots drawn until one does not crash
 
 struct RobotOptions {
   std::string vehicle, randomise = "none", out;
@@ -25,7 +22,8 @@ void add_robot_options(CLI::App& command, RobotOptions& o);
 class Robots {
  public:
   explicit Robots(const RobotOptions& o);
-  Case robot(std::uint64_t draw) const;
+  Case robot(std::uint64_t draw) const { return drawn_case(declared_, randomisation_, seed_, draw); }
+  Drawn fly(Programme programme) const;
 
  private:
   Case declared_;

@@ -2,6 +2,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "blind_make.hpp"
+#include "blind_score.hpp"
 #include "diagnose.hpp"
 #include "gap/check.hpp"
 #include "gap/data_faults.hpp"
@@ -119,9 +121,41 @@ int main(int argc, char** argv) {
   diagnose->add_option("--withhold", command.withheld, "entries that the catalogue is to lack");
   diagnose->add_option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
   diagnose->add_option("--threads", command.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
+  CLI::App* blind = program.app().add_subcommand("blind", "how often diagnoses of robots of another making are right");
+  blind->require_subcommand(1);
+  CLI::App* make = blind->add_subcommand("make", "flies the cases and seals what they are");
+  gap::MakeCommand made;
+  std::string set;
+  make->add_option("--out", made.out, "folder for the cases")->required();
+  make->add_option("--set", set, "development or reported: which seeds")
+      ->check(CLI::IsMember({"development", "reported"}))
+      ->required();
+  make->add_option("--part", made.plan.part, "this part alone")
+      ->check(CLI::IsMember(std::vector<std::string>(std::begin(gap::kParts), std::end(gap::kParts))));
+  make->add_option("--cases", made.plan.at_most, "of each part at most")->check(CLI::Range(1, 1000));
+  make->add_option("--vehicle", made.vehicle, "the robot as declared")->capture_default_str();
+  make->add_option("--randomise", made.randomise, "what robots are drawn from")->capture_default_str();
+  make->add_option("--detectable", made.detectable, "what the oracle found of every effect")->capture_default_str();
+  make->add_option("--threads", made.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
+  CLI::App* score = blind->add_subcommand("score", "diagnoses every case, then opens the labels and compares");
+  gap::ScoreCommand scored;
+  score->add_option("folder", scored.folder, "of blind make")->required();
+  score->add_option("--vehicle", scored.vehicle, "the robot as declared, where it is elsewhere now");
+  score->add_option("--priors", scored.priors, "what is uncertain of the vehicle")->capture_default_str();
+  score->add_option("--threads", scored.threads, "cases at a time; 0: one for each processor")
+      ->check(CLI::Range(0, 1024));
   program.app().require_subcommand(1);
   return program.run(argc, argv, [&] {
-    if (check->parsed()) program.write_json(gap::check(folders));
-    else program.write_json(gap::run_diagnose(command));
+    if (make->parsed()) {
+      made.plan.reported = set == "reported";
+      if (!gap::blind_make(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
+    } else if (score->parsed()) {
+      const gap::Json scores = gap::blind_score(scored);
+      if (!scores.is_null()) program.write_json(scores);
+    } else if (check->parsed()) {
+      program.write_json(gap::check(folders));
+    } else {
+      program.write_json(gap::run_diagnose(command));
+    }
   });
 }

@@ -1,0 +1,21 @@
+// flappy-gap blind score.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "blind_predict.hpp"
+
+namespace flappy::gap {
+
+struct ScoreCommand {
+  std::filesystem::path folder, vehicle, priors = "configs/gap/priors.toml";  ///< vehicle: empty for the manifest's
+  int threads = 0;  ///< cases at a time; 0: one for each processor
+  Predictor predictor = predict;
+};
+
+/// Predicts what has no prediction yet, seals the predictions, opens the labels, scores. Goes on where it was stopped; null where
+/// it was stopped again. InputError where logs, labels or predictions are not what was sealed.
+nlohmann::ordered_json blind_score(const ScoreCommand& command);
+
+}  // namespace flappy::gap
