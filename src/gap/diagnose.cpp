@@ -22,10 +22,14 @@ constexpr double kLeastGain = 0, kLeastFurther = 8;
 /// A coordinate of a size that is as good as 0.
 constexpr double kVanished = 0.005;
 /// How well an entry's equation describes the effect of its name: share of its own signature.
-constexpr double kForm = 0.15;
+constexpr double kForm = 0.3;
 /// Shares of the signal that a term which no entry explains may have.
 constexpr double kUnexplained[] = {0.003, 0.01, 0.03, 0.1};
 constexpr int kMostTerms = 12;
+/// Share of what the best entry explains that its imperfect equation may leave to others before the cause counts as unknown.
+constexpr double kImperfect = 0.5;
+/// Nats that a term has to bring beyond those of choosing it: single floors are exceeded now and then.
+constexpr double kTermCost = 6;
 /// What was thought before any flight: how often a gap is of each kind.
 constexpr double kPriorNone = 0.15, kPriorParameters = 0.35, kPriorEffect = 0.35, kPriorUnknown = 0.15;
 /// For every further effect.
@@ -87,6 +91,7 @@ class Diagnoser {
       const double log_prior = std::log(kPriorUnknown / static_cast<double>(model::effects().size()));
       Answer beside = explain_freely(best.fit.point, log_prior);
       if (!beside.terms.empty() && beside.log_evidence > unknown.log_evidence) unknown = std::move(beside);
+      unknown.log_evidence -= kImperfect * std::max(0.0, best.log_evidence - parameters);
     }
     d.answers.push_back(std::move(unknown));
     for (Answer& a : singles) d.answers.push_back(std::move(a));
@@ -215,7 +220,7 @@ class Diagnoser {
         room(g, best.function) = std::hypot(sd(g, best.function), best.share * evidence_.signal(g));
       }
       const double next = posterior(l, c, all_, room).log_evidence -
-                          std::log(static_cast<double>(kChannels * q * std::size(kUnexplained)));
+                          std::log(static_cast<double>(kChannels * q * std::size(kUnexplained))) - kTermCost;
       if (next < now) break;
       best.gain = next - now;
       now = next;
