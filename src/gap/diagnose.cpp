@@ -21,8 +21,6 @@ constexpr double kEffectReach = 0.4;
 constexpr double kLeastGain = 0, kLeastFurther = 8;
 /// A coordinate of a size that is as good as 0.
 constexpr double kVanished = 0.005;
-/// How well an entry's equation describes the effect of its name: share of its own signature.
-constexpr double kForm = 0.3;
 /// Shares of the signal that a term which no entry explains may have.
 constexpr double kUnexplained[] = {0.003, 0.01, 0.03, 0.1};
 constexpr int kMostTerms = 12;
@@ -170,7 +168,7 @@ class Diagnoser {
   Smooth form_error(const Linearised& l, Index shared) const {
     Smooth own = Smooth::Zero(kGroups, evidence_.basis().size());
     for (std::size_t k = static_cast<std::size_t>(shared); k < l.columns.size(); ++k)
-      if (l.columns[k].size() > 0) own += kForm * l.at[static_cast<Index>(k)] * l.columns[k];
+      if (l.columns[k].size() > 0) own += kFormError * l.at[static_cast<Index>(k)] * l.columns[k];
     return own.cwiseAbs();
   }
 

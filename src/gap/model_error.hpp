@@ -38,4 +38,7 @@ struct Mistaken {
 };
 inline constexpr Mistaken kMistaken[] = {{0.7, 0.25}, {1, 0.4}, {1.4, 0.25}, {2, 0.1}};
 
+/// How well an entry's equation describes the effect of its name: sd of every coefficient as a share of its own.
+inline constexpr double kFormError = 0.3;
+
 }  // namespace flappy::gap

@@ -15,9 +15,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// How well an entry's equation describes the effect of its name: share of its own signature.
-constexpr double kForm = 0.15;
-
 /// An answer where the flights so far leave it.
 struct Rival {
   std::string name;
@@ -79,7 +76,7 @@ std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, const S
   }
   for (Index d = rival.hypothesis.shared(); d < k; ++d) {
     const Smooth& column = l.columns[static_cast<std::size_t>(d)];
-    if (column.size() > 0) e.form += kForm * rival.at[d] * column;
+    if (column.size() > 0) e.form += kFormError * rival.at[d] * column;
   }
   return e;
 }

@@ -123,8 +123,24 @@ Report report_of(const std::vector<std::string>& names, const std::vector<Carrie
   return r;
 }
 
+Report report_of(const std::vector<std::string>& names, std::vector<DataFault> faults) {
+  Report r;
+  r.flights = names;
+  r.faults = std::move(faults);
+  r.conclusion.kind = Conclusion::Kind::data;
+  r.conclusion.probability = 1;
+  return r;
+}
+
 Json diagnosis_json(const Report& r) {
-  Json faults = Json::array(), where = Json::array(), candidates = Json::array();
+  Json faults = Json::array(), where = Json::array(), candidates = Json::array(), closed_loop = Json::array();
+  const auto finite = [](double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); };
+  for (const ClosedLoop& c : r.closed_loop)
+    closed_loop.push_back({{"flight", c.flight},
+                           {"quantity", c.quantity},
+                           {"recorded", finite(c.recorded)},
+                           {"nominal", finite(c.nominal)},
+                           {"corrected", finite(c.corrected)}});
   for (const DataFault& f : r.faults) faults.push_back({{"file", f.file}, {"line", f.line}, {"what", f.what}});
   for (const Place& p : largest_discoveries(r.places, "refit", kMostPlaces))
     where.push_back({{"channel", channel_name(p.channel)},
@@ -160,8 +176,11 @@ Json diagnosis_json(const Report& r) {
             {"closure", closure(&Closure::value)},
             {"closure_low", closure(&Closure::low)},
             {"closure_high", closure(&Closure::high)}}},
-          {"closed_loop", Json::array()},
-          {"next_experiment", nullptr}};
+          {"closed_loop", closed_loop},
+          {"next_experiment", r.next ? Json({{"manoeuvre", r.next->manoeuvre},
+                                             {"separates", r.next->separates},
+                                             {"expected_nats", r.next->expected_nats}})
+                                     : Json(nullptr)}};
 }
 
 }  // namespace flappy::gap

@@ -6,16 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "gap/closed_loop.hpp"
 #include "gap/closure.hpp"
+#include "gap/data_faults.hpp"
+#include "gap/next_experiment.hpp"
 #include "gap/verdict.hpp"
 
 namespace flappy::gap {
-
-struct DataFault {
-  std::string file;
-  int line = 0;
-  std::string what;
-};
 
 /// What an effect's parameter is, with its 90 % interval.
 struct Size {
@@ -60,17 +57,20 @@ struct Report {
   double noise_floor = 0;
   std::optional<Closure> closure;
   std::vector<double> over_noise[3];  ///< by stage: rms of residual over noise, [channel], 0 where there is none
+  std::vector<ClosedLoop> closed_loop;
+  std::optional<NextExperiment> next;  ///< none where no two answers are left
 };
 
 /// Names of the stages of places.
 inline constexpr const char* kStages[] = {"nominal", "refit", "effect"};
 
+/// Of data that forbid a diagnosis.
+Report report_of(const std::vector<std::string>& names, std::vector<DataFault> faults);
 /// `names`: of the flights' folders.
 Report report_of(const std::vector<std::string>& names, const std::vector<CarriedFlight>& flights,
                  const sim::Randomisation& uncertain, const Diagnosis& diagnosis);
 
 /// Its candidates without effects stand for parameters, none and unknown, whose name is their group: all add up to 1.
-/// `closed_loop` and `next_experiment` are left empty.
 nlohmann::ordered_json diagnosis_json(const Report& report);
 
 /// Of an effect's parameter, from its name: "kg/m" of line_kg_m, "" where it has none.

@@ -9,6 +9,8 @@ namespace flappy::gap {
 
 struct DiagnoseCommand {
   std::string vehicle, priors = "configs/gap/priors.toml";
+  std::string
+      manoeuvre;  ///< configuration of flappy-fly that the flights flew; empty: the recorded paths, under our hover's
   std::vector<std::string> flights, withheld;
   std::string out;  ///< folder for all files; empty: none
   int threads = 0;  ///< 0: one for each processor

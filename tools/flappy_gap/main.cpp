@@ -118,6 +118,8 @@ int main(int argc, char** argv) {
   diagnose->add_option("--vehicle", command.vehicle, "the vehicle's file, as it was believed")->required();
   diagnose->add_option("--flights", command.flights, "folders of flight logs")->required();
   diagnose->add_option("--priors", command.priors, "what is uncertain of the vehicle")->capture_default_str();
+  diagnose->add_option("--manoeuvre", command.manoeuvre,
+                       "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
   diagnose->add_option("--withhold", command.withheld, "entries that the catalogue is to lack");
   diagnose->add_option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
   diagnose->add_option("--threads", command.threads, "0: one for each processor")->check(CLI::Range(0, 1024));

@@ -1,6 +1,7 @@
 #include "summary.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <filesystem>
@@ -78,6 +79,18 @@ std::vector<Place> one_of_each_test(const Report& r) {
   return list;
 }
 
+/// Where the correction tells most: by the change of the error over its size.
+const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
+  const ClosedLoop* most = nullptr;
+  double largest = 0;
+  for (const ClosedLoop& c : list) {
+    const double before = std::abs(c.nominal - c.recorded), after = std::abs(c.corrected - c.recorded);
+    const double share = (before - after) / (std::abs(c.recorded) + 1e-9);
+    if (share > largest) largest = share, most = &c;
+  }
+  return most;
+}
+
 std::string name_of(const Reported& c) {
   return c.kind == Answer::Kind::effect ? listed(c.effects, "and") : "(" + c.group + ")";
 }
@@ -88,7 +101,7 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   std::vector<std::string> lines = {verdict_line(r.conclusion)};
   if (r.conclusion.kind == Conclusion::Kind::data) {
     for (std::size_t i = 0; i < r.faults.size() && i + 3 < kSummaryLines; ++i)
-      lines.push_back(text("  %s:%d: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
+      lines.push_back(text("  %s:%zu: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
     lines.push_back(next_line(r.conclusion, out));
     return lines;
   }
@@ -145,6 +158,14 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     for (std::size_t i = 0; i < r.moved.size() && i < kMoved; ++i)
       lines.push_back(text("  %-36s %+10.2f", r.moved[i].name.c_str(), r.moved[i].prior_sd));
   }
+  if (const ClosedLoop* c = most_corrected(r.closed_loop))
+    lines.push_back(text("in closed loop, %s: %s recorded %.3g, by the vehicle's file %.3g, by the corrected one %.3g",
+                         std::filesystem::path(c->flight).filename().c_str(), c->quantity.c_str(), c->recorded,
+                         c->nominal, c->corrected));
+  if (r.next)
+    lines.push_back(text("%s and %s differ most in configs/gap/experiments/%s.toml (%.3g nats expected)",
+                         r.next->separates.front().c_str(), r.next->separates.back().c_str(), r.next->manoeuvre.c_str(),
+                         r.next->expected_nats));
   lines.push_back(next_line(r.conclusion, out));
   return lines;
 }
