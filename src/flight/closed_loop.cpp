@@ -1,6 +1,7 @@
 // The closed loop: what a block of flappers does in one control period, stage by stage. Compiled once for each
 // instruction set (FLAPPY_ISA); the bits are the same on all of them.
 #include "flight/flight_block.hpp"
+#include "flight/sensor_effects.hpp"
 #include "sim/rows.hpp"
 
 namespace flappy::flight {
@@ -113,10 +114,20 @@ FLAPPY_INLINE void look(const FlightSpace<T>& s, int first) {
   store_rows(truth, s.flight.truth, first);
 }
 
-/// Sensors sample the true state at the end of a slice.
+/// Time since the start of each lane's flight, `steps` into the period.
 template <class T>
-FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Slice& slice, int imu_samples,
-                         int mocap_samples, int first) {
+FLAPPY_INLINE L<T> flight_time_s(const FlightBlock<T>& f, const FlightPlan<T>& plan, std::int64_t steps, int first) {
+  T time[kWidth<T>];
+  for (int i = 0; i < kWidth<T>; ++i)
+    time[i] = static_cast<T>(f.tick[first + i] * static_cast<double>(plan.task.tick_s) +
+                             static_cast<double>(steps) * plan.physics->step_s);
+  return L<T>::load(time);
+}
+
+/// Sensors sample the true state at the end of a slice, `steps` into the period.
+template <class T>
+FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Slice& slice, std::int64_t steps,
+                         int imu_samples, int mocap_samples, int first) {
   FlightBlock<T>& f = s.flight;
   const auto truth = load_rows<Truth<L<T>>>(f.truth, first);
   const auto draw = [&](sim::Stream stream, std::uint32_t index) {
@@ -126,10 +137,11 @@ FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
   if (slice.imu) {
     auto imu = load_rows<Imu<L<T>>>(f.imu, first);
     const L<T> interval(slice.imu_interval_s);
-    const auto sample =
+    auto sample =
         sample_imu(plan.imu, L<T>(L<T>(1) / interval), truth, imu, draw(sim::Stream::imu, 2 * slice.imu_index),
                    draw(sim::Stream::imu, 2 * slice.imu_index + 1));
     store_rows(imu, f.imu, first);
+    if (s.effects.set & kImuEffects) disturb(s.effects, flight_time_s(f, plan, steps, first), sample, first);
     auto fusion = load_rows<Fusion<L<T>>>(f.fusion, first);
     gather(fusion.gathered, sample, interval);
     store_rows(fusion, f.fusion, first);
@@ -142,8 +154,9 @@ FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
       chance = sim::uniforms<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap), index + 2,
                                    f.flapper + first, f.flight + first)
                    .u[0];
-    const auto sample = sample_mocap(plan.mocap, truth, seen, draw(sim::Stream::mocap, index),
-                                     draw(sim::Stream::mocap, index + 1), chance);
+    auto sample = sample_mocap(plan.mocap, truth, seen, draw(sim::Stream::mocap, index),
+                               draw(sim::Stream::mocap, index + 1), chance);
+    if (s.effects.set & kMocapEffects) disturb(s.effects, sample, first);
     seen.store(f.seen[0] + first);
     store_rows(sample, slot(s.queue, slice.mocap_slot, kMocapRows), first);
     if (s.tap.mocap != nullptr) store_rows(sample, slot(s.tap.mocap, mocap_samples, kMocapRows), first);
@@ -272,7 +285,9 @@ void fly_block(const FlightSpace<T>& s, const FlightPlan<T>& plan) {
     step += slice.steps;
     const bool sampled = slice.imu || slice.mocap, last = i + 1 == plan.slice_count;
     if (sampled || last) for_lanes<T>([&](int first) { look(s, first); });
-    if (sampled) for_lanes<T>([&](int first) { sense(s, plan, slice, imu_samples, mocap_samples, first); });
+    if (sampled)
+      for_lanes<T>(
+          [&](int first) { sense(s, plan, slice, step - plan.first_step, imu_samples, mocap_samples, first); });
     imu_samples += slice.imu;
     mocap_samples += slice.mocap;
     watch.lap(kSense);
