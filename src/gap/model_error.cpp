@@ -64,11 +64,11 @@ constexpr Shares kShares[] = {
       {0.0008, 0.0009, 0.0013, 0.0010, 0.0047},
       {0.0019, 0.0012, 0.0014, 0.0015, 0.0036}}},
 };
-/// Of other channels, whatever the harmonic; of strokes and motors no development robot told, so they are as forces.
+/// Of other channels, whatever the harmonic; of strokes and motors no development robot told yet: a guess on the safe side.
 struct Share {
   double steady, changing, velocity;
 };
-constexpr Share kDrive = {0.01, 0.001, 0.002}, kPath = {0.0019, 0.001, 0.002}, kTurn = {0.0006, 0.0006, 0.0006};
+constexpr Share kDrive = {0.03, 0.004, 0.008}, kPath = {0.0019, 0.001, 0.002}, kTurn = {0.0006, 0.0006, 0.0006};
 /// Against what changes with an input.
 constexpr double kRate = 0.88, kProduct = 0.74, kPlace = 0.77;
 

@@ -221,7 +221,8 @@ class ChannelRows {
 const char* channel_unit(int channel) {
   if (channel < kForceX) return "rad/s^2";
   if (channel < kStrokeLeft) return "m/s^2";
-  if (channel < kPathX) return "rad";
+  if (channel < kBattery) return "rad";
+  if (channel < kPathX) return channel == kBattery ? "V" : "A";
   return channel < kTurnX ? "m/s^2" : "rad/s";
 }
 
