@@ -7,6 +7,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "io/program.hpp"
 #include "io/sha256.hpp"
+#include "oracle.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::blind {
@@ -113,10 +114,22 @@ int main(int argc, char** argv) {
   fly->add_flag("--wings", o.wings, "log wing angles");
   fly->add_flag("--no-truth", o.no_truth, "leave out truth.csv");
   fly->add_option("--out", o.out, "folder for flight_1, flight_2, flight_3")->required();
+  CLI::App* oracle = program.app().add_subcommand("oracle", "finds how large effects have to be to be found");
+  blind::OracleCommand command;
+  oracle->add_option("--vehicle", command.vehicle, "the vehicle as declared")->required();
+  oracle->add_option("--randomise", command.randomise, "what robots are drawn from")->capture_default_str();
+  oracle->add_option("--priors", command.priors, "what is uncertain of them")->capture_default_str();
+  oracle->add_option("--vehicles", command.vehicles, "how many")->check(CLI::Range(1, 1000))->capture_default_str();
+  oracle->add_option("--seed", command.seed, "of the first")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 53))
+      ->capture_default_str();
+  oracle->add_option("--out", command.out, "file for what is found")->required();
+  oracle->add_option("--threads", command.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
   program.app().require_subcommand(1);
   return program.run(argc, argv, [&] {
     if (*list)
       for (const std::string& name : blind::effect_names()) std::printf("%s\n", name.c_str());
+    else if (*oracle) program.write_json(blind::run_oracle(command));
     else program.write_json(blind::fly_case(o));
   });
 }
