@@ -85,7 +85,6 @@ Oracle::Oracle(const Subject& subject, const sim::Randomisation& uncertain) {
       columns.push_back(std::move(axis));
     }
   }
-  columns_ = static_cast<Index>(columns.size());
   information_ = subject.information(subject.parameters(uncertain), columns);
 }
 
@@ -94,7 +93,7 @@ VectorXd Oracle::truth_of(Effect effect, double size) const {
   const Columns& c = effects_[static_cast<std::size_t>(effect)];
   const auto above = static_cast<std::size_t>(std::ranges::lower_bound(c.sizes, size) - c.sizes.begin());
   if (above == c.sizes.size()) return {};
-  VectorXd d = VectorXd::Zero(columns_);
+  VectorXd d = VectorXd::Zero(width());
   const double low = above > 0 ? c.sizes[above - 1] : 0, share = (size - low) / (c.sizes[above] - low);
   d[c.at[above]] = share;
   if (above > 0) d[c.at[above - 1]] = 1 - share;
@@ -106,7 +105,7 @@ double Oracle::best_gain(const VectorXd& truth, Effect hypothesis, const std::ve
                          const std::vector<double>& sizes) const {
   const std::vector<int>& further = effects_[static_cast<std::size_t>(hypothesis)].further;
   const auto n = static_cast<Index>(further.size());
-  MatrixXd m = MatrixXd::Zero(columns_, n + 1);
+  MatrixXd m = MatrixXd::Zero(width(), n + 1);
   VectorXd precision = VectorXd::Constant(n + 1, 1 / (kSizeSd * kSizeSd));
   for (Index i = 0; i < n; ++i) m(further[static_cast<std::size_t>(i)], i + 1) = 1;
   double best = 0;  // its size may be none
@@ -128,7 +127,7 @@ double Oracle::gain_over(Effect truth, double size, Effect rival) const {
   if (d.size() == 0) return 0;
   const Columns& c = effects_[static_cast<std::size_t>(rival)];
   std::vector<VectorXd> columns;
-  for (const int at : c.at) columns.emplace_back(VectorXd::Unit(columns_, at));
+  for (const int at : c.at) columns.emplace_back(VectorXd::Unit(width(), at));
   return best_gain(d, truth, {d}, {size}) - best_gain(d, rival, columns, c.sizes);
 }
 

@@ -80,12 +80,21 @@ class Subject {
   double noise_ratio_ = 1;
 };
 
-/// What a subject says of every effect.
+/// What flights say of every effect.
 class Oracle {
  public:
+  /// The columns of an effect, as indices.
+  struct Columns {
+    std::vector<double> sizes;  ///< increasing, at which there is a column
+    std::vector<int> at;        ///< which
+    std::vector<int> further;   ///< other directions, at typical size
+  };
+  Oracle(std::array<Columns, kEffects> effects, Information information)
+      : effects_(std::move(effects)), information_(std::move(information)) {}
+  /// `uncertain`: draws of the parameters, about any vehicle. Some minutes of one processor.
   Oracle(const Subject& subject, const sim::Randomisation& uncertain);
 
-  /// Nats that the truth gains over parameters alone; nothing where the robot comes apart.
+  /// Nats that the truth gains over parameters alone, on a flight held out; 0 where the robot comes apart.
   double gain(Effect truth, double size) const;
   /// Nats that it gains over a rival whose sizes are free.
   double gain_over(Effect truth, double size, Effect rival) const;
@@ -93,17 +102,12 @@ class Oracle {
   double detectable(Effect effect, double nats) const;
 
  private:
-  struct Columns {
-    std::vector<double> sizes;  ///< at which there is a column
-    std::vector<int> at;        ///< which
-    std::vector<int> further;   ///< other directions, at typical size
-  };
   Eigen::VectorXd truth_of(Effect effect, double size) const;
   double best_gain(const Eigen::VectorXd& truth, Effect hypothesis, const std::vector<Eigen::VectorXd>& columns,
                    const std::vector<double>& sizes) const;
+  Eigen::Index width() const { return information_[0].rows(); }
 
   std::array<Columns, kEffects> effects_;
-  Eigen::Index columns_ = 0;
   Information information_;
 };
 
