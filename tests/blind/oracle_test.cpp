@@ -29,11 +29,12 @@ TEST(Oracle, ExpectsWhatDrawsGive) {
   const auto draw = [&](Index rows, Index columns) {
     return MatrixXd(MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }));
   };
-  const MatrixXd parameters = 2 * draw(kRows, 2), both = draw(kRows, 2);
+  // little is known of the second coefficient, so that what learning it costs shows
+  const MatrixXd parameters = 2 * draw(kRows, 2), both = 0.4 * draw(kRows, 2);
   const MatrixXd covariance = MatrixXd::Identity(kRows, kRows) + parameters * parameters.transpose();
-  const VectorXd precision = Eigen::Vector2d(0.2, 1), weights = Eigen::Vector2d(2, 0.5);
+  const VectorXd precision = Eigen::Vector2d(0.2, 1), weights = Eigen::Vector2d(4, 1);
   MatrixXd columns(kRows, 3);
-  columns << both, both * weights + 0.7 * draw(kRows, 1);
+  columns << both, both * weights + 0.3 * draw(kRows, 1);
   const VectorXd truth = Eigen::Vector3d::UnitZ();
   const MatrixXd hypothesis = MatrixXd::Identity(3, 2);
   const MatrixXd wide = covariance + both * precision.cwiseInverse().asDiagonal() * both.transpose();

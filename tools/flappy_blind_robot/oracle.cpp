@@ -111,7 +111,7 @@ std::string rounded(double x) {
   return io::toml_number(std::strtod(text, nullptr));
 }
 
-std::string to_toml(const OracleCommand& o, const std::vector<Finding>& findings) {
+std::string to_toml(const OracleCommand& o, std::size_t vehicles, const std::vector<Finding>& findings) {
   char date[20];
   const std::time_t now = std::time(nullptr);
   std::strftime(date, sizeof date, "%Y-%m-%d", std::gmtime(&now));
@@ -119,7 +119,7 @@ std::string to_toml(const OracleCommand& o, const std::vector<Finding>& findings
       "# How large the effects of the blind robot have to be (docs/blind_oracle.md), in its own unit: 1 is typical. "
       "Written by\n"
       "#   flappy-blind-robot oracle --vehicle " +
-      o.vehicle + " --randomise " + o.randomise + " --vehicles " + std::to_string(o.vehicles) + " --seed " +
+      o.vehicle + " --randomise " + o.randomise + " --vehicles " + std::to_string(vehicles) + " --seed " +
       std::to_string(o.seed) + " --out " + o.out + "\n# " + date + ", commit " + io::commit() + ", " + processor() +
       "\n#\n"
       "# detectable       10 nats over parameters alone on the held-out third of 30 s, median; missing: more than 4\n"
@@ -175,7 +175,8 @@ Json run_oracle(const OracleCommand& o) {
   std::vector<Development> vehicles;
   {
     io::ProgressLine line("robots", 60);
-    for (int i = 0; i < o.vehicles; ++i) {
+    io::stop_on_interrupt();  // with those that are done
+    for (int i = 0; i < o.vehicles && !(io::interrupted() && i > 0); ++i) {
       line.show(static_cast<double>(i) / o.vehicles);
       const std::uint64_t seed = o.seed + static_cast<std::uint64_t>(i);
       vehicles.push_back(develop(declared, robots, uncertain, seed, o.threads));
@@ -188,7 +189,7 @@ Json run_oracle(const OracleCommand& o) {
   }
   const std::vector<Finding> findings = weigh(vehicles);
   print(findings);
-  io::write_atomically(o.out, to_toml(o, findings));
+  io::write_atomically(o.out, to_toml(o, vehicles.size(), findings));
   Json effects = Json::object();
   for (std::size_t e = 0; e < kEffects; ++e) {
     const Finding& f = findings[e];
@@ -202,7 +203,7 @@ Json run_oracle(const OracleCommand& o) {
                                   {"misfit", f.value.misfit},
                                   {"catalogue", f.value.values}};
   }
-  return {{"vehicles", o.vehicles}, {"effects", effects}};
+  return {{"vehicles", vehicles.size()}, {"effects", effects}};
 }
 
 }  // namespace flappy::blind
