@@ -53,15 +53,15 @@ class Subject {
   };
   /// What each adds to the rows; empty for those with which the robot comes apart.
   std::vector<gap::Smooth> added(const std::vector<Added>& list) const;
-  /// The same of every uncertain parameter for one standard deviation, and of the IMU's lag. `uncertain`: draws, about any vehicle.
+  /// The same of every uncertain parameter for one standard deviation, and of the IMU's lag, in the robot and in the
+  /// simulator. `uncertain`: draws, about any vehicle.
   std::vector<gap::Smooth> parameters(const sim::Randomisation& uncertain) const;
+  std::vector<gap::Smooth> simulated_parameters(const sim::Randomisation& uncertain) const;
   /// The same of coordinates of an entry of the catalogue, in the simulator.
   std::vector<gap::Smooth> catalogue(const std::string& effect, const std::vector<Eigen::VectorXd>& coordinates) const;
 
   /// `columns` with the parameters integrated out.
   Information information(const std::vector<gap::Smooth>& parameters, const std::vector<gap::Smooth>& columns) const;
-  /// d' W d over all flights, nothing integrated out: how well the noise lets rows be told apart.
-  Eigen::MatrixXd distance(const std::vector<gap::Smooth>& columns) const;
 
   /// Of the rows' noise over what the headers declare, median of the groups.
   double noise_ratio() const { return noise_ratio_; }
@@ -69,6 +69,7 @@ class Subject {
 
  private:
   std::vector<gap::Smooth> sensed(const std::vector<Added>& list) const;
+  model::Vehicle moved(const sim::Randomisation& uncertain, std::size_t draw, double variate) const;
   Eigen::MatrixXd sums(const std::vector<gap::Smooth>& columns, const std::vector<char>& use,
                        const gap::Smooth& eta_sd) const;
 
@@ -113,17 +114,19 @@ class Oracle {
 
 /// An entry of the catalogue where it is most like an effect of the blind robot.
 struct TrueValue {
-  std::map<std::string, double> values;  ///< "effect.parameter": of its sizes; shapes are typical
-  double misfit = 1;                     ///< what is left of the effect's rows: 0 none, 1 all
+  std::map<std::string, double> values;  ///< "effect.parameter": of its sizes
+  double misfit = 1;                     ///< share of the effect's rows that it leaves: 0 none, 1 all
 };
 /// An entry that leaves more is nothing like the effect.
 inline constexpr double kMostMisfit = 0.5;
-/// By least squares on what the effect adds to the noise-free rows, in units of their noise. `effect`: not one from outside.
-TrueValue true_value(const Subject& subject, Effect effect, double size);
+/// The sizes and shapes of the entry with which the simulator's noise-free rows change most as the robot's do, in the measure
+/// C^-1 above: what `parameters`, the simulator's, can take over is nobody's size. Shapes have their prior, sizes none.
+/// `effect`: of the catalogue.
+TrueValue true_value(const Subject& subject, const std::vector<gap::Smooth>& parameters, Effect effect, double size);
 
 /// "effect.parameter" of each effect in `effects`, alone, on flights without any under the same seed; null where the entry is
-/// nothing like it (misfit above 0.5), or where the robot does not fly without. Some ten seconds of one processor.
+/// nothing like it (misfit above 0.5), or where the robot does not fly without. Some twenty seconds of one processor.
 std::map<std::string, std::optional<double>> true_values(const Case& c, const std::vector<BlindEffect>& effects,
-                                                         int threads);
+                                                         const sim::Randomisation& uncertain, int threads);
 
 }  // namespace flappy::blind

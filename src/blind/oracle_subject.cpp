@@ -135,22 +135,21 @@ std::vector<Smooth> Subject::sensed(const std::vector<Added>& list) const {
   return result;
 }
 
-std::vector<Smooth> Subject::parameters(const sim::Randomisation& uncertain) const {
-  std::vector<Rider> riders;
+/// By as much as any vehicle's figures are moved: a law that replaces knows nothing of this one's.
+model::Vehicle Subject::moved(const sim::Randomisation& uncertain, std::size_t draw, double variate) const {
   std::vector<double> variates(uncertain.draws(), 0);
   model::Vehicle middle = uncertain.at(variates);
-  const auto from = model::parameters(middle);
-  const auto moved = [&](std::size_t draw, double variate) {
-    variates[draw] = variate;
-    model::Vehicle there = uncertain.at(variates), own = case_.vehicle;
-    variates[draw] = 0;
-    // by as much as any vehicle's figures are moved: a law that replaces knows nothing of this one's
-    const auto to = model::parameters(there), changed = model::parameters(own);
-    for (std::size_t i = 0; i < changed.size(); ++i) *changed[i].value += *to[i].value - *from[i].value;
-    return own;
-  };
+  variates[draw] = variate;
+  model::Vehicle there = uncertain.at(variates), own = case_.vehicle;
+  const auto from = model::parameters(middle), to = model::parameters(there), changed = model::parameters(own);
+  for (std::size_t i = 0; i < changed.size(); ++i) *changed[i].value += *to[i].value - *from[i].value;
+  return own;
+}
+
+std::vector<Smooth> Subject::parameters(const sim::Randomisation& uncertain) const {
+  std::vector<Rider> riders;
   for (std::size_t d = 0; d < uncertain.draws(); ++d)
-    for (const double to : {kReach, -kReach}) riders.push_back({moved(d, to), {}, case_.seed});
+    for (const double to : {kReach, -kReach}) riders.push_back({moved(uncertain, d, to), {}, case_.seed});
   for (const int late : {kLagSteps, -kLagSteps}) riders.push_back({case_.vehicle, {}, case_.seed, late});
   std::vector<Signature> rows = carry_all(flights_, riders, threads_);
   std::vector<Smooth> result;
@@ -160,6 +159,19 @@ std::vector<Smooth> Subject::parameters(const sim::Randomisation& uncertain) con
     const bool lag = i + 2 == rows.size();
     result.push_back(evidence_->smooth(change) / (lag ? 2 * kLagSteps : 2 * kReach));
   }
+  return result;
+}
+
+std::vector<Smooth> Subject::simulated_parameters(const sim::Randomisation& uncertain) const {
+  std::vector<gap::Candidate> candidates;
+  for (std::size_t d = 0; d < uncertain.draws(); ++d)
+    for (const double to : {kReach, -kReach}) candidates.push_back({moved(uncertain, d, to)});
+  for (const double to : {kReach, -kReach}) candidates.push_back({case_.vehicle, to * kLagSteps * gap::kStep_s});
+  std::vector<Signature> left = gap::Fitter(flights_, *evidence_, threads_).residuals(candidates);
+  std::vector<Smooth> result;
+  for (std::size_t i = 0; i < left.size(); i += 2)
+    if (const Signature change = difference(std::move(left[i + 1]), left[i]); !change.empty())
+      result.push_back(evidence_->smooth(change) / (2 * kReach));
   return result;
 }
 
@@ -205,11 +217,6 @@ Information Subject::information(const std::vector<Smooth>& parameters, const st
     result.emplace_back(s.bottomRightCorner(n, n) - half.transpose() * half);
   }
   return result;
-}
-
-MatrixXd Subject::distance(const std::vector<Smooth>& columns) const {
-  const Smooth none = Smooth::Zero(gap::kGroups, evidence_->basis().size());
-  return sums(columns, std::vector<char>(flights_.size(), 1), none);
 }
 
 }  // namespace flappy::blind

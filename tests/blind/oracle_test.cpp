@@ -175,9 +175,12 @@ TEST(OracleSubject, SensorsDoNotChangeTheFlight) {
 // Effects whose size both sides state in the same units: the entry comes out as what was put in. Two delays differ by how
 // they wait for each other, 5 %; poses are jittered by as much as a tenth of the delay.
 TEST(OracleTruth, FindsWhatWasPutIn) {
+  const auto uncertain =
+      sim::read_randomisation(test::nominal(), io::Config::load(test::source_path("configs/gap/priors.toml")).root());
   const auto values = true_values(
       flown({}),
-      {{"mocap_tilt", 2}, {"marker_offset", 2}, {"mocap_delay", 1}, {"com_offset", 2}, {"command_delay", 0.5}}, 2);
+      {{"mocap_tilt", 2}, {"marker_offset", 2}, {"mocap_delay", 1}, {"com_offset", 2}, {"command_delay", 0.5}},
+      uncertain, 2);
   const auto at = [&](const char* name) {
     const auto found = values.find(name);
     if (found == values.end() || !found->second) ADD_FAILURE() << name;

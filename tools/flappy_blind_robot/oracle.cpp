@@ -69,7 +69,8 @@ bool beyond_prior(const TrueValue& value) {
   return false;
 }
 
-std::vector<Finding> weigh(const std::vector<Development>& vehicles) {
+std::vector<Finding> weigh(const std::vector<Development>& vehicles, const sim::Randomisation& uncertain) {
+  const std::vector<gap::Smooth> parameters = vehicles[0].subject->simulated_parameters(uncertain);
   const auto over_vehicles = [&](const std::function<double(const Oracle&)>& value) {
     std::vector<double> values;
     for (const Development& d : vehicles) values.push_back(value(*d.oracle));
@@ -86,7 +87,7 @@ std::vector<Finding> weigh(const std::vector<Development>& vehicles) {
     f.gain_at_typical = median(over_vehicles([&](const Oracle& o) { return o.gain(effect, 1); }));
     f.undetectable = !(2 * f.detectable <= kMostSize);
     const double size = std::min(2 * f.detectable, kMostSize);
-    if (in_catalogue(effect)) f.value = true_value(*vehicles[0].subject, effect, size);
+    if (in_catalogue(effect)) f.value = true_value(*vehicles[0].subject, parameters, effect, size);
     if (!f.undetectable && in_catalogue(effect) && f.value.misfit < kMostMisfit) f.undetectable = beyond_prior(f.value);
     for (std::size_t r = 0; r < kEffects; ++r) {
       const auto rival = static_cast<Effect>(r);
@@ -187,7 +188,7 @@ Json run_oracle(const OracleCommand& o) {
       std::fflush(stdout);
     }
   }
-  const std::vector<Finding> findings = weigh(vehicles);
+  const std::vector<Finding> findings = weigh(vehicles, uncertain);
   print(findings);
   io::write_atomically(o.out, to_toml(o, vehicles.size(), findings));
   Json effects = Json::object();
