@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "escapes.hpp"
+#include "oracle.hpp"
 
 namespace flappy::blind {
 namespace {
@@ -62,12 +63,24 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   escape->add_option("--out", escapes.robot.out, "folder for the logs: escape_1, escape_2, ...");
+  CLI::App* oracle = program.app().add_subcommand("oracle", "finds how large effects have to be to be found");
+  blind::OracleCommand command;
+  oracle->add_option("--vehicle", command.vehicle, "the vehicle as declared")->required();
+  oracle->add_option("--randomise", command.randomise, "what robots are drawn from")->capture_default_str();
+  oracle->add_option("--priors", command.priors, "what is uncertain of them")->capture_default_str();
+  oracle->add_option("--vehicles", command.vehicles, "how many")->check(CLI::Range(1, 1000))->capture_default_str();
+  oracle->add_option("--seed", command.seed, "of the first")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 53))
+      ->capture_default_str();
+  oracle->add_option("--out", command.out, "file for what is found")->required();
+  oracle->add_option("--threads", command.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
   program.app().require_subcommand(1);
   return program.run(argc, argv, [&] {
     using blind::Programme;
     if (*list)
       for (const std::string& name : blind::effect_names()) std::printf("%s\n", name.c_str());
     else if (*escape) program.write_json(blind::fly_escapes(escapes));
+    else if (*oracle) program.write_json(blind::run_oracle(command));
     else program.write_json(blind::fly_case(robot, programme == "rich" ? Programme::rich : Programme::hover));
   });
 }

@@ -2,11 +2,14 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "blind/oracle.hpp"
 #include "blind_make.hpp"
 #include "blind_score.hpp"
 #include "diagnose.hpp"
+#include "flappy/vehicle_file.hpp"
 #include "gap/check.hpp"
 #include "gap/data_faults.hpp"
+#include "io/config.hpp"
 #include "io/program.hpp"
 
 namespace flappy::gap {
@@ -150,6 +153,11 @@ int main(int argc, char** argv) {
   return program.run(argc, argv, [&] {
     if (make->parsed()) {
       made.plan.reported = set == "reported";
+      const sim::Randomisation uncertain =
+          sim::read_randomisation(model::read_vehicle(made.vehicle), io::Config::load(command.priors, {}).root());
+      made.true_values = [&](const blind::Case& c, const std::vector<blind::BlindEffect>& effects) {
+        return blind::true_values(c, effects, uncertain, 1);
+      };
       if (!gap::blind_make(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
     } else if (score->parsed()) {
       const gap::Json scores = gap::blind_score(scored);

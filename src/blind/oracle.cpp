@@ -1,0 +1,148 @@
+#include "blind/oracle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "gap/hypothesis.hpp"
+
+namespace flappy::blind {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using gap::Smooth;
+
+/// Sizes at which effects are tried: few do twice as much at twice the size. Those of sensors do.
+constexpr double kSizes[] = {0.25, 0.5, 1, 2, 4}, kSensorSizes[] = {1, 4};
+/// A size is taken for this much, give or take, before any flight.
+constexpr double kSizeSd = 2;
+/// A typical size of the catalogue is a third of the end of its prior, 1.645 of its coordinate.
+constexpr double kTypicalCoordinate = 1.645 / 3;
+constexpr double kLeastSize = 1e-3, kMostSize = 4;
+
+/// Effects that draw a direction, and how many others span what they could have drawn. Those of sensors: the catalogue's axes.
+constexpr std::pair<Effect, int> kDirections[] = {
+    {Effect::com_offset, 2}, {Effect::inertia_products, 3}, {Effect::wing_damage, 2}, {Effect::wind, 2}};
+
+/// L over a set of flights, less what it is with none.
+double total_gain(const MatrixXd& information, const VectorXd& truth, const MatrixXd& m, const VectorXd& precision) {
+  const MatrixXd a = m.transpose() * information * m;
+  const VectorXd f = m.transpose() * (information * truth);
+  const MatrixXd known = MatrixXd(precision.asDiagonal()) + a;
+  const Eigen::LLT<MatrixXd> llt(known);
+  return 0.5 * (f.dot(llt.solve(f)) + llt.solve(a).trace()) - llt.matrixLLT().diagonal().array().log().sum();
+}
+
+}  // namespace
+
+double held_out_gain(const Information& information, const VectorXd& truth, const MatrixXd& hypothesis,
+                     const VectorXd& precision) {
+  double sum = 0;
+  const double all = total_gain(information[0], truth, hypothesis, precision);
+  for (std::size_t set = 1; set < information.size(); ++set)
+    sum += all - total_gain(information[set], truth, hypothesis, precision);
+  return sum / static_cast<double>(information.size() - 1);
+}
+
+Oracle::Oracle(const Subject& subject, const sim::Randomisation& uncertain) {
+  std::vector<Subject::Added> list;
+  const std::uint64_t seed = subject.flown().seed;
+  for (std::size_t e = 0; e < kEffects; ++e) {
+    const auto effect = static_cast<Effect>(e);
+    if (acts_on_sensors(effect))
+      for (const double size : kSensorSizes) list.push_back({effect, size, seed});
+    else
+      for (const double size : kSizes) list.push_back({effect, size, seed});
+    for (const auto& [turned, others] : kDirections)
+      for (int i = 1; turned == effect && i <= others; ++i)
+        list.push_back({effect, 1, seed + static_cast<std::uint64_t>(i)});
+  }
+  const std::vector<Smooth> found = subject.added(list);
+  std::vector<Smooth> columns;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    if (found[i].size() == 0) continue;
+    Columns& c = effects_[static_cast<std::size_t>(list[i].effect)];
+    if (list[i].seed != seed) {
+      c.further.push_back(static_cast<int>(columns.size()));
+    } else {
+      c.sizes.push_back(list[i].size);
+      c.at.push_back(static_cast<int>(columns.size()));
+    }
+    columns.push_back(found[i]);
+  }
+  for (std::size_t e = 0; e < kEffects; ++e) {
+    if (!acts_on_sensors(static_cast<Effect>(e)) || !in_catalogue(static_cast<Effect>(e))) continue;
+    const auto unknowns = static_cast<Index>(gap::unknowns_of(effect_names()[e]).size());
+    std::vector<VectorXd> axes;
+    for (Index i = 0; i < unknowns; ++i)
+      if (gap::unknowns_of(effect_names()[e])[static_cast<std::size_t>(i)].size)
+        axes.emplace_back(kTypicalCoordinate * VectorXd::Unit(unknowns, i));
+    for (Smooth& axis : subject.catalogue(effect_names()[e], axes)) {
+      if (axis.size() == 0) continue;
+      effects_[e].further.push_back(static_cast<int>(columns.size()));
+      columns.push_back(std::move(axis));
+    }
+  }
+  information_ = subject.information(subject.parameters(uncertain), columns);
+}
+
+/// What an effect adds at any size, from those at which it was tried: in between and below, straight; empty beyond.
+VectorXd Oracle::truth_of(Effect effect, double size) const {
+  const Columns& c = effects_[static_cast<std::size_t>(effect)];
+  const auto above = static_cast<std::size_t>(std::ranges::lower_bound(c.sizes, size) - c.sizes.begin());
+  if (above == c.sizes.size()) return {};
+  VectorXd d = VectorXd::Zero(width());
+  const double low = above > 0 ? c.sizes[above - 1] : 0, share = (size - low) / (c.sizes[above] - low);
+  d[c.at[above]] = share;
+  if (above > 0) d[c.at[above - 1]] = 1 - share;
+  return d;
+}
+
+/// Of an effect's columns, each beside its further directions, the one that explains the truth best.
+double Oracle::best_gain(const VectorXd& truth, Effect hypothesis, const std::vector<VectorXd>& columns,
+                         const std::vector<double>& sizes) const {
+  const std::vector<int>& further = effects_[static_cast<std::size_t>(hypothesis)].further;
+  const auto n = static_cast<Index>(further.size());
+  MatrixXd m = MatrixXd::Zero(width(), n + 1);
+  VectorXd precision = VectorXd::Constant(n + 1, 1 / (kSizeSd * kSizeSd));
+  for (Index i = 0; i < n; ++i) m(further[static_cast<std::size_t>(i)], i + 1) = 1;
+  double best = 0;  // its size may be none
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    m.col(0) = columns[i];
+    precision[0] = sizes[i] * sizes[i] / (kSizeSd * kSizeSd);
+    best = std::max(best, held_out_gain(information_, truth, m, precision));
+  }
+  return best;
+}
+
+double Oracle::gain(Effect truth, double size) const {
+  const VectorXd d = truth_of(truth, size);
+  return d.size() == 0 ? 0 : best_gain(d, truth, {d}, {size});
+}
+
+double Oracle::gain_over(Effect truth, double size, Effect rival) const {
+  const VectorXd d = truth_of(truth, size);
+  if (d.size() == 0) return 0;
+  const Columns& c = effects_[static_cast<std::size_t>(rival)];
+  std::vector<VectorXd> columns;
+  for (const int at : c.at) columns.emplace_back(VectorXd::Unit(width(), at));
+  return best_gain(d, truth, {d}, {size}) - best_gain(d, rival, columns, c.sizes);
+}
+
+double Oracle::detectable(Effect effect, double nats) const {
+  const auto enough = [&](double size) { return gain(effect, size) >= nats; };
+  constexpr double kStep = 1.1;
+  double high = kLeastSize;
+  while (high < kMostSize && !enough(high)) high = std::min(kMostSize, high * kStep);
+  if (!enough(high)) return std::numeric_limits<double>::infinity();
+  double low = high / kStep;
+  for (int i = 0; i < 20; ++i) {
+    const double middle = std::sqrt(low * high);
+    (enough(middle) ? high : low) = middle;
+  }
+  return high;
+}
+
+}  // namespace flappy::blind

@@ -1,0 +1,20 @@
+// flappy-blind-robot oracle.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace flappy::blind {
+
+struct OracleCommand {
+  std::string vehicle, randomise = "configs/randomisation/published.toml", priors = "configs/gap/priors.toml", out;
+  int vehicles = 8;
+  std::uint64_t seed = 2001;  ///< of the first
+  int threads = 0;            ///< 0: one for each processor
+};
+
+/// Finds, prints and writes how large effects have to be; the machine-readable result.
+nlohmann::ordered_json run_oracle(const OracleCommand& command);
+
+}  // namespace flappy::blind
