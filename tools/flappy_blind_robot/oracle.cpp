@@ -115,7 +115,7 @@ std::string to_toml(const OracleCommand& o, std::size_t vehicles, const std::vec
   const std::time_t now = std::time(nullptr);
   std::strftime(date, sizeof date, "%Y-%m-%d", std::gmtime(&now));
   std::string text =
-      "# How large the effects of the blind robot have to be (docs/blind_oracle.md), in its own unit: 1 is typical. "
+      "# How large the effects of the blind robot have to be (docs/blind.md), in its own unit: 1 is typical. "
       "Written by\n"
       "#   flappy-blind-robot oracle --vehicle " +
       o.vehicle + " --randomise " + o.randomise + " --vehicles " + std::to_string(vehicles) + " --seed " +
