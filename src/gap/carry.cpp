@@ -39,6 +39,8 @@ constexpr std::size_t kVehicles = sim::kLanes<double>;
 constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
 static_assert(kPathX == kSignals + kMetered);
 
+/// Steps by which rounding may put an instant off.
+constexpr double kSameStep = 1e-3;
 /// What two good streams may disagree by for reasons that no entry knows, times the share that models get wrong.
 constexpr double kStreamSignal_m_s2 = 1, kStreamSignal_rad_s = 1;
 
@@ -106,7 +108,8 @@ CarriedFlight::CarriedFlight(Recording recording) : recording_(std::move(recordi
   compare_streams();
 }
 
-/// The samples of power.csv on the grid: they are of the instant at which a step begins.
+/// The samples of power.csv on the grid. A sample and a new voltage may share an instant, and the sample is of the new one:
+/// so it is taken from the first step that begins then or later, and the next.
 void CarriedFlight::lay_power(std::size_t first_beat) {
   const Recording& r = recording_;
   if (!r.log.power) return;
@@ -115,13 +118,14 @@ void CarriedFlight::lay_power(std::size_t first_beat) {
   std::size_t step = 0, k = 0;  // the interval, and where it begins
   for (std::size_t i = 0; i < r.log.power->t_s.size(); ++i) {
     const double t_s = r.log.power->t_s[i] - r.log.header.power->latency_s;
-    const double at = std::round((t_s - r.begin_s) / kStep_s);
+    const double begins = (t_s - r.begin_s) / kStep_s, at = std::ceil(begins - kSameStep);
     if (at < 0) continue;
-    while (k < r.intervals() && at >= static_cast<double>(step) + r.steps[k])
+    while (k < r.intervals() && at + 1 >= static_cast<double>(step) + r.steps[k])
       step += static_cast<std::size_t>(r.steps[k++]);
     if (k == r.intervals()) break;
     power_sample_.push_back(i);
     power_step_.push_back(static_cast<std::size_t>(at));
+    power_late_.push_back(at - begins);
     beat.push_back(r.beat_at(t_s));
     valid.push_back(r.valid[k]);
   }
@@ -238,7 +242,9 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
   const int longest = *std::ranges::max_element(r.steps);
   std::vector<double> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
   std::vector<double> samples(r.intervals() * kSignals * kVehicles, 0);
-  std::vector<double> meter(r.log.power ? static_cast<std::size_t>(longest) * kMetered * kVehicles : 0);
+  // of the last step before an interval, and its own
+  constexpr std::size_t kMeter = kMetered * kVehicles;
+  std::vector<double> meter(r.log.power ? (static_cast<std::size_t>(longest) + 1) * kMeter : 0);
   std::vector<double> power;
   std::size_t step = 0, metered = 0;
   for (std::size_t k = 0; k < r.intervals(); ++k) {
@@ -251,7 +257,7 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
     }
     sim::BlockEffects<double> in_force = storage.effects_of(0);
     in_force.voltages_V = voltages_V.data();
-    if (r.log.power) in_force.meter = meter.data();
+    if (r.log.power) in_force.meter = meter.data() + kMeter;
     storage.kernel(block, in_force, plan, 0, r.steps[k], nullptr);
     carry(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
     double* to = &samples[k * kSignals * kVehicles];
@@ -264,13 +270,15 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
       to[kStrokeLeft * kVehicles + lane] = kept.rows[kStroke][lane];
       to[kStrokeRight * kVehicles + lane] = kept.rows[kStroke + 1][lane];
     }
-    for (; metered < power_step_.size() && power_step_[metered] < step; ++metered) {
-      const auto* from =
-          &meter[(power_step_[metered] + static_cast<std::size_t>(r.steps[k]) - step) * kMetered * kVehicles];
-      for (std::size_t lane = 0; lane < kVehicles; ++lane)
-        power.push_back(r.log.header.power->battery_nominal_V * from[lane]);
-      power.insert(power.end(), from + kVehicles, from + kMetered * kVehicles);
+    for (; metered < power_step_.size() && power_step_[metered] + 1 < step; ++metered) {
+      const double late = power_late_[metered];
+      const double* now = &meter[(power_step_[metered] + 1 + static_cast<std::size_t>(r.steps[k]) - step) * kMeter];
+      for (std::size_t i = 0; i < kMeter; ++i) {
+        const double sample = now[i] + late * (now[i] - now[i + kMeter]);
+        power.push_back(i < kVehicles ? r.log.header.power->battery_nominal_V * sample : sample);
+      }
     }
+    if (r.log.power) std::copy_n(&meter[static_cast<std::size_t>(r.steps[k]) * kMeter], kMeter, meter.data());
   }
 
   Rows together(r.beats * kCoefficients * kSignals * kVehicles, 0);

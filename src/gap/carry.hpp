@@ -84,6 +84,7 @@ class CarriedFlight {
   std::vector<char> compared_;  ///< beats
   bool has_wings_ = false;
   std::vector<std::size_t> power_sample_, power_step_;  ///< of power.csv on the grid; the step that begins with it
+  std::vector<double> power_late_;                      ///< or so many steps later
   Rows measured_, signal_;
 };
 

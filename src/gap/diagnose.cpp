@@ -50,10 +50,13 @@ class Diagnoser {
     progress(0, "fitting parameters");
     const Hypothesis plain(uncertain_, {});
     const Linearised nominal = fit_parameters(plain);
-    d.parameters = parameters_;
     progress(0.3, "screening effects");
     const std::vector<Column> columns = effect_columns({}, parameters_);
-    for (const Column& c : columns) background_.push_back(background_sd(c.effect) * c.change);
+    std::vector<Smooth> background;
+    for (const Column& c : columns) background.push_back(background_sd(c.effect) * c.change);
+    fitter_.set_background(std::move(background));
+    parameters_ = fitter_.refit(plain, parameters_, 4);
+    d.parameters = parameters_;
     d.answers.push_back(weigh(Answer::Kind::none, {}, nominal, std::log(kPriorNone)));
     d.answers.push_back(weigh(Answer::Kind::parameters, {}, parameters_.point, std::log(kPriorParameters)));
     Answer unknown = explain_freely(parameters_.point, std::log(kPriorUnknown));
@@ -142,7 +145,7 @@ class Diagnoser {
     Columns c;
     for (std::size_t k = 0; k < l.columns.size(); ++k)
       if (l.columns[k].size() > 0) c.add(l.columns[k], -l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
-    for (const Smooth& b : background_) c.add(b, 0);
+    for (const Smooth& b : fitter_.background()) c.add(b, 0);
     return c;
   }
 
@@ -427,7 +430,6 @@ class Diagnoser {
   mutable Evidence evidence_;
   Fitter fitter_;
   Fit parameters_;
-  std::vector<Smooth> background_;
 };
 
 }  // namespace

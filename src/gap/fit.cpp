@@ -148,12 +148,19 @@ Posterior Fitter::solve(const Linearised& point) const {
     columns.push_back(&point.columns[static_cast<std::size_t>(d)]);
     seen.push_back(d);
   }
+  const auto own = static_cast<Index>(columns.size());
+  for (const Smooth& b : background_) {
+    chosen.push_back(static_cast<int>(columns.size()));
+    columns.push_back(&b);
+  }
   const Reduced reduced = evidence_.reduce(point.statistics, columns, all_of(flights_.size()), evidence_.floor());
-  const VectorXd prior_mean = -(point.directions.axes.transpose() * point.at);
-  const Posterior p = Evidence::posterior(reduced, chosen, prior_mean(seen));
+  VectorXd prior_mean = VectorXd::Zero(static_cast<Index>(columns.size()));
+  const VectorXd start = -(point.directions.axes.transpose() * point.at);
+  prior_mean.head(own) = start(seen);
+  const Posterior p = Evidence::posterior(reduced, chosen, prior_mean);
   Posterior all{p.log_evidence, VectorXd::Zero(k), MatrixXd::Identity(k, k)};
-  all.mean(seen) = p.mean;
-  all.covariance(seen, seen) = p.covariance;
+  all.mean(seen) = p.mean.head(own);
+  all.covariance(seen, seen) = p.covariance.topLeftCorner(own, own);
   return all;
 }
 
@@ -163,8 +170,15 @@ MatrixXd Fit::covariance() const {
 }
 
 double Fitter::cost(const Statistics& residual, const VectorXd& at) const {
-  const Reduced reduced = evidence_.reduce(residual, {}, all_of(flights_.size()), evidence_.floor());
-  return 0.5 * (reduced.sums(0, 0) + at.squaredNorm());
+  std::vector<const Smooth*> columns;
+  std::vector<int> chosen;
+  for (const Smooth& b : background_) {
+    chosen.push_back(static_cast<int>(columns.size()));
+    columns.push_back(&b);
+  }
+  const Reduced reduced = evidence_.reduce(residual, columns, all_of(flights_.size()), evidence_.floor());
+  const VectorXd none = VectorXd::Zero(static_cast<Index>(columns.size()));
+  return 0.5 * at.squaredNorm() - Evidence::posterior(reduced, chosen, none).log_evidence;
 }
 
 /// Those of the parameters' fit, and the effects' own.

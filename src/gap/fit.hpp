@@ -37,6 +37,10 @@ class Fitter {
   Fitter(const std::vector<CarriedFlight>& flights, Evidence& evidence, int threads)
       : flights_(flights), evidence_(evidence), threads_(threads) {}
 
+  /// Columns that may take what they can beside every hypothesis, with standard normal coefficients.
+  void set_background(std::vector<Smooth> columns) { background_ = std::move(columns); }
+  const std::vector<Smooth>& background() const { return background_; }
+
   /// Residuals under many candidates; empty signatures for vehicles that come apart.
   std::vector<Signature> residuals(const std::vector<Candidate>& candidates) const;
   /// `known`: columns of the first directions, which need not be found again.
@@ -63,6 +67,7 @@ class Fitter {
   const std::vector<CarriedFlight>& flights_;
   Evidence& evidence_;
   int threads_;
+  std::vector<Smooth> background_;
 };
 
 }  // namespace flappy::gap

@@ -65,6 +65,7 @@ std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, const S
   if (l.residual.empty()) return {};
   Expected e{l.statistics, {}, Smooth::Zero(floor.rows(), floor.cols())};
   const Index k = rival.covariance.rows();
+  if (k == 0) return e;  // without a gap nothing is uncertain
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(rival.covariance);
   for (Index i = 0; i < k; ++i) {
     Smooth sum = Smooth::Zero(floor.rows(), floor.cols());
