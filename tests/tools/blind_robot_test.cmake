@@ -63,3 +63,8 @@ expect_refused("${WORK}/note.txt: is no policy; accepted: an actor (.json), Torc
   ${escape} --policy ${WORK}/note.txt)
 expect_refused("${SOURCE}/configs/fly/hover.toml: is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal that stands still and a success"
   ${escape} --policy ${WORK}/policy.h --config ${SOURCE}/configs/fly/hover.toml)
+
+# Before hours of work, not after.
+expect_refused("${WORK}/gone/sizes.toml: cannot be written; accepted: a file in a folder that exists"
+  oracle --vehicle ${vehicle} --randomise ${SOURCE}/configs/randomisation/published.toml --priors ${SOURCE}/configs/gap/priors.toml
+  --out ${WORK}/gone/sizes.toml)

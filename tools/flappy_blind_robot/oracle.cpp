@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 
@@ -163,6 +164,10 @@ void print(const std::vector<Finding>& findings) {
 
 Json run_oracle(const OracleCommand& o) {
   const Case declared = declared_case(o.vehicle);
+  const std::filesystem::path folder = std::filesystem::absolute(o.out).parent_path();
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error) || std::filesystem::is_directory(o.out, error))
+    throw io::InputError(o.out + ": cannot be written; accepted: a file in a folder that exists");
   const auto draws = [&](const std::string& file) {
     return sim::read_randomisation(declared.vehicle, io::Config::load(file).root());
   };
