@@ -19,7 +19,7 @@ struct Inputs {
 };
 
 /// As the driver clips them.
-Inputs clipped(const Inputs& inputs, const model::Driver& driver);
+Inputs clipped(const Inputs& u, const model::Driver& d);
 
 struct Waypoint {
   double t_s = 0;
