@@ -22,7 +22,7 @@ struct StreamStatistics {
 };
 
 /// Where a fault of the data first shows: a file of the log and its line.
-struct Place {
+struct LogPlace {
   std::string file;  ///< empty: no such fault
   std::size_t line = 2;
 };
@@ -32,7 +32,7 @@ struct Finding {
   Verdict verdict = Verdict::ok;
   std::string text;  ///< what was seen; of a warning also what was expected and the likely cause
   std::vector<std::pair<std::string, double>> values;  ///< the figures behind it
-  Place fault = {};  ///< of a warning that forbids a diagnosis: no physics explains it
+  LogPlace fault = {};  ///< of a warning that forbids a diagnosis: no physics explains it
 };
 
 struct CheckReport {

@@ -57,7 +57,7 @@ Wave fit_wave(const Column& phase_rad, const Column& volts) {
 void check_frequency(const FlightLog& log, Findings& findings) {
   const std::string name = "flapping frequency";
   const double declared = log.header.flapping_Hz, per_beat = 1 / (declared * median_interval(log.command.t_s));
-  const auto say = [&](Verdict verdict, const std::string& text, Place fault = {}) {
+  const auto say = [&](Verdict verdict, const std::string& text, LogPlace fault = {}) {
     findings.push_back({name, verdict, text, {}, std::move(fault)});
   };
   if (per_beat < 4)
@@ -82,7 +82,7 @@ void check_phase(const FlightLog& log, Findings& findings) {
   // The split cycle shifts left and right apart; their sum keeps the phase.
   for (std::size_t i = 0; i < volts.size(); ++i) volts[i] = u.left_voltage_V[i] + u.right_voltage_V[i];
   const auto say = [&](Verdict verdict, const std::string& text) {
-    findings.push_back({name, verdict, text, {}, verdict == Verdict::warning ? Place{kCommand} : Place{}});
+    findings.push_back({name, verdict, text, {}, verdict == Verdict::warning ? LogPlace{kCommand} : LogPlace{}});
   };
   if (f * interval > 0.25 || rms(volts) < 0.1)
     return say(Verdict::not_tested, "too few samples a beat, or hardly any voltage");
@@ -198,7 +198,7 @@ void check_power(const FlightLog& log, Findings& findings) {
                       near ? Verdict::ok : Verdict::warning,
                       near ? seen : seen + ", within 25 % expected: another number of cells, or another unit",
                       {{"battery_V", battery}},
-                      near ? Place{} : Place{kPower}});
+                      near ? LogPlace{} : LogPlace{kPower}});
 
   const Column* const currents[] = {&p.left_current_A, &p.right_current_A};
   const Column* const volts[] = {&log.command.left_voltage_V, &log.command.right_voltage_V};

@@ -24,7 +24,8 @@ struct Context {
   Frame frame;        ///< as found; as declared where that fits or nothing was found
   Lag lag;
 
-  void say(const std::string& check, Verdict verdict, const std::string& text, Values values = {}, Place fault = {}) {
+  void say(const std::string& check, Verdict verdict, const std::string& text, Values values = {},
+           LogPlace fault = {}) {
     findings.push_back({check, verdict, text, std::move(values), std::move(fault)});
   }
 };

@@ -124,7 +124,7 @@ bool check_clock(Context& c) {
   c.say("clock", good ? Verdict::ok : Verdict::warning,
         seen + expected + (good ? "" : ": clocks apart, or a wrong latency"),
         {{"lag_s", lag->value}, {"lag_sd_s", lag->sd}, {"correlation", sync->correlation}},
-        off_s > allowed_s + kLargestDelay_s && !drifts ? Place{kImu} : Place{});
+        off_s > allowed_s + kLargestDelay_s && !drifts ? LogPlace{kImu} : LogPlace{});
 
   // A millisecond over a flight is a fifth of a radian of the beat, which no check here minds.
   if (!drifts && (!first || !last || std::hypot(first->sd, last->sd) > 0.0025)) {
@@ -137,8 +137,9 @@ bool check_clock(Context& c) {
                end_s - begin_s, 1e3 * noticed_s()) +
             (drifts ? format(": clocks run at different speeds, by %.0f ppm", 1e6 * per_s) : ""),
         {{"change_s", change_s}, {"per_s", per_s}},
-        drifts && std::abs(per_s) > kLargestDrift ? Place{kImu, line_at(c.log.imu.t_s, noticed_s() / std::abs(per_s))}
-                                                  : Place{});
+        drifts && std::abs(per_s) > kLargestDrift
+            ? LogPlace{kImu, line_at(c.log.imu.t_s, noticed_s() / std::abs(per_s))}
+            : LogPlace{});
   return true;
 }
 
@@ -183,7 +184,7 @@ std::vector<Hypothesis> mistakes() {
 }
 
 /// The mistake that explains the rates, if any does, and in which file; leaves the frame.
-std::pair<std::string, Place> find_mistake(Context& c) {
+std::pair<std::string, LogPlace> find_mistake(Context& c) {
   const std::vector<Hypothesis> all = mistakes();
   std::vector<double> left;
   double total = 0, noise = 0;
@@ -268,7 +269,7 @@ void check_gyro(Context& c) {
       seen += (seen.empty() ? "" : ", ") + format("%.3g x gyro_%c about %c", fit.gain(i, j), kAxes[j], kAxes[i]);
   }
   if (seen.empty() && odd.empty()) return c.say("gyro", Verdict::not_tested, "too little rotation");
-  const auto [cause, fault] = good ? std::pair<std::string, Place>() : find_mistake(c);
+  const auto [cause, fault] = good ? std::pair<std::string, LogPlace>() : find_mistake(c);
   if (good) c.frame = {};
   c.say("gyro", Verdict::warning,
         (good ? odd : "mocap turns " + seen + ", 1 x about the same axis expected") + ": " +

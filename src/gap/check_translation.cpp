@@ -162,7 +162,7 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
   if (is(100)) cause = "likely in cm, not m";
   if (is(1 / 0.0254)) cause = "likely in inches, not m";
   c.say("position scale", Verdict::warning, seen + ", 1 expected: " + cause, values,
-        alike > 0.9 ? Place{kMocap} : Place{});
+        alike > 0.9 ? LogPlace{kMocap} : LogPlace{});
 }
 
 void check_speed(Context& c) {

@@ -63,11 +63,11 @@ class Diagnoser {
     const double parameters = d.answers[1].log_evidence;
 
     std::vector<Answer> singles;
-    d.screened = screen(columns, parameters_);
-    for (std::size_t i = 0; i < d.screened.size() && static_cast<int>(i) < options_.finalists; ++i) {
-      if (d.screened[i].gain < kLeastGain) break;
-      progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + d.screened[i].effect);
-      Answer a = fit_effects({d.screened[i]});
+    const std::vector<Screened> screened = screen(columns, parameters_);
+    for (std::size_t i = 0; i < screened.size() && static_cast<int>(i) < options_.finalists; ++i) {
+      if (screened[i].gain < kLeastGain) break;
+      progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + screened[i].effect);
+      Answer a = fit_effects({screened[i]});
       if (!vanished(a)) singles.push_back(std::move(a));
     }
     std::ranges::sort(singles, std::greater{}, &Answer::log_evidence);
@@ -154,11 +154,11 @@ class Diagnoser {
   }
 
   /// Whatever models are mistaken by. `own`: of the effects in the hypothesis.
-  double log_evidence(const Linearised& l, const Columns& c, const std::vector<char>& use, const Smooth& own) const {
+  double log_evidence(const Linearised& l, const Columns& c, const Smooth& own) const {
     const Smooth floor = evidence_.floor();
     std::vector<double> each;
     for (const Mistaken& m : kMistaken)
-      each.push_back(std::log(m.probability) + posterior(l, c, use, together(m.factor * floor, own)).log_evidence);
+      each.push_back(std::log(m.probability) + posterior(l, c, all_, together(m.factor * floor, own)).log_evidence);
     const double most = *std::ranges::max_element(each);
     double sum = 0;
     for (const double e : each) sum += std::exp(e - most);
@@ -168,34 +168,25 @@ class Diagnoser {
   static Smooth together(const Smooth& a, const Smooth& b) { return (a.array().square() + b.array().square()).sqrt(); }
 
   /// What the equations of effects get wrong of themselves.
-  Smooth form_error(const Linearised& l, Index shared) const {
+  Smooth form_error(const Linearised& l) const {
     Smooth own = Smooth::Zero(kGroups, evidence_.basis().size());
-    for (std::size_t k = static_cast<std::size_t>(shared); k < l.columns.size(); ++k)
+    for (std::size_t k = static_cast<std::size_t>(shared_); k < l.columns.size(); ++k)
       if (l.columns[k].size() > 0) own += kFormError * l.at[static_cast<Index>(k)] * l.columns[k];
     return own.cwiseAbs();
   }
 
   Answer weigh(Answer::Kind kind, std::vector<std::string> effects, const Linearised& l, double log_prior) const {
-    const Columns c = columns_of(l);
-    const Smooth own = form_error(l, shared_);
-    const auto of = [&](const std::vector<char>& use) { return log_evidence(l, c, use, own); };
     Answer a;
     a.kind = kind;
     a.effects = std::move(effects);
-    a.log_evidence = of(all_);
-    for (std::size_t f = 0; f < all_.size(); ++f) {
-      std::vector<char> others = all_;
-      others[f] = 0;
-      a.log_held_out += a.log_evidence - of(others);
-    }
-    a.log_evidence += log_prior;
+    a.log_evidence = log_evidence(l, columns_of(l), form_error(l)) + log_prior;
     return a;
   }
 
   /// Gives single functions of the regime in single channels more room than every model needs, as long as that pays.
   Answer explain_freely(const Linearised& l, double log_prior) const {
     const Columns c = columns_of(l);
-    const Smooth own = form_error(l, shared_);
+    const Smooth own = form_error(l);
     Smooth sd = together(evidence_.floor(), own);
     const Index q = evidence_.basis().size();
     const Posterior before = posterior(l, c, all_, sd);
@@ -230,7 +221,7 @@ class Diagnoser {
     }
     a.terms = std::move(terms);
     // what the terms gain, beside what is known without them
-    a.log_evidence = log_evidence(l, c, all_, own) + now - before.log_evidence + log_prior;
+    a.log_evidence = log_evidence(l, c, own) + now - before.log_evidence + log_prior;
     return a;
   }
 
@@ -400,7 +391,7 @@ class Diagnoser {
     for (Answer& a : d.answers)
       if (a.kind == Answer::Kind::effect) {
         const Hypothesis h(uncertain_, a.effects);
-        add(h, a.fit.point, together(evidence_.floor(), form_error(a.fit.point, shared_)), a.left);
+        add(h, a.fit.point, together(evidence_.floor(), form_error(a.fit.point)), a.left);
       }
     std::vector<Signature> rows = fitter_.residuals(candidates);
     for (std::size_t i = 0; i < of.size(); ++i)

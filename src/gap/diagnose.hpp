@@ -22,7 +22,6 @@ struct Answer {
   enum class Kind { none, parameters, effect, unknown } kind = Kind::parameters;
   std::vector<std::string> effects;
   double log_evidence = 0;  ///< of all flights
-  double log_held_out = 0;  ///< of every flight given the others, summed
   double probability = 0;
   std::vector<Term> terms;  ///< of an unknown cause
   Fit fit;                  ///< of effects and parameters
@@ -45,12 +44,11 @@ struct DiagnoseOptions {
 };
 
 struct Diagnosis {
-  std::vector<Answer> answers;     ///< most probable first
-  Fit parameters;                  ///< without any effect
-  std::vector<Screened> screened;  ///< all entries, the best first
-  Signature nominal;               ///< what is left of the measurement with the vehicle's file
-  Signature refit;                 ///< with parameters alone: in each flight what is left with the fit to the others
-  std::vector<double> noise_sd;    ///< [group] of the rows of noise alone, as found
+  std::vector<Answer> answers;   ///< most probable first
+  Fit parameters;                ///< without any effect
+  Signature nominal;             ///< what is left of the measurement with the vehicle's file
+  Signature refit;               ///< with parameters alone: in each flight what is left with the fit to the others
+  std::vector<double> noise_sd;  ///< [group] of the rows of noise alone, as found
 };
 
 Diagnosis diagnose(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,

@@ -137,6 +137,13 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
     for (VectorXd& sum : flight) sum /= n;
 }
 
+void Fitter::add_background(std::vector<const Smooth*>& columns, std::vector<int>& chosen) const {
+  for (const Smooth& b : background_) {
+    chosen.push_back(static_cast<int>(columns.size()));
+    columns.push_back(&b);
+  }
+}
+
 Posterior Fitter::solve(const Linearised& point) const {
   const Index k = point.directions.reach.size();
   std::vector<const Smooth*> columns;
@@ -149,10 +156,7 @@ Posterior Fitter::solve(const Linearised& point) const {
     seen.push_back(d);
   }
   const auto own = static_cast<Index>(columns.size());
-  for (const Smooth& b : background_) {
-    chosen.push_back(static_cast<int>(columns.size()));
-    columns.push_back(&b);
-  }
+  add_background(columns, chosen);
   const Reduced reduced = evidence_.reduce(point.statistics, columns, all_of(flights_.size()), evidence_.floor());
   VectorXd prior_mean = VectorXd::Zero(static_cast<Index>(columns.size()));
   const VectorXd start = -(point.directions.axes.transpose() * point.at);
@@ -172,10 +176,7 @@ MatrixXd Fit::covariance() const {
 double Fitter::cost(const Statistics& residual, const VectorXd& at) const {
   std::vector<const Smooth*> columns;
   std::vector<int> chosen;
-  for (const Smooth& b : background_) {
-    chosen.push_back(static_cast<int>(columns.size()));
-    columns.push_back(&b);
-  }
+  add_background(columns, chosen);
   const Reduced reduced = evidence_.reduce(residual, columns, all_of(flights_.size()), evidence_.floor());
   const VectorXd none = VectorXd::Zero(static_cast<Index>(columns.size()));
   return 0.5 * at.squaredNorm() - Evidence::posterior(reduced, chosen, none).log_evidence;

@@ -61,6 +61,7 @@ class Fitter {
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
   Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const;
   void average(const Hypothesis& hypothesis, Linearised& l) const;
+  void add_background(std::vector<const Smooth*>& columns, std::vector<int>& chosen) const;
   Posterior solve(const Linearised& point) const;
   double cost(const Statistics& residual, const Eigen::VectorXd& at) const;
 

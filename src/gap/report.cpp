@@ -12,21 +12,6 @@ using Json = nlohmann::ordered_json;
 constexpr double kHalf90 = 1.645;
 constexpr std::size_t kMostPlaces = 20;
 
-std::vector<Size> sizes_of(const Answer& a, const sim::Randomisation& uncertain) {
-  std::vector<Size> sizes;
-  if (a.fit.point.at.size() == 0) return sizes;
-  const Hypothesis h(uncertain, a.effects);
-  const Eigen::VectorXd mean = a.fit.mean();
-  const Eigen::MatrixXd covariance = a.fit.covariance();
-  for (Eigen::Index i = h.shared(); i < h.size(); ++i) {
-    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
-    const double reach = kHalf90 * std::sqrt(covariance(i, i));
-    sizes.push_back({u.effect + "." + u.name, u.value(mean[i]), u.value(mean[i] - reach), u.value(mean[i] + reach),
-                     unit_of(u.name)});
-  }
-  return sizes;
-}
-
 std::vector<Moved> moved_by(const Fit& fit, const Hypothesis& hypothesis) {
   std::vector<Moved> moved;
   const Eigen::VectorXd mean = fit.mean();
@@ -48,6 +33,21 @@ std::vector<double> over_noise(const std::vector<Place>& places, const std::stri
 Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 }  // namespace
+
+std::vector<Size> sizes_of(const Answer& a, const sim::Randomisation& uncertain) {
+  std::vector<Size> sizes;
+  if (a.fit.point.at.size() == 0) return sizes;
+  const Hypothesis h(uncertain, a.effects);
+  const Eigen::VectorXd mean = a.fit.mean();
+  const Eigen::MatrixXd covariance = a.fit.covariance();
+  for (Eigen::Index i = h.shared(); i < h.size(); ++i) {
+    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+    const double reach = kHalf90 * std::sqrt(covariance(i, i));
+    sizes.push_back({u.effect + "." + u.name, u.value(mean[i]), u.value(mean[i] - reach), u.value(mean[i] + reach),
+                     unit_of(u.name)});
+  }
+  return sizes;
+}
 
 std::string unit_of(const std::string& name) {
   static const std::pair<const char*, const char*> kUnits[] = {

@@ -21,6 +21,9 @@ struct Size {
   std::string unit;
 };
 
+/// Of the effects of an answer; none where it was not fitted.
+std::vector<Size> sizes_of(const Answer& answer, const sim::Randomisation& uncertain);
+
 /// An answer as reported.
 struct Reported {
   Answer::Kind kind = Answer::Kind::effect;

@@ -5,15 +5,12 @@
 
 #include "flappy/vehicle_file.hpp"
 #include "gap/baselines.hpp"
-#include "gap/closure.hpp"
-#include "gap/data_faults.hpp"
-#include "gap/verdict.hpp"
+#include "gap/report.hpp"
 #include "io/config.hpp"
 
 namespace flappy::gap {
 namespace {
 
-constexpr double kHalf90 = 1.645;
 /// Of the difference of two means, from its scatter over blocks.
 double sd_of_difference(const Losses& a, const Losses& b) {
   if (a.sum.size() != b.sum.size() || a.sum.size() < 2) return 0;
@@ -30,14 +27,7 @@ double sd_of_difference(const Losses& a, const Losses& b) {
 
 std::map<std::string, Estimate> estimates(const Answer& a, const sim::Randomisation& uncertain) {
   std::map<std::string, Estimate> values;
-  const Hypothesis h(uncertain, a.effects);
-  const Eigen::VectorXd mean = a.fit.mean();
-  const Eigen::MatrixXd covariance = a.fit.covariance();
-  for (Eigen::Index i = h.shared(); i < h.size(); ++i) {
-    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
-    const double reach = kHalf90 * std::sqrt(covariance(i, i));
-    values[u.effect + "." + u.name] = {u.value(mean[i]), u.value(mean[i] - reach), u.value(mean[i] + reach)};
-  }
+  for (const Size& s : sizes_of(a, uncertain)) values[s.name] = {s.value, s.low, s.high};
   return values;
 }
 

@@ -2,23 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <filesystem>
+
+#include "gap/check_parts.hpp"
 
 namespace flappy::gap {
 namespace {
 
 constexpr std::size_t kSizes = 12, kRunnersUp = 3, kMoved = 4, kTerms = 3;
-
-__attribute__((format(printf, 1, 2))) std::string text(const char* format, ...) {
-  char line[400];
-  va_list values;
-  va_start(values, format);
-  std::vsnprintf(line, sizeof line, format, values);
-  va_end(values);
-  return line;
-}
 
 std::string listed(const std::vector<std::string>& words, const char* last) {
   std::string all;
@@ -31,17 +22,17 @@ std::string verdict_line(const Conclusion& c) {
   const double p = c.probability;
   switch (c.kind) {
     case Conclusion::Kind::effect:
-      return text("Missing in the model: %s (probability %.2f%s)", listed(c.effects, "and").c_str(), p,
-                  p < 0.5 ? ", no more than a guess" : "");
+      return format("Missing in the model: %s (probability %.2f%s)", listed(c.effects, "and").c_str(), p,
+                    p < 0.5 ? ", no more than a guess" : "");
     case Conclusion::Kind::group:
-      return text("Missing in the model: one of %s, which these flights cannot tell apart (together %.2f)",
-                  listed(c.effects, "or").c_str(), p);
+      return format("Missing in the model: one of %s, which these flights cannot tell apart (together %.2f)",
+                    listed(c.effects, "or").c_str(), p);
     case Conclusion::Kind::parameters:
-      return text("Nothing is missing in the model, its parameters are off (probability %.2f)", p);
+      return format("Nothing is missing in the model, its parameters are off (probability %.2f)", p);
     case Conclusion::Kind::none:
-      return text("No gap beyond noise: the vehicle's file explains the flights (probability %.2f)", p);
+      return format("No gap beyond noise: the vehicle's file explains the flights (probability %.2f)", p);
     case Conclusion::Kind::unknown:
-      return text("Something is missing in the model that no entry of the catalogue explains (probability %.2f)", p);
+      return format("Something is missing in the model that no entry of the catalogue explains (probability %.2f)", p);
     case Conclusion::Kind::data:
       return "The data are at fault; nothing was diagnosed";
   }
@@ -101,7 +92,7 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   std::vector<std::string> lines = {verdict_line(r.conclusion)};
   if (r.conclusion.kind == Conclusion::Kind::data) {
     for (std::size_t i = 0; i < r.faults.size() && i + 3 < kSummaryLines; ++i)
-      lines.push_back(text("  %s:%zu: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
+      lines.push_back(format("  %s:%zu: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
     lines.push_back(next_line(r.conclusion, out));
     return lines;
   }
@@ -120,23 +111,23 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     lines.push_back("size, with its 90 % interval:");
     for (std::size_t i = 0; i < concluded->sizes.size() && i < kSizes; ++i) {
       const Size& s = concluded->sizes[i];
-      lines.push_back(text("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
-                           s.unit.empty() ? "" : " ", s.unit.c_str()));
+      lines.push_back(format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
+                             s.unit.empty() ? "" : " ", s.unit.c_str()));
     }
   }
   if (r.conclusion.kind == Conclusion::Kind::unknown && !r.unexplained.empty()) {
     lines.push_back("what is left depends on:");
     for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
-      lines.push_back(text("  %s on %s, %.0f %% of the signal or so (%.0f nats)",
-                           channel_name(r.unexplained[i].channel), r.unexplained[i].function.c_str(),
-                           100 * r.unexplained[i].share, r.unexplained[i].gain));
+      lines.push_back(format("  %s on %s, %.0f %% of the signal or so (%.0f nats)",
+                             channel_name(r.unexplained[i].channel), r.unexplained[i].function.c_str(),
+                             100 * r.unexplained[i].share, r.unexplained[i].gain));
   }
   std::string others;
   std::size_t shown = 0;
   for (const Reported* c : ranked) {
     const bool is = named ? c == concluded : kind_name(c->kind) == std::string(kind_name(r.conclusion.kind));
     if (is || shown == kRunnersUp) continue;
-    others += text("%s%s %.2g", shown == 0 ? "" : ", ", name_of(*c).c_str(), c->probability);
+    others += format("%s%s %.2g", shown == 0 ? "" : ", ", name_of(*c).c_str(), c->probability);
     ++shown;
   }
   lines.push_back("runners-up: " + others);
@@ -144,28 +135,29 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   lines.push_back(places.empty() ? "with parameters refitted nothing stands out of the noise"
                                  : "where the gap lies, with parameters refitted (rms, that of noise):");
   for (const Place& p : places)
-    lines.push_back(text("  %-12s %-34s %8.3g, noise %.3g %s (p %.1g)", channel_name(p.channel), p.regime.c_str(),
-                         p.gap, p.noise_floor, channel_unit(p.channel), p.p_value));
-  const auto loss = [](const std::optional<double>& e) { return e ? text("%.3g", *e) : std::string("-"); };
+    lines.push_back(format("  %-12s %-34s %8.3g, noise %.3g %s (p %.1g)", channel_name(p.channel), p.regime.c_str(),
+                           p.gap, p.noise_floor, channel_unit(p.channel), p.p_value));
+  const auto loss = [](const std::optional<double>& e) { return e ? format("%.3g", *e) : std::string("-"); };
   lines.push_back("mean loss in flights held out: vehicle's file " + loss(r.nominal) + ", parameters refitted " +
                   loss(r.refit) + ", with the best effect " + loss(r.effect) + ", noise alone " + loss(r.noise_floor));
   if (r.closure)
-    lines.push_back(text("the best effect closes %.0f %% of what refitting leaves (90 %%: %.0f to %.0f %%)",
-                         100 * r.closure->value, 100 * r.closure->low, 100 * r.closure->high));
+    lines.push_back(format("the best effect closes %.0f %% of what refitting leaves (90 %%: %.0f to %.0f %%)",
+                           100 * r.closure->value, 100 * r.closure->low, 100 * r.closure->high));
   else lines.push_back("how much of that an effect closes cannot be told from noise");
   if (!r.moved.empty() && r.conclusion.kind != Conclusion::Kind::none) {
     lines.push_back("parameters that moved most, in standard deviations of what was believed:");
     for (std::size_t i = 0; i < r.moved.size() && i < kMoved; ++i)
-      lines.push_back(text("  %-36s %+10.2f", r.moved[i].name.c_str(), r.moved[i].prior_sd));
+      lines.push_back(format("  %-36s %+10.2f", r.moved[i].name.c_str(), r.moved[i].prior_sd));
   }
   if (const ClosedLoop* c = most_corrected(r.closed_loop))
-    lines.push_back(text("in closed loop, %s: %s recorded %.3g, by the vehicle's file %.3g, by the corrected one %.3g",
-                         std::filesystem::path(c->flight).filename().c_str(), c->quantity.c_str(), c->recorded,
-                         c->nominal, c->corrected));
+    lines.push_back(
+        format("in closed loop, %s: %s recorded %.3g, by the vehicle's file %.3g, by the corrected one %.3g",
+               std::filesystem::path(c->flight).filename().c_str(), c->quantity.c_str(), c->recorded, c->nominal,
+               c->corrected));
   if (r.next)
-    lines.push_back(text("%s and %s differ most in configs/gap/experiments/%s.toml (%.3g nats expected)",
-                         r.next->separates.front().c_str(), r.next->separates.back().c_str(), r.next->manoeuvre.c_str(),
-                         r.next->expected_nats));
+    lines.push_back(format("%s and %s differ most in configs/gap/experiments/%s.toml (%.3g nats expected)",
+                           r.next->separates.front().c_str(), r.next->separates.back().c_str(),
+                           r.next->manoeuvre.c_str(), r.next->expected_nats));
   lines.push_back(next_line(r.conclusion, out));
   return lines;
 }
