@@ -79,7 +79,7 @@ Baseline best_rmse(const std::vector<CarriedFlight>& flights, const Diagnosis& d
   double least = 1e300;
   std::vector<std::pair<double, std::string>> left;
   for (const Answer& a : d.answers) {
-    if (a.kind != Answer::Kind::effect || a.fit.point.residual.empty()) continue;
+    if (!a.fitted()) continue;
     const Energy e = energy(flights, d.noise_sd, a.fit.point.residual);
     double sum = 0;
     for (const double s : e.sum) sum += s;

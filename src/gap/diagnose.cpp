@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "gap/model_error.hpp"
 #include "model/effects/registry.hpp"
@@ -17,8 +18,8 @@ using Eigen::VectorXd;
 
 /// Reach of the first difference along a size.
 constexpr double kEffectReach = 0.4;
-/// An effect that gains less in the linear screening is not fitted; a further effect has to gain more.
-constexpr double kLeastGain = 0, kLeastFurther = 8;
+/// What a further effect has to gain in the linear screening to be fitted.
+constexpr double kLeastFurther = 8;
 /// A coordinate of a size that is as good as 0.
 constexpr double kVanished = 0.005;
 /// Shares of the signal that a term which no entry explains may have.
@@ -29,9 +30,14 @@ constexpr double kImperfect = 0.5;
 /// Nats that a term has to bring beyond those of choosing it: single floors are exceeded now and then.
 constexpr double kTermCost = 6;
 /// What was thought before any flight: how often a gap is of each kind.
-constexpr double kPriorNone = 0.15, kPriorParameters = 0.35, kPriorEffect = 0.35, kPriorUnknown = 0.15;
+constexpr double kPriorNone = 0.1, kPriorParameters = 0.2, kPriorEffect = 0.55, kPriorUnknown = 0.15;
 /// For every further effect.
 constexpr double kPriorFurther = 0.1;
+
+/// Of a size that cannot be negative: log of twice the probability that N(mean, sd^2) is positive, as half its prior was.
+double log_twice_positive(double mean, double sd) {
+  return std::log(std::max(std::erfc(-mean / (sd * std::numbers::sqrt2)), 1e-300));
+}
 
 class Diagnoser {
  public:
@@ -64,18 +70,20 @@ class Diagnoser {
 
     std::vector<Answer> singles;
     const std::vector<Screened> screened = screen(columns, parameters_);
-    for (std::size_t i = 0; i < screened.size() && static_cast<int>(i) < options_.finalists; ++i) {
-      if (screened[i].gain < kLeastGain) break;
-      progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + screened[i].effect);
-      Answer a = fit_effects({screened[i]});
-      if (!vanished(a)) singles.push_back(std::move(a));
+    for (std::size_t i = 0; i < screened.size(); ++i) {
+      const Screened& s = screened[i];
+      Answer a;
+      if (static_cast<int>(i) < options_.finalists && s.gain > 0 &&
+          progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + s.effect))
+        a = fit_effects({s});
+      singles.push_back(vanished(a) ? leave_open(s, columns, parameters) : std::move(a));
     }
     std::ranges::sort(singles, std::greater{}, &Answer::log_evidence);
     // further effects beside the best
-    if (!singles.empty() && singles.front().log_evidence > parameters) {
+    if (!singles.empty() && singles.front().fitted() && singles.front().log_evidence > parameters) {
       Answer best = singles.front();
       for (int n = 2; n <= options_.most_effects; ++n) {
-        progress(0.7 + 0.1 * n, "looking beside " + best.effects.back());
+        if (!progress(0.7 + 0.1 * n, "looking beside " + best.effects.back())) break;
         const auto beside = screen(effect_columns(best.effects, best.fit), best.fit);
         if (beside.empty() || beside.front().gain < kLeastFurther) break;
         std::vector<Screened> set = screened_of(best);
@@ -87,15 +95,16 @@ class Diagnoser {
       }
     }
     // what looks like an entry at first, and leaves more than that entry's form may
-    if (!singles.empty()) {
-      const Answer& best = *std::ranges::max_element(singles, {}, &Answer::log_evidence);
+    const auto best = std::ranges::max_element(singles, {}, &Answer::log_evidence);
+    if (best != singles.end() && best->fitted()) {
       const double log_prior = std::log(kPriorUnknown / static_cast<double>(model::effects().size()));
-      Answer beside = explain_freely(best.fit.point, log_prior);
+      Answer beside = explain_freely(best->fit.point, log_prior);
       if (!beside.terms.empty() && beside.log_evidence > unknown.log_evidence) unknown = std::move(beside);
-      unknown.log_evidence -= kImperfect * std::max(0.0, best.log_evidence - parameters);
+      unknown.log_evidence -= kImperfect * std::max(0.0, best->log_evidence - parameters);
     }
     d.answers.push_back(std::move(unknown));
     for (Answer& a : singles) d.answers.push_back(std::move(a));
+    d.complete = !stopped_;
     normalise(d);
     d.nominal = nominal.residual;
     hold_out(d);
@@ -196,29 +205,34 @@ class Diagnoser {
     Statistics settled = l.statistics;  // with the columns where they are most probable
     for (std::size_t k = 0; k < c.columns.size(); ++k)
       evidence_.add(-before.mean[static_cast<Index>(k)], *c.columns[k], settled);
+    const double cost = std::log(static_cast<double>(kChannels * q * std::size(kUnexplained))) + kTermCost;
+    const VectorXd shares = Eigen::Map<const VectorXd>(kUnexplained, std::size(kUnexplained));
+    std::vector<MatrixXd> gains(kChannels);  // found anew where the room changed
     std::vector<Term> terms;
     for (int n = 0; n < kMostTerms; ++n) {
       Term best{0, 0, 0, 0};
-      for (int channel = 0; channel < kChannels; ++channel)
-        for (Index i = 0; i < q; ++i)
-          for (const double share : kUnexplained) {
-            const double gain = evidence_.local_gain(settled, all_, sd, channel, static_cast<int>(i), share);
-            if (gain > best.gain) best = {channel, static_cast<int>(i), share, gain};
-          }
+      for (int channel = 0; channel < kChannels; ++channel) {
+        MatrixXd& g = gains[static_cast<std::size_t>(channel)];
+        if (g.size() == 0) g = evidence_.local_gains(settled, all_, sd, channel, shares);
+        Index function = 0, share = 0;
+        if (const double gain = g.maxCoeff(&function, &share); gain > best.gain)
+          best = {channel, static_cast<int>(function), shares[share], gain};
+      }
       if (best.gain <= 0) break;
       Smooth room = sd;
       for (int k = 0; k < kCoefficients; ++k) {
         const int g = best.channel * kCoefficients + k;
         room(g, best.function) = std::hypot(sd(g, best.function), best.share * evidence_.signal(g));
       }
-      const double next = posterior(l, c, all_, room).log_evidence -
-                          std::log(static_cast<double>(kChannels * q * std::size(kUnexplained))) - kTermCost;
+      const double next = posterior(l, c, all_, room).log_evidence - cost;
       if (next < now) break;
       best.gain = next - now;
       now = next;
       sd = room;
+      gains[static_cast<std::size_t>(best.channel)].resize(0, 0);
       terms.push_back(best);
     }
+    if (terms.empty()) now -= cost;  // a cause has to show somewhere
     a.terms = std::move(terms);
     // what the terms gain, beside what is known without them
     a.log_evidence = log_evidence(l, c, own) + now - before.log_evidence + log_prior;
@@ -284,13 +298,23 @@ class Diagnoser {
       std::vector<std::size_t> own;
       for (std::size_t i = 0; i < columns.size(); ++i)
         if (columns[i].effect == name) own.push_back(i);
+      const std::size_t all = own.size();
       Screened s{name, 0, VectorXd::Zero(static_cast<Index>(unknowns.size()))};
       while (!own.empty()) {
         const Posterior p = solve(own);
         const auto value = [&](std::size_t k) { return p.mean[static_cast<Index>(base.size() + k)]; };
+        const auto sd = [&](std::size_t k) {
+          const auto i = static_cast<Index>(base.size() + k);
+          return std::sqrt(p.covariance(i, i));
+        };
         const auto one_sided = [&](std::size_t k) {
           return unknowns[static_cast<std::size_t>(columns[own[k]].unknown)].low >= 0;
         };
+        if (own.size() == all) {
+          s.gain = p.log_evidence - without;
+          for (std::size_t k = 0; k < own.size(); ++k)
+            if (one_sided(k)) s.gain += log_twice_positive(value(k), sd(k));
+        }
         // of sizes with one sign, the one that comes out farthest on the other is none
         std::size_t worst = own.size();
         for (std::size_t k = 0; k < own.size(); ++k)
@@ -299,11 +323,7 @@ class Diagnoser {
           own.erase(own.begin() + static_cast<std::ptrdiff_t>(worst));
           continue;
         }
-        s.gain = p.log_evidence - without;
-        for (std::size_t k = 0; k < own.size(); ++k) {
-          s.coordinates[columns[own[k]].unknown] = value(k);
-          if (one_sided(k)) s.gain += std::log(2.0);
-        }
+        for (std::size_t k = 0; k < own.size(); ++k) s.coordinates[columns[own[k]].unknown] = value(k);
         break;
       }
       ranking.push_back(std::move(s));
@@ -326,7 +346,7 @@ class Diagnoser {
 
   /// Whether a fit left one of its effects without any size.
   bool vanished(const Answer& a) const {
-    if (a.fit.point.residual.empty()) return true;
+    if (!a.fitted()) return true;
     const Hypothesis h(uncertain_, a.effects);
     for (const std::string& e : a.effects) {
       double largest = 0;
@@ -338,6 +358,29 @@ class Diagnoser {
     }
     return false;
   }
+
+  /// An entry that would gain nothing: what the flights do not tell of it stays as it was thought before.
+  Answer leave_open(const Screened& s, const std::vector<Column>& columns, double parameters) const {
+    Answer a;
+    a.kind = Answer::Kind::effect;
+    a.effects = {s.effect};
+    const Hypothesis h(uncertain_, a.effects);
+    std::vector<Smooth> own(unknowns_of(s.effect).size());
+    for (const Column& c : columns)
+      if (c.effect == s.effect) own[static_cast<std::size_t>(c.unknown)] = c.change;
+    a.fit = fitter_.linear(h, parameters_, own);
+    // of its first size what is probable beyond 0, with all else as that has it
+    Posterior& p = a.fit.posterior;
+    const Index first = h.shared();
+    const double mean = p.mean[first], sd = std::sqrt(p.covariance(first, first)), t = mean / sd;
+    const double beyond =
+        std::exp(-0.5 * t * t) / (std::sqrt(std::numbers::pi / 2) * std::erfc(-t / std::numbers::sqrt2));
+    p.mean += p.covariance.col(first) / sd * (t > -5 ? beyond : -t);
+    a.log_evidence = parameters - std::log(kPriorParameters) + std::min(s.gain, 0.0) + log_prior_of_one();
+    return a;
+  }
+
+  static double log_prior_of_one() { return std::log(kPriorEffect / static_cast<double>(model::effects().size())); }
 
   Answer fit_effects(const std::vector<Screened>& set) const {
     std::vector<std::string> effects;
@@ -357,7 +400,7 @@ class Diagnoser {
       none.effects = effects;
       return none;
     }
-    double log_prior = std::log(kPriorEffect / static_cast<double>(model::effects().size()));
+    double log_prior = log_prior_of_one();
     for (std::size_t i = 1; i < set.size(); ++i)
       log_prior += std::log(kPriorFurther / static_cast<double>(model::effects().size()));
     for (Index i = h.shared(); i < h.size(); ++i) {
@@ -389,7 +432,7 @@ class Diagnoser {
     };
     add(Hypothesis(uncertain_, {}), parameters_.point, evidence_.floor(), d.refit);
     for (Answer& a : d.answers)
-      if (a.kind == Answer::Kind::effect) {
+      if (a.fitted()) {
         const Hypothesis h(uncertain_, a.effects);
         add(h, a.fit.point, together(evidence_.floor(), form_error(a.fit.point)), a.left);
       }
@@ -409,8 +452,10 @@ class Diagnoser {
     std::ranges::sort(d.answers, std::greater{}, &Answer::log_evidence);
   }
 
-  void progress(double share, const std::string& what) const {
-    if (options_.progress) options_.progress(share, what);
+  /// Whether to go on.
+  bool progress(double share, const std::string& what) {
+    stopped_ = stopped_ || (options_.progress && !options_.progress(share, what));
+    return !stopped_;
   }
 
   const sim::Randomisation& uncertain_;
@@ -421,6 +466,7 @@ class Diagnoser {
   mutable Evidence evidence_;
   Fitter fitter_;
   Fit parameters_;
+  bool stopped_ = false;
 };
 
 }  // namespace

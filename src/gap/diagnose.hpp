@@ -24,8 +24,11 @@ struct Answer {
   double log_evidence = 0;  ///< of all flights
   double probability = 0;
   std::vector<Term> terms;  ///< of an unknown cause
-  Fit fit;                  ///< of effects and parameters
-  Signature left;           ///< of an effect: in each flight what is left with the fit to the others
+  /// Of effects and parameters. An effect that would gain nothing is weighed as far as a linear model sees: no residual, and
+  /// its size is what flights that tell nothing of it leave probable.
+  Fit fit;
+  Signature left;  ///< of an effect that was fitted: in each flight what is left with the fit to the others
+  bool fitted() const { return !fit.point.residual.empty(); }
 };
 
 /// What an effect would explain beside the fitted parameters, as far as a linear model sees.
@@ -39,11 +42,12 @@ struct DiagnoseOptions {
   int threads = 0;
   int finalists = 8;  ///< effects that are fitted in full
   int most_effects = 3;
-  std::vector<std::string> withheld;  ///< entries that the catalogue is to lack
-  std::function<void(double share, const std::string& what)> progress;
+  std::vector<std::string> withheld;                                    ///< entries that the catalogue is to lack
+  std::function<bool(double share, const std::string& what)> progress;  ///< false: no further effect is fitted
 };
 
 struct Diagnosis {
+  bool complete = true;          ///< false: progress had it stop before every effect was weighed
   std::vector<Answer> answers;   ///< most probable first
   Fit parameters;                ///< without any effect
   Signature nominal;             ///< what is left of the measurement with the vehicle's file

@@ -18,12 +18,21 @@ constexpr double kMostPast = 0.95;
 
 std::size_t row_of(std::size_t beat, int group) { return beat * kRowsPerBeat + static_cast<std::size_t>(group); }
 
-/// Precision of eta given the rest, in units of its prior's sd.
-Eigen::LLT<MatrixXd> eta_precision(const MatrixXd& normal, const VectorXd& sd) {
-  MatrixXd precision = sd.asDiagonal() * normal * sd.asDiagonal();
-  precision.diagonal().array() += 1;
-  return Eigen::LLT<MatrixXd>(precision);
-}
+/// A group with eta integrated out: sums a' b over its rows become a' b - of(a)' of(b).
+struct WithoutEta {
+  WithoutEta(const MatrixXd& normal, VectorXd eta_sd) : sd(std::move(eta_sd)) {
+    MatrixXd precision = sd.asDiagonal() * normal * sd.asDiagonal();
+    precision.diagonal().array() += 1;
+    llt.compute(precision);
+    half = of(normal);
+  }
+  /// Of sums basis x a.
+  MatrixXd of(const MatrixXd& sums) const { return llt.matrixL().solve(sd.asDiagonal() * sums); }
+
+  VectorXd sd;
+  Eigen::LLT<MatrixXd> llt;  ///< of eta's precision given the rest, in units of its prior's sd
+  MatrixXd half;             ///< of the basis
+};
 
 double median(std::vector<double> v) {
   if (v.empty()) return 0;
@@ -251,43 +260,42 @@ Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smo
                          const std::vector<char>& use, const Smooth& eta_sd) const {
   const Index q = basis_.size(), k = static_cast<Index>(columns.size());
   Reduced result{MatrixXd::Zero(k + 1, k + 1), 0};
+  MatrixXd change(q, k), weighed(q, k);
   for (int g = 0; g < kGroups; ++g) {
     const auto [normal, right] = sums_of(residual, use, g);
     if (normal(0, 0) == 0) continue;  // nothing was seen
-    MatrixXd change(q, k + 1), sums(q, k + 1);
     for (Index i = 0; i < k; ++i) change.col(i) = columns[static_cast<std::size_t>(i)]->row(g).transpose();
-    sums.leftCols(k) = normal * change.leftCols(k);
-    sums.col(k) = right;
+    const WithoutEta without(normal, eta_sd.row(g).transpose());
+    weighed.noalias() = (normal - without.half.transpose() * without.half) * change;
+    result.sums.topLeftCorner(k, k).triangularView<Eigen::Lower>() += change.transpose() * weighed;
+    const VectorXd half_right = without.of(right);
+    result.sums.row(k).head(k) += (right - without.half.transpose() * half_right).transpose() * change;
     MatrixXd ridge = normal;
     ridge.diagonal().array() += kLooseRidge * normal(0, 0);
-    change.col(k) = ridge.ldlt().solve(right);
-    const VectorXd sd = eta_sd.row(g).transpose();
-    const Eigen::LLT<MatrixXd> llt = eta_precision(normal, sd);
-    const MatrixXd cross = llt.matrixL().solve(sd.asDiagonal() * sums);
-    result.sums += change.transpose() * sums - cross.transpose() * cross;
-    result.log_scale -= llt.matrixLLT().diagonal().array().log().sum();
+    result.sums(k, k) += ridge.ldlt().solve(right).dot(right) - half_right.squaredNorm();
+    result.log_scale -= without.llt.matrixLLT().diagonal().array().log().sum();
   }
-  result.sums = (0.5 * (result.sums + result.sums.transpose())).eval();
+  result.sums = MatrixXd(result.sums.selfadjointView<Eigen::Lower>());
   return result;
 }
 
-double Evidence::local_gain(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd, int channel,
-                            int function, double share) const {
-  double gain = 0;
+MatrixXd Evidence::local_gains(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd,
+                               int channel, const VectorXd& shares) const {
+  MatrixXd gains = MatrixXd::Zero(basis_.size(), shares.size());
   for (int g = channel * kCoefficients; g < (channel + 1) * kCoefficients; ++g) {
     const auto [normal, right] = sums_of(residual, use, g);
     if (normal(0, 0) == 0) continue;
-    const VectorXd sd = eta_sd.row(g).transpose();
-    const Eigen::LLT<MatrixXd> llt = eta_precision(normal, sd);
+    const WithoutEta without(normal, eta_sd.row(g).transpose());
     // one more coefficient, beside those that were there
-    const VectorXd b = normal.col(function), half = llt.matrixL().solve(sd.cwiseProduct(b));
-    const VectorXd half_right = llt.matrixL().solve(sd.cwiseProduct(right));
-    const double more = share * groups_[static_cast<std::size_t>(g)].signal;
-    const double information = more * more * (b[function] - half.squaredNorm());
-    const double score = more * (right[function] - half.dot(half_right));
-    gain += 0.5 * (score * score / (1 + information) - std::log1p(information));
+    const VectorXd known = normal.diagonal() - without.half.colwise().squaredNorm().transpose();
+    const VectorXd left = right - without.half.transpose() * without.of(right);
+    for (Index s = 0; s < shares.size(); ++s) {
+      const double more = shares[s] * groups_[static_cast<std::size_t>(g)].signal;
+      const Eigen::ArrayXd information = more * more * known.array(), score = more * left.array();
+      gains.col(s).array() += 0.5 * (score.square() / (1 + information) - information.log1p());
+    }
   }
-  return gain;
+  return gains;
 }
 
 Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& columns, const VectorXd& prior_mean) {

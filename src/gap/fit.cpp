@@ -223,6 +223,19 @@ Fit Fitter::fit(const Hypothesis& hypothesis, const VectorXd& start, const Fit& 
   return improve(hypothesis, std::move(result), iterations, &parameters);
 }
 
+Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters, const std::vector<Smooth>& own) const {
+  Fit result;
+  Linearised& l = result.point;
+  l = parameters.point;
+  l.residual.clear();
+  l.at = hypothesis.start();
+  l.at.head(hypothesis.shared()) = parameters.point.at;
+  l.directions = beside(hypothesis, parameters);
+  l.columns.insert(l.columns.end(), own.begin(), own.end());
+  result.posterior = solve(l);
+  return result;
+}
+
 Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const {
   Fit result;
   result.point = linearise(hypothesis, before.point.at, principal(hypothesis, before));

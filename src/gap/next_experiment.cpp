@@ -45,7 +45,6 @@ std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncer
       continue;
     }
     const Fit& fit = a.kind == Answer::Kind::parameters ? d.parameters : a.fit;
-    if (fit.point.residual.empty()) continue;
     rivals.push_back(
         {name_of(a), a.probability, h, h.bounded(fit.mean()), fit.point.directions, fit.posterior.covariance});
   }

@@ -78,6 +78,7 @@ Report report_of(const std::vector<std::string>& names, const std::vector<Carrie
                  const sim::Randomisation& uncertain, const Diagnosis& d) {
   Report r;
   r.flights = names;
+  r.complete = d.complete;
   r.conclusion = conclude(d.answers);
   const Surroundings around = surroundings_of(flights, d.noise_sd);
   r.noise_floor = huber_floor();
@@ -92,6 +93,8 @@ Report report_of(const std::vector<std::string>& names, const std::vector<Carrie
                {},     {}};
     if (effect) {
       c.sizes = sizes_of(a, uncertain);
+    }
+    if (a.fitted()) {
       const Losses left = losses_of(around, a.left);
       c.loss = left.mean();
       c.closure = closure_of(refit, left, r.noise_floor);
@@ -159,28 +162,30 @@ Json diagnosis_json(const Report& r) {
                           {"closure", c.closure ? Json(c.closure->value) : Json(nullptr)}});
   }
   const auto closure = [&](double Closure::*part) { return r.closure ? Json((*r.closure).*part) : Json(nullptr); };
-  return {{"schema", 1},
-          {"flights", r.flights},
-          {"data_faults", faults},
-          {"verdict",
-           {{"kind", kind_name(r.conclusion.kind)},
-            {"effects", r.conclusion.effects},
-            {"probability", r.conclusion.probability}}},
-          {"where", where},
-          {"candidates", candidates},
-          {"gap",
-           {{"nominal", number(r.nominal)},
-            {"refit", number(r.refit)},
-            {"effect", number(r.effect)},
-            {"noise_floor", r.noise_floor},
-            {"closure", closure(&Closure::value)},
-            {"closure_low", closure(&Closure::low)},
-            {"closure_high", closure(&Closure::high)}}},
-          {"closed_loop", closed_loop},
-          {"next_experiment", r.next ? Json({{"manoeuvre", r.next->manoeuvre},
-                                             {"separates", r.next->separates},
-                                             {"expected_nats", r.next->expected_nats}})
-                                     : Json(nullptr)}};
+  Json json = {{"schema", 1},
+               {"flights", r.flights},
+               {"data_faults", faults},
+               {"verdict",
+                {{"kind", kind_name(r.conclusion.kind)},
+                 {"effects", r.conclusion.effects},
+                 {"probability", r.conclusion.probability}}},
+               {"where", where},
+               {"candidates", candidates},
+               {"gap",
+                {{"nominal", number(r.nominal)},
+                 {"refit", number(r.refit)},
+                 {"effect", number(r.effect)},
+                 {"noise_floor", r.noise_floor},
+                 {"closure", closure(&Closure::value)},
+                 {"closure_low", closure(&Closure::low)},
+                 {"closure_high", closure(&Closure::high)}}},
+               {"closed_loop", closed_loop},
+               {"next_experiment", r.next ? Json({{"manoeuvre", r.next->manoeuvre},
+                                                  {"separates", r.next->separates},
+                                                  {"expected_nats", r.next->expected_nats}})
+                                          : Json(nullptr)}};
+  if (!r.complete) json["complete"] = false;
+  return json;
 }
 
 }  // namespace flappy::gap

@@ -51,6 +51,7 @@ struct Unexplained {
 struct Report {
   std::vector<std::string> flights;
   std::vector<DataFault> faults;  ///< any: nothing else was looked at
+  bool complete = true;           ///< false: stopped before every effect was weighed
   Conclusion conclusion;
   std::vector<Reported> candidates;  ///< effects, the most probable first; then the kinds without one
   std::vector<Unexplained> unexplained;
@@ -74,6 +75,7 @@ Report report_of(const std::vector<std::string>& names, const std::vector<Carrie
                  const sim::Randomisation& uncertain, const Diagnosis& diagnosis);
 
 /// Its candidates without effects stand for parameters, none and unknown, whose name is their group: all add up to 1.
+/// "complete" is there only where it is false.
 nlohmann::ordered_json diagnosis_json(const Report& report);
 
 /// Of an effect's parameter, from its name: "kg/m" of line_kg_m, "" where it has none.

@@ -9,7 +9,7 @@
 
 namespace flappy::gap {
 
-struct Estimate {
+struct ScoredSize {
   double value = 0, low = 0, high = 0;  ///< 90 % interval
 };
 
@@ -17,9 +17,9 @@ struct Estimate {
 struct FittedSet {
   std::vector<std::string> effects;
   double probability = 0;
-  std::map<std::string, Estimate> values;  ///< by "effect.parameter"
-  std::optional<double> left;              ///< E, its mean loss on held-out flights
-  double gain_sd = 0;                      ///< of E_refit - E, from blocks of beats
+  std::map<std::string, ScoredSize> values;  ///< by "effect.parameter"
+  std::optional<double> left;                ///< E, its mean loss on held-out flights
+  double gain_sd = 0;                        ///< of E_refit - E, from blocks of beats
 };
 
 /// What a simpler method said.

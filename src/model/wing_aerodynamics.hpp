@@ -52,6 +52,12 @@ FLAPPY_INLINE WingWrench<T> scaled(const WingWrench<T>& w, const T& factor) {
   return {factor * w.normal_force_N, factor * w.force_x_N, factor * w.force_z_N, factor * w.moment_Nm};
 }
 
+/// Its lift times `factor`: the force normal to the plane of the strokes and its moment about the leading edge's x.
+template <class T>
+FLAPPY_INLINE WingWrench<T> with_lift(const WingWrench<T>& w, const T& factor) {
+  return {w.normal_force_N, w.force_x_N, factor * w.force_z_N, {factor * w.moment_Nm.x, w.moment_Nm.y, w.moment_Nm.z}};
+}
+
 /// `v`, `w`: velocity of the shoulder and angular velocity of E relative to the air, in E. `side`: +1 left,
 /// -1 right.
 template <int side, class T>

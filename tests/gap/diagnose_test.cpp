@@ -10,6 +10,7 @@
 #include "flight/fly_fixture.hpp"
 #include "gap/sensor_effects.hpp"
 #include "io/config.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -180,6 +181,23 @@ TEST(SensorEffects, AreTakenBack) {
               std::cos(0.1) * log.imu.accel_y_m_s2[50] + std::sin(0.1) * log.imu.accel_z_m_s2[50], 1e-12);
   EXPECT_TRUE(sensor_effects({{"wind", {}}, {"mocap_tilt", {}}}).count("mocap_tilt"));
   EXPECT_FALSE(sensor_effects({{"wind", {}}, {"mocap_tilt", {}}}).count("wind"));
+}
+
+TEST(Diagnose, StopsWithWhatItHas) {
+  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal");
+  DiagnoseOptions options;
+  options.threads = 2;
+  options.progress = [](double, const std::string&) { return false; };
+  const Diagnosis d = diagnose(flights, uncertain(), options);
+  EXPECT_FALSE(d.complete);
+  ASSERT_EQ(d.answers.size(), 3 + model::effects().size());
+  double sum = 0;
+  for (const Answer& a : d.answers) {
+    EXPECT_TRUE(a.left.empty());
+    sum += a.probability;
+  }
+  EXPECT_NEAR(sum, 1, 1e-12);
+  EXPECT_EQ(d.answers[0].kind, Answer::Kind::none);
 }
 
 }  // namespace

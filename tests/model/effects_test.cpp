@@ -96,6 +96,15 @@ struct Bench {
 const WingWrench<One> kUnit{One(1), One(1), One(1), {One(1), One(1), One(1)}};
 
 double normal(const WingWrench<One>& w) { return value(w.normal_force_N); }
+/// Of kUnit, with nothing but its lift changed.
+double lift(const WingWrench<One>& w) {
+  EXPECT_EQ(value(w.normal_force_N), 1);
+  EXPECT_EQ(value(w.force_x_N), 1);
+  EXPECT_EQ(value(w.moment_Nm.x), value(w.force_z_N));
+  EXPECT_EQ(value(w.moment_Nm.y), 1);
+  EXPECT_EQ(value(w.moment_Nm.z), 1);
+  return value(w.force_z_N);
+}
 
 // ---- the vehicle
 
@@ -451,13 +460,13 @@ TEST(GroundAndCeiling, GiveTheirFactor) {
   const One q[2] = {One(0.2), One(0.06)};
   b.x.position_m.z = One(0.05);
   b.x.left.stroke_rad = One(0.3);
-  EXPECT_NEAR(normal(b.air<GroundEffect>(q, kUnit)), 1 + 0.2 * std::exp(-(0.05 + 0.019) / 0.06), 1e-15);
+  EXPECT_NEAR(lift(b.air<GroundEffect>(q, kUnit)), 1 + 0.2 * std::exp(-(0.05 + 0.019) / 0.06), 1e-15);
   b.x.position_m.z = One(-1);
-  EXPECT_NEAR(normal(b.air<GroundEffect>(q, kUnit)), 1.2, 1e-15);
+  EXPECT_NEAR(lift(b.air<GroundEffect>(q, kUnit)), 1.2, 1e-15);
   b.x.position_m.z = One(2.9);
-  EXPECT_NEAR(normal(b.air<CeilingEffect>(q, kUnit)), 1 + 0.2 * std::exp(-(0.1 - 0.019) / 0.06), 1e-15);
+  EXPECT_NEAR(lift(b.air<CeilingEffect>(q, kUnit)), 1 + 0.2 * std::exp(-(0.1 - 0.019) / 0.06), 1e-15);
   b.x.attitude = {One(0), One(1), One(0), One(0)};  // upside down: the stroke plane hangs below
-  EXPECT_NEAR(normal(b.air<CeilingEffect>(q, kUnit)), 1 + 0.2 * std::exp(-(0.1 + 0.019) / 0.06), 1e-15);
+  EXPECT_NEAR(lift(b.air<CeilingEffect>(q, kUnit)), 1 + 0.2 * std::exp(-(0.1 + 0.019) / 0.06), 1e-15);
 }
 
 TEST(Wind, BlowsInWAndGustsWithItsRms) {
@@ -572,21 +581,33 @@ TEST(WakeCapture, DecaysFromTheReversal) {
   EXPECT_LT(fly(10, 1), 1.25);
 }
 
-TEST(ClapAndFling, ActsWhereBothWingsAre) {
+TEST(ClapAndFling, ActsWhereBothWingsAreAndIsShedOnTheWay) {
   Bench b;
-  const One q[2] = {One(0.5), One(1.4)};
+  const One q[2] = {One(0.5), One(1.3)};
   const Planform& f = b.vehicle.left.planform;
   const double width = f.mean_chord_m / (2 * f.wing_length_m);
   const auto gain = [&](double left, double right) {
     b.x.left.stroke_rad = One(left);
     b.x.right.stroke_rad = One(right);
-    return normal(b.air<ClapAndFling>(q, kUnit)) - 1;
+    return lift(b.air<ClapAndFling>(q, kUnit)) - 1;
   };
-  EXPECT_EQ(gain(1.4, 1.5), 0);
-  EXPECT_NEAR(gain(1.4 + width / 2, 1.6), 0.25, 1e-12);
-  EXPECT_NEAR(gain(-1.6, -1.4 - width / 4), 0.5 * (3.0 / 16 - 2.0 / 64), 1e-12);
-  EXPECT_NEAR(gain(1.6, 1.6), 0.5, 1e-12);
-  EXPECT_EQ(gain(1.6, -1.6), 0);
+  const auto afresh = [&](double left, double right) {
+    b.memory[0] = 0;
+    return gain(left, right);
+  };
+  EXPECT_EQ(afresh(1.3, 1.5), 0);
+  EXPECT_NEAR(afresh(1.3 + width / 2, 1.6), 0.25, 1e-12);
+  EXPECT_NEAR(afresh(-1.6, -1.3 - width / 4), 0.5 * (3.0 / 16 - 2.0 / 64), 1e-12);
+  EXPECT_EQ(afresh(1.6, -1.6), 0);
+  EXPECT_NEAR(afresh(1.6, 1.6), 0.5, 1e-12);
+  EXPECT_NEAR(gain(0, 0), 0.5, 1e-12);  // kept at rest
+  // two chords of the tip's travel: e-fold, but for the square of a step
+  const double rate = 100;
+  b.x.left.stroke_rate_rad_s = One(-rate);
+  const int steps = static_cast<int>(2 * f.mean_chord_m / (f.wing_length_m * rate * kStep));
+  for (int i = 0; i < steps; ++i) gain(0, 0);
+  const double step = 1.0 / steps;
+  EXPECT_NEAR(gain(0, 0), 0.5 * std::exp(-1.0), 0.5 * 2 * step);
 }
 
 TEST(AddedMass, ResistsAccelerationNormalToTheWing) {

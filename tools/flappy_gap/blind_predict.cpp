@@ -25,8 +25,8 @@ double sd_of_difference(const Losses& a, const Losses& b) {
   return std::sqrt(scatter * n / (n - 1)) / rows;
 }
 
-std::map<std::string, Estimate> estimates(const Answer& a, const sim::Randomisation& uncertain) {
-  std::map<std::string, Estimate> values;
+std::map<std::string, ScoredSize> estimates(const Answer& a, const sim::Randomisation& uncertain) {
+  std::map<std::string, ScoredSize> values;
   for (const Size& s : sizes_of(a, uncertain)) values[s.name] = {s.value, s.low, s.high};
   return values;
 }
@@ -62,9 +62,14 @@ Prediction predict(const Question& q) {
   p.refit = refit.mean();
   p.floor = huber_floor();
   for (const Answer& a : d.answers) {
-    if (a.kind != Answer::Kind::effect || a.fit.point.residual.empty()) continue;
-    const Losses left = losses_of(around, a.left);
-    p.sets.push_back({a.effects, a.probability, estimates(a, uncertain), left.mean(), sd_of_difference(refit, left)});
+    if (a.kind != Answer::Kind::effect) continue;
+    FittedSet set{a.effects, a.probability, estimates(a, uncertain)};
+    if (a.fitted()) {
+      const Losses left = losses_of(around, a.left);
+      set.left = left.mean();
+      set.gain_sd = sd_of_difference(refit, left);
+    }
+    p.sets.push_back(std::move(set));
   }
   if (q.baselines) p.baselines = baselines(flights, uncertain, d, q.withheld, options.threads);
   return p;

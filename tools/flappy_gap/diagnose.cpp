@@ -20,9 +20,6 @@ using Json = nlohmann::ordered_json;
 /// Probability of the second answer from which on a flight is looked for that tells it from the first.
 constexpr double kLeastRival = 0.01;
 
-/// Thrown out of a diagnosis by its progress.
-struct Interrupted {};
-
 struct Logs {
   std::vector<flight::FlightLog> logs;
   std::vector<DataFault> faults;
@@ -45,8 +42,8 @@ Diagnosis diagnose_visibly(const std::vector<CarriedFlight>& flights, const sim:
   options.withheld = command.withheld;
   io::ProgressLine line("diagnosing", std::numeric_limits<double>::infinity());
   options.progress = [&](double share, const std::string& what) {
-    if (io::interrupted()) throw Interrupted();
     line.show(share, what);
+    return !io::interrupted();
   };
   return diagnose(flights, uncertain, options);
 }
@@ -120,16 +117,13 @@ Json run_diagnose(const DiagnoseCommand& command) {
   std::vector<CarriedFlight> flights;
   for (std::size_t f = 0; f < read.logs.size(); ++f)
     flights.emplace_back(Recording(command.flights[f], std::move(read.logs[f]), vehicle));
-  Diagnosis d;
-  try {
-    d = diagnose_visibly(flights, uncertain, command);
-  } catch (const Interrupted&) {
-    throw io::InputError("interrupted: no diagnosis is written");
-  }
+  const Diagnosis d = diagnose_visibly(flights, uncertain, command);
   Report report = report_of(command.flights, flights, uncertain, d);
   const model::Vehicle corrected = corrected_vehicle(vehicle, d, report.conclusion, uncertain);
-  report.closed_loop = fly_both(command, flights, vehicle, corrected);
-  report.next = next_experiment(d, uncertain, command.threads);
+  if (d.complete) {
+    report.closed_loop = fly_both(command, flights, vehicle, corrected);
+    report.next = next_experiment(d, uncertain, command.threads);
+  }
   Json json = diagnosis_json(report);
   for (const std::string& line : summary_of(report, command.out)) std::printf("%s\n", line.c_str());
   if (out.empty()) return json;

@@ -96,6 +96,7 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     lines.push_back(next_line(r.conclusion, out));
     return lines;
   }
+  if (!r.complete) lines.push_back("stopped before every effect was weighed");
   std::vector<const Reported*> ranked;
   for (const Reported& c : r.candidates) ranked.push_back(&c);
   std::ranges::stable_sort(ranked, std::greater{}, &Reported::probability);

@@ -1,9 +1,9 @@
-// Thrust gained near a ceiling, as a factor on what the air does to the wings:
+// Thrust gained near a ceiling, as a factor on the lift of the wings:
 //   k = 1 + gain exp(-h / length)      h: clearance of the stroke plane to the ceiling
 // [1] Hsiao, Chirarattananon, Ceiling effects for hybrid aerial-surface locomotion of small rotorcraft, IEEE/ASME Trans.
 //     Mechatronics 24(5), 2019: thrust at one power rises as a monotonic function of clearance / rotor radius, about 1.1
 //     at half a radius. The exponential is the form of He, Leang et al. 2019 for the ground, fitted to the same kind of data.
-// A level attitude and a flat ceiling are assumed; above the ceiling h counts as 0.
+// The force in the plane of the strokes stays, as for the ground. A level attitude and a flat ceiling are assumed; above the ceiling h counts as 0.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -19,7 +19,7 @@ struct CeilingEffect {
   template <int side, class T>
   static FLAPPY_INLINE void air(const T (&q)[2], const Surroundings<T>& s, const StateRows<T>&, WingWrench<T>& air) {
     const T clearance = max(T(s.ceiling_z_m - stroke_plane_z(s)), T(0));
-    air = scaled(air, T(T(1) + q[0] * exp_negative(T(clearance / q[1]))));
+    air = with_lift(air, T(T(1) + q[0] * exp_negative(T(clearance / q[1]))));
   }
 };
 

@@ -1,9 +1,10 @@
-// Thrust gained near the ground, as a factor on what the air does to the wings:
+// Thrust gained near the ground, as a factor on the lift of the wings:
 //   k = 1 + gain exp(-h / length)      h: height of the stroke plane over the ground
 // [1] He, Leang et al., In-ground-effect modeling and nonlinear-disturbance observer for multirotor UAV control,
 //     J. Dyn. Syst. Meas. Control 141(7), 071013, 2019: k = 1 + C_a exp(-C_b h / R), fitted to small rotors.
 // Finite when standing, unlike 1 / (1 - (R / 4h)^2) (Cheeseman and Bennett 1955), which it meets within 0.4 % for
-// h > R with gain 0.27, length 0.7 R. A level attitude and a flat ground are assumed; below the ground h counts as 0.
+// h > R with gain 0.27, length 0.7 R. The plane takes the downwash away: for the same power, that is the same drag of the
+// wings, there is more lift, so the force in the plane of the strokes stays. A level attitude and a flat ground are assumed; below the ground h counts as 0.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -19,7 +20,7 @@ struct GroundEffect {
   template <int side, class T>
   static FLAPPY_INLINE void air(const T (&q)[2], const Surroundings<T>& s, const StateRows<T>&, WingWrench<T>& air) {
     const T height = max(T(stroke_plane_z(s) - s.ground_z_m), T(0));
-    air = scaled(air, T(T(1) + q[0] * exp_negative(T(height / q[1]))));
+    air = with_lift(air, T(T(1) + q[0] * exp_negative(T(height / q[1]))));
   }
 };
 
