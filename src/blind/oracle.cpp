@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 using gap::Smooth;
 
 /// Sizes at which effects are tried: few do twice as much at twice the size. Those of sensors do.
-constexpr double kSizes[] = {0.25, 0.5, 1, 2, 4}, kSensorSizes[] = {1, 4};
+constexpr double kSizes[] = {0.25, 0.5, 1, 2, 4}, kSensorSizes[] = {1, 4}, kDelaySizes[] = {0.01, 0.03, 0.1};
 /// A size is taken for this much, give or take, before any flight.
 constexpr double kSizeSd = 2;
 /// A typical size of the catalogue is a third of the end of its prior, 1.645 of its coordinate.
@@ -51,6 +51,8 @@ Oracle::Oracle(const Subject& subject, const sim::Randomisation& uncertain) {
   const std::uint64_t seed = subject.flown().seed;
   for (std::size_t e = 0; e < kEffects; ++e) {
     const auto effect = static_cast<Effect>(e);
+    if (effect == Effect::command_delay)  // straight for a small part of a beat only
+      for (const double size : kDelaySizes) list.push_back({effect, size, seed});
     if (acts_on_sensors(effect))
       for (const double size : kSensorSizes) list.push_back({effect, size, seed});
     else

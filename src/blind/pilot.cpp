@@ -44,7 +44,7 @@ Plan::Plan(Programme programme, std::size_t flight, const Room& room, std::uint6
   };
   double share = 0;  // of kRms
   if (programme == Programme::hover) {
-    add(0, 0, 0, 0.4 + 0.1 * static_cast<double>(flight));
+    add(0, 0, 0, 0.5);
   } else if (flight == 0) {
     add(0, 0, 0, 0.5);
     share = 1;

@@ -560,25 +560,39 @@ TEST(RotationalLift, AddsToAPitchingUpWingOnBothStrokes) {
   EXPECT_NEAR(value(w.moment_Nm.z), scale * f.wing_length_m * f.z_cp2, 1e-12 * std::abs(scale));
 }
 
-TEST(WakeCapture, DecaysFromTheReversal) {
+TEST(WakeCapture, IsTheWingMeetingAirThatDiesDown) {
   Bench b;
   const One q[2] = {One(0.3), One(0.1)};
   const auto fly = [&](double rate, int steps) {
     b.x.left.stroke_rate_rad_s = One(rate);
-    double last = 0;
-    for (int i = 0; i < steps; ++i) last = normal(b.air<WakeCapture>(q, kUnit));
+    WingWrench<One> last{};
+    for (int i = 0; i < steps; ++i) last = b.air<WakeCapture>(q, WingWrench<One>{});
     return last;
   };
-  EXPECT_EQ(fly(10, 40), 1);  // no wake yet
-  EXPECT_EQ(fly(-10, 1), 1.3);
+  /// What a wing that turns at `rate` gains where the air comes at it with `wake`.
+  const auto expected = [](double rate, double wake) {
+    const auto force = [](double r) {
+      Bench c;
+      c.x.left.stroke_rate_rad_s = One(r);
+      const auto s = c.see();
+      return normal(blade_element<+1>(c.p.left, c.pose.left.theta, One(0), flow<+1>(s).v, flow<+1>(s).w));
+    };
+    return force(rate + std::copysign(wake, rate)) - force(rate);
+  };
+  EXPECT_EQ(normal(fly(10, 20)), 0);  // no wake yet
+  EXPECT_EQ(normal(fly(40, 20)), 0);
+  EXPECT_NEAR(normal(fly(-1, 1)), expected(-1, 0.3 * 40), 1e-15);
+  EXPECT_GT(std::abs(expected(-1, 0.3 * 40)),
+            100 * std::abs(expected(-1, 0.3)));  // a wing that hardly moves has a peak
   // 40 steps of stroke before it, of which the last is 39 steps after the first
-  EXPECT_NEAR(fly(-10, 3), 1 + 0.3 * std::exp(-3 / (0.1 * b.memory[2] / kStep)), 1e-14);
+  EXPECT_NEAR(normal(fly(-1, 3)), expected(-1, 12 * std::exp(-3 / (0.1 * b.memory[2] / kStep))), 1e-14);
   EXPECT_NEAR(b.memory[2], 40 * kStep, 1e-15);
-  EXPECT_NEAR(fly(-10, 56), 1, 1e-5);
-  EXPECT_EQ(fly(10, 1), 1.3);
+  EXPECT_NEAR(normal(fly(-5, 56)), 0, 1e-5 * std::abs(expected(-5, 12)));
+  const auto w = fly(2, 1);
+  EXPECT_NEAR(normal(w), expected(2, 0.3 * 5), 1e-15);
   EXPECT_NEAR(b.memory[2], 59 * kStep, 1e-15);
-  EXPECT_NEAR(fly(0, 1), 1 + 0.3 * std::exp(-1 / (0.1 * 59)), 1e-14);  // a wing that stops has not reversed
-  EXPECT_LT(fly(10, 1), 1.25);
+  EXPECT_NEAR(std::hypot(value(w.force_x_N), value(w.force_z_N)), std::abs(normal(w)), 1e-15);
+  EXPECT_NEAR(normal(fly(0, 1)), expected(1e-12, 1.5 * std::exp(-1 / (0.1 * 59))), 1e-13);  // that stops, not reversed
 }
 
 TEST(ClapAndFling, ActsWhereBothWingsAreAndIsShedOnTheWay) {
@@ -760,12 +774,12 @@ TEST(Tether, WeighsWithHeightAndPullsBack) {
   Bench b;
   b.x.position_m = {One(0.5), One(-1), One(2)};
   b.com = {One(0), One(0), One(-0.001)};
-  const One q[4] = {One(2e-4), One(1e-3), One(0.1), One(0)};
+  const One q[5] = {One(2e-4), One(1e-3), One(0.1), One(0), One(-0.01)};
   const auto load = b.world<Tether>(q);
   EXPECT_NEAR(value(load.force_B.z), -2e-4 * 9.81 * 2, 1e-16);
   EXPECT_NEAR(value(load.force_B.x), -1e-3 * 0.4, 1e-16);
   EXPECT_NEAR(value(load.force_B.y), 1e-3, 1e-16);
-  EXPECT_NEAR(value(load.moment_B.y), 0.001 * value(load.force_B.x), 1e-18);
+  EXPECT_NEAR(value(load.moment_B.y), -0.009 * value(load.force_B.x), 1e-18);
   b.x.position_m.z = One(-1);
   EXPECT_EQ(value(b.world<Tether>(q).force_B.z), 0);
 }

@@ -51,7 +51,7 @@ class Benchmark : public testing::Test {
     c.vehicle = kConfigs + "vehicles/hummingbird_nominal.toml";
     c.randomise = kConfigs + "randomisation/published.toml";
     c.detectable = root_ / "detectable.toml";
-    c.plan.part = part;
+    c.plan.parts = {part};
     c.plan.at_most = at_most;
     c.threads = 2;
     c.true_values = [](const blind::Case& flown, const std::vector<blind::BlindEffect>& effects) {
@@ -213,7 +213,7 @@ TEST_F(Benchmark, PlansEveryPart) {
   for (const PlannedCase& c : plan_cases(of, reported)) EXPECT_GE(c.seed, 700001U);
   // what a part holds does not depend on what else is made
   PlanOptions pairs;
-  pairs.part = "pairs";
+  pairs.parts = {"pairs"};
   std::set<std::string> alone, among;
   for (const PlannedCase& c : plan_cases(of, pairs)) alone.insert(c.effects[0].id + std::to_string(c.seed));
   for (const PlannedCase& c : plan)

@@ -96,7 +96,7 @@ class Planner {
 
   template <class Fill>
   void part(const char* name, std::size_t count, const Fill& fill) {
-    if (!options_.part.empty() && options_.part != name) return;
+    if (!options_.parts.empty() && !std::ranges::count(options_.parts, name)) return;
     if (options_.at_most > 0) count = std::min(count, options_.at_most);
     for (std::size_t k = 0; k < count; ++k) {
       PlannedCase c;

@@ -35,9 +35,9 @@ struct PlannedCase {
 };
 
 struct PlanOptions {
-  bool reported = false;    ///< seeds of the reported figures; otherwise those of development
-  std::string part;         ///< empty: all
-  std::size_t at_most = 0;  ///< cases of each part; 0: all
+  bool reported = false;           ///< seeds of the reported figures; otherwise those of development
+  std::vector<std::string> parts;  ///< empty: all
+  std::size_t at_most = 0;         ///< cases of each part; 0: all
 };
 
 std::vector<PlannedCase> plan_cases(const std::map<std::string, Detectability>& detectability,

@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
   make->add_option("--set", set, "development or reported: which seeds")
       ->check(CLI::IsMember({"development", "reported"}))
       ->required();
-  make->add_option("--part", made.plan.part, "this part alone")
+  make->add_option("--part", made.plan.parts, "these parts alone")
       ->check(CLI::IsMember(std::vector<std::string>(std::begin(gap::kParts), std::end(gap::kParts))));
   make->add_option("--cases", made.plan.at_most, "of each part at most")->check(CLI::Range(1, 1000));
   make->add_option("--vehicle", made.vehicle, "the robot as declared")->capture_default_str();

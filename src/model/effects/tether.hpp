@@ -1,4 +1,4 @@
-// A cable that hangs from the torso's origin to the ground: it weighs down with the length that is in the air, and pulls
+// A cable that hangs from below the torso's origin to the ground: it weighs down with the length that is in the air, and pulls
 // weakly back to above its anchor,
 //   F_z = -line g h      F_x = -stiffness (x - anchor_x)      F_y = -stiffness (y - anchor_y)      h: height over the ground
 // [1] Irvine, Cable Structures, 1981, ch. 1: a slack line carries its own weight, and pulls sideways in proportion to small
@@ -12,19 +12,20 @@ inline namespace FLAPPY_ISA {
 
 struct Tether {
   static constexpr EffectInfo kInfo{"tether", Stage::world, 2, "world_force", "Irvine 1981"};
-  static constexpr std::array<EffectParameter, 4> kParameters{{{"line_kg_m", 0, 0.1, 0.0002, 0, 0.0006},
+  static constexpr std::array<EffectParameter, 5> kParameters{{{"line_kg_m", 0, 0.1, 0.0002, 0, 0.0006},
                                                                {"stiffness_N_m", 0, 1, 0.001, 0, 0.003},
                                                                {"anchor_x_m", -100, 100, 0, -0.5, 0.5},
-                                                               {"anchor_y_m", -100, 100, 0, -0.5, 0.5}}};
+                                                               {"anchor_y_m", -100, 100, 0, -0.5, 0.5},
+                                                               {"attached_z_m", -0.1, 0.1, -0.01, -0.02, 0}}};
 
   template <class T>
-  static FLAPPY_INLINE void world(const T (&q)[4], const Surroundings<T>& s, const StateRows<T>&, BodyLoad<T>& load) {
+  static FLAPPY_INLINE void world(const T (&q)[5], const Surroundings<T>& s, const StateRows<T>&, BodyLoad<T>& load) {
     const Vec3<T>& at = s.position_m;
     const T height = max(T(at.z - s.ground_z_m), T(0));
     const Vec3<T> force = transpose_times(
         s.attitude, Vec3<T>{q[1] * T(q[2] - at.x), q[1] * T(q[3] - at.y), -T(T(q[0] * s.gravity) * height)});
     load.force_B = load.force_B + force;
-    load.moment_B = load.moment_B - cross(s.com_m, force);
+    load.moment_B = load.moment_B + cross(Vec3<T>{T(0), T(0), q[4]} - s.com_m, force);
   }
 };
 
