@@ -31,6 +31,9 @@ struct LaneMask {
   using Raw __attribute__((vector_size(N * sizeof(T)))) = Integer;
   Raw raw;  // all bits set or none, as a vector comparison gives them
 
+  static FLAPPY_INLINE LaneMask of(Raw holds) { return {holds}; }
+  static FLAPPY_INLINE LaneMask of(bool holds) requires(N == 1) { return {Raw{-Integer{holds}}}; }
+
   friend FLAPPY_INLINE LaneMask operator&(LaneMask a, LaneMask b) { return {a.raw & b.raw}; }
   friend FLAPPY_INLINE LaneMask operator|(LaneMask a, LaneMask b) { return {a.raw | b.raw}; }
   friend FLAPPY_INLINE LaneMask operator!(LaneMask a) { return {~a.raw}; }
@@ -82,12 +85,18 @@ struct Lanes {
   FLAPPY_INLINE Lanes& operator-=(P p) { return *this = *this - p; }
   FLAPPY_INLINE Lanes& operator*=(Lanes b) { return *this = *this * b; }
 
-  friend FLAPPY_INLINE Mask operator<(Lanes a, Lanes b) { return {a.raw < b.raw}; }
-  friend FLAPPY_INLINE Mask operator>(Lanes a, Lanes b) { return {a.raw > b.raw}; }
-  friend FLAPPY_INLINE Mask operator<=(Lanes a, Lanes b) { return {a.raw <= b.raw}; }
-  friend FLAPPY_INLINE Mask operator>=(Lanes a, Lanes b) { return {a.raw >= b.raw}; }
-
-  friend FLAPPY_INLINE Mask operator==(Lanes a, Lanes b) { return {a.raw == b.raw}; }
+  // One lane is compared and chosen as a number: the range propagation of gcc 12 gets the masks of such vectors wrong.
+  // With V and M vectors of one double and one long, at -O2 this gives 2 for V{-1}, not 1:
+  //   double f(V x) { M m = x < 0; return (long)m != 0 ? ((m & (x < 1)) ? V{1} : V{2})[0] : 3; }
+  FLAPPY_INLINE auto comparable() const {
+    if constexpr (N == 1) return raw[0];
+    else return raw;
+  }
+  friend FLAPPY_INLINE Mask operator<(Lanes a, Lanes b) { return Mask::of(a.comparable() < b.comparable()); }
+  friend FLAPPY_INLINE Mask operator>(Lanes a, Lanes b) { return Mask::of(a.comparable() > b.comparable()); }
+  friend FLAPPY_INLINE Mask operator<=(Lanes a, Lanes b) { return Mask::of(a.comparable() <= b.comparable()); }
+  friend FLAPPY_INLINE Mask operator>=(Lanes a, Lanes b) { return Mask::of(a.comparable() >= b.comparable()); }
+  friend FLAPPY_INLINE Mask operator==(Lanes a, Lanes b) { return Mask::of(a.comparable() == b.comparable()); }
 
   friend FLAPPY_INLINE Lanes where(Mask m, Lanes yes, Lanes no) { return select(m, yes, no); }
   friend FLAPPY_INLINE Lanes clamp(Lanes v, Lanes low, Lanes high) { return min(max(v, low), high); }
@@ -144,7 +153,7 @@ struct Lanes {
       else return Lanes((Raw)_mm512_maskz_min_pd(__mmask8(-1), (__m512d)a.raw, (__m512d)b.raw));
     }
 #endif
-    return select(Mask{a.raw < b.raw}, a, b);
+    return select(a < b, a, b);
   }
   friend FLAPPY_INLINE Lanes max(Lanes a, Lanes b) {
 #if defined(__AVX512F__)
@@ -153,9 +162,12 @@ struct Lanes {
       else return Lanes((Raw)_mm512_maskz_max_pd(__mmask8(-1), (__m512d)a.raw, (__m512d)b.raw));
     }
 #endif
-    return select(Mask{a.raw > b.raw}, a, b);
+    return select(a > b, a, b);
   }
-  friend FLAPPY_INLINE Lanes select(Mask m, Lanes yes, Lanes no) { return Lanes(m.raw ? yes.raw : no.raw); }
+  friend FLAPPY_INLINE Lanes select(Mask m, Lanes yes, Lanes no) {
+    if constexpr (N == 1) return m.raw[0] != 0 ? yes : no;
+    else return Lanes(m.raw ? yes.raw : no.raw);
+  }
   // What scalar.hpp says about bits, in every lane.
   using Unsigned = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
   using Bits __attribute__((vector_size(N * sizeof(T)))) = Unsigned;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "flight/fleets.hpp"
 #include "sim/randomise.hpp"
@@ -152,6 +153,43 @@ TEST(ClosedLoopDeterminism, Float) {
 TEST(ClosedLoopDeterminism, Double) {
   for (const Case& c : kCases) one_hash<double>(c, c.in_double);
 }
+
+constexpr std::uint64_t kGoldenTakeOffFloat = 0x85c399297d894f15;
+constexpr std::uint64_t kGoldenTakeOffDouble = 0x9b7f99f18726dd9b;
+
+/// Flappers that leave the ground; some of them, the first among them, fall back on it and leave it again.
+template <class T>
+Fleet<T> take_off(std::size_t count, const std::string& set) {
+  FleetOptions o = options("pid");
+  o.batch.threads = 1;
+  o.batch.instruction_set = set;
+  Fleet<T> fleet(count, test::identified(), o);
+  for (std::size_t i = 0; i < count; ++i) {
+    fleet.start(i, 0, {}, sim::Start::standing);
+    fleet.set_added(i, {9.5 + 0.5 * static_cast<double>(i), 0, 0, 0});
+  }
+  int falls_back = 0;
+  sim::Start support = sim::Start::standing;
+  for (int period = 0; period < 150; ++period) {
+    fleet.step();
+    const sim::Start before = std::exchange(support, fleet.batch().support(0));
+    falls_back += before == sim::Start::flying && support == sim::Start::standing;
+  }
+  EXPECT_EQ(falls_back, 1) << set;
+  return fleet;
+}
+
+template <class T>
+void one_take_off(std::uint64_t golden) {
+  for (const std::string& set : sim::instruction_sets()) {
+    const Fleet<T> fleet = take_off<T>(9, set);
+    EXPECT_EQ(fleet.hash(), golden) << set << ": 0x" << std::hex << fleet.hash();
+    EXPECT_EQ(take_off<T>(1, set).hash(), fleet.hash(0, 1)) << set << ", alone";
+  }
+}
+
+TEST(ClosedLoopDeterminism, TakeOffInFloat) { one_take_off<float>(kGoldenTakeOffFloat); }
+TEST(ClosedLoopDeterminism, TakeOffInDouble) { one_take_off<double>(kGoldenTakeOffDouble); }
 
 TEST(ClosedLoopDeterminism, HashSeesNoiseActionsAndTime) {
   const FleetOptions o = options("pid");

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "flappy/batch.hpp"
 #include "model/effects/registry.hpp"
@@ -156,6 +157,76 @@ void one_hash_of_affected(std::uint64_t golden) {
 
 TEST(Determinism, EffectsInFloat) { one_hash_of_affected<float>(kGoldenEffectsFloat); }
 TEST(Determinism, EffectsInDouble) { one_hash_of_affected<double>(kGoldenEffectsDouble); }
+
+// ---- leaving the ground, falling back on it, and touching it in flight
+
+constexpr std::uint64_t kGoldenGroundFloat = 0x4e70b70a22b58fa1;
+constexpr std::uint64_t kGoldenGroundDouble = 0x8b1e4bd51146e630;
+
+/// As many as fill blocks and leave some over.
+constexpr std::size_t kGrounded = 19;
+
+/// What became of flappers at the ground.
+struct Grounded {
+  std::vector<std::uint64_t> hashes;
+  int rises = 0, falls_back = 0;
+  std::size_t touches = 0;
+};
+
+/// Flappers [first, first + count): some sink onto the ground, the others stand on it and lift more or less of their weight.
+template <class T>
+Grounded at_ground(std::size_t first, std::size_t count, const std::string& instruction_set) {
+  BatchOptions options;
+  options.threads = 1;
+  options.instruction_set = instruction_set;
+  options.world.ground_z_m = 0;
+  Batch<T> batch(count, test::identified(), options);
+  std::vector<Start> support;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t id = first + i;
+    const bool sinks = id % 6 == 5;
+    FlapperState s;
+    s.position_m[2] = sinks ? 0.005 : 0;
+    support.push_back(sinks ? Start::flying : Start::standing);
+    batch.set_vehicle(i, vehicle(id));
+    batch.reset(i, s, support[i]);
+    batch.set_input(i, {sinks ? 0 : 11 + static_cast<double>(id % 8), 0.1, 0, 0});
+  }
+  Grounded g;
+  for (int period = 0; period < 70; ++period) {
+    batch.step(kSteps);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Start now = batch.support(i);
+      g.rises += support[i] == Start::standing && now == Start::flying;
+      g.falls_back += support[i] == Start::flying && now == Start::standing;
+      support[i] = now;
+    }
+  }
+  g.touches = batch.count_status(kTouchedGround);
+  for (std::size_t i = 0; i < count; ++i) g.hashes.push_back(batch.hash(i, i + 1));
+  return g;
+}
+
+template <class T>
+void one_hash_at_ground(std::uint64_t golden) {
+  for (const std::string& set : instruction_sets()) {
+    const Grounded g = at_ground<T>(0, kGrounded, set);
+    std::uint64_t all = 0;
+    for (const std::uint64_t h : g.hashes) all = all * 31 + h;
+    EXPECT_EQ(all, golden) << set << ": 0x" << std::hex << all;
+    EXPECT_GT(g.rises, 10) << set;
+    EXPECT_EQ(g.falls_back, 5) << set;
+    EXPECT_EQ(g.touches, 3u) << set;
+    for (const std::size_t i : {1, 7}) {  // without effects, and with one
+      const Grounded alone = at_ground<T>(i, 1, set);
+      EXPECT_EQ(alone.hashes[0], g.hashes[i]) << set << ", flapper " << i;
+      EXPECT_EQ(alone.falls_back, 1) << set << ", flapper " << i;
+    }
+  }
+}
+
+TEST(Determinism, GroundInFloat) { one_hash_at_ground<float>(kGoldenGroundFloat); }
+TEST(Determinism, GroundInDouble) { one_hash_at_ground<double>(kGoldenGroundDouble); }
 
 TEST(Determinism, HashSeesEveryNumber) {
   Batch<float> a = fly<float>(0, 2, 1, ""), b = fly<float>(0, 2, 1, "");

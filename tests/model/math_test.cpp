@@ -278,6 +278,29 @@ TEST(Lanes, AreScalarsInEverySlot) {
   expect_scalars_in_every_slot<double, 8>();
 }
 
+/// -1 below -1, 0 between that and 0, x elsewhere.
+template <class L>
+__attribute__((noinline)) L stepped_where_negative(L x) {
+  const auto negative = x < L(0);
+  if (!any(negative)) return x;
+  return where(negative & (x < L(-1)), L(-1), where(negative & (x > L(-1)), L(0), x));
+}
+template <class T, int N>
+void expect_steps() {
+  for (const double x : {-2.0, -0.5, 0.5}) {
+    const Lanes<T, N> got = stepped_where_negative(Lanes<T, N>(x));
+    for (int i = 0; i < N; ++i) EXPECT_EQ(got.raw[i], x < -1 ? -1 : x < 0 ? 0 : x) << N << " lanes";
+  }
+}
+
+// A mask may choose within a branch on it, in one lane too, which no vector unit has.
+TEST(Lanes, ChooseInABranchOnTheirMask) {
+  expect_steps<float, 1>();
+  expect_steps<float, 4>();
+  expect_steps<double, 1>();
+  expect_steps<double, 2>();
+}
+
 // A product that meets a sum is fused.
 TEST(Lanes, FuseWhatIsWritten) {
   using L = Lanes<double, 2>;
