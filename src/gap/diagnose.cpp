@@ -31,6 +31,9 @@ constexpr double kImperfect = 0.5;
 constexpr double kTermCost = 6;
 /// What was thought before any flight: how often a gap is of each kind.
 constexpr double kPriorNone = 0.1, kPriorParameters = 0.2, kPriorEffect = 0.55, kPriorUnknown = 0.15;
+/// Nats that an entry may gain on a robot without any effect, for two makers' models differ by more here and there than their
+/// floors say: so much of each entry's gain tells nothing.
+constexpr double kByChance = 20;
 /// For every further effect.
 constexpr double kPriorFurther = 0.1;
 
@@ -64,8 +67,9 @@ class Diagnoser {
     parameters_ = fitter_.refit(plain, parameters_, 4);
     d.parameters = parameters_;
     d.answers.push_back(weigh(Answer::Kind::none, {}, nominal, std::log(kPriorNone)));
+    plain_ = log_evidence(parameters_.point, 0);
     d.answers.push_back(weigh(Answer::Kind::parameters, {}, parameters_.point, std::log(kPriorParameters)));
-    Answer unknown = explain_freely(parameters_.point, std::log(kPriorUnknown));
+    Answer unknown = explain_freely(parameters_.point, 0, std::log(kPriorUnknown));
     const double parameters = d.answers[1].log_evidence;
 
     std::vector<Answer> singles;
@@ -76,7 +80,7 @@ class Diagnoser {
       if (static_cast<int>(i) < options_.finalists && s.gain > 0 &&
           progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + s.effect))
         a = fit_effects({s});
-      singles.push_back(vanished(a) ? leave_open(s, columns, parameters) : std::move(a));
+      singles.push_back(vanished(a) ? leave_open(s, columns) : std::move(a));
     }
     std::ranges::sort(singles, std::greater{}, &Answer::log_evidence);
     // further effects beside the best
@@ -98,7 +102,7 @@ class Diagnoser {
     const auto best = std::ranges::max_element(singles, {}, &Answer::log_evidence);
     if (best != singles.end() && best->fitted()) {
       const double log_prior = std::log(kPriorUnknown / static_cast<double>(model::effects().size()));
-      Answer beside = explain_freely(best->fit.point, log_prior);
+      Answer beside = explain_freely(best->fit.point, best->effects.size(), log_prior);
       if (!beside.terms.empty() && beside.log_evidence > unknown.log_evidence) unknown = std::move(beside);
       unknown.log_evidence -= kImperfect * std::max(0.0, best->log_evidence - parameters);
     }
@@ -162,8 +166,10 @@ class Diagnoser {
     return Evidence::posterior(evidence_.reduce(l.statistics, c.columns, use, sd), c.chosen, c.mean());
   }
 
-  /// Whatever models are mistaken by. `own`: of the effects in the hypothesis.
-  double log_evidence(const Linearised& l, const Columns& c, const Smooth& own) const {
+  /// Whatever models are mistaken by; of what so many effects gain over the parameters, what is more than chance.
+  double log_evidence(const Linearised& l, std::size_t effects) const {
+    const Columns c = columns_of(l);
+    const Smooth own = form_error(l);
     const Smooth floor = evidence_.floor();
     std::vector<double> each;
     for (const Mistaken& m : kMistaken)
@@ -171,7 +177,8 @@ class Diagnoser {
     const double most = *std::ranges::max_element(each);
     double sum = 0;
     for (const double e : each) sum += std::exp(e - most);
-    return most + std::log(sum);
+    const double all = most + std::log(sum), gain = all - plain_;
+    return effects == 0 ? all : plain_ + std::max(gain - kByChance * static_cast<double>(effects), std::min(gain, 0.0));
   }
 
   static Smooth together(const Smooth& a, const Smooth& b) { return (a.array().square() + b.array().square()).sqrt(); }
@@ -188,12 +195,12 @@ class Diagnoser {
     Answer a;
     a.kind = kind;
     a.effects = std::move(effects);
-    a.log_evidence = log_evidence(l, columns_of(l), form_error(l)) + log_prior;
+    a.log_evidence = log_evidence(l, a.effects.size()) + log_prior;
     return a;
   }
 
   /// Gives single functions of the regime in single channels more room than every model needs, as long as that pays.
-  Answer explain_freely(const Linearised& l, double log_prior) const {
+  Answer explain_freely(const Linearised& l, std::size_t effects, double log_prior) const {
     const Columns c = columns_of(l);
     const Smooth own = form_error(l);
     Smooth sd = together(evidence_.floor(), own);
@@ -235,7 +242,7 @@ class Diagnoser {
     if (terms.empty()) now -= cost;  // a cause has to show somewhere
     a.terms = std::move(terms);
     // what the terms gain, beside what is known without them
-    a.log_evidence = log_evidence(l, c, own) + now - before.log_evidence + log_prior;
+    a.log_evidence = log_evidence(l, effects) + now - before.log_evidence + log_prior;
     return a;
   }
 
@@ -360,7 +367,7 @@ class Diagnoser {
   }
 
   /// An entry that would gain nothing: what the flights do not tell of it stays as it was thought before.
-  Answer leave_open(const Screened& s, const std::vector<Column>& columns, double parameters) const {
+  Answer leave_open(const Screened& s, const std::vector<Column>& columns) const {
     Answer a;
     a.kind = Answer::Kind::effect;
     a.effects = {s.effect};
@@ -376,7 +383,7 @@ class Diagnoser {
     const double beyond =
         std::exp(-0.5 * t * t) / (std::sqrt(std::numbers::pi / 2) * std::erfc(-t / std::numbers::sqrt2));
     p.mean += p.covariance.col(first) / sd * (t > -5 ? beyond : -t);
-    a.log_evidence = parameters - std::log(kPriorParameters) + std::min(s.gain, 0.0) + log_prior_of_one();
+    a.log_evidence = plain_ + std::min(s.gain, 0.0) + log_prior_of_one();
     return a;
   }
 
@@ -466,6 +473,7 @@ class Diagnoser {
   mutable Evidence evidence_;
   Fitter fitter_;
   Fit parameters_;
+  double plain_ = 0;  ///< log evidence of the parameters alone
   bool stopped_ = false;
 };
 
