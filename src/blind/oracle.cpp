@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 using gap::Smooth;
 
 /// Sizes at which effects are tried: few do twice as much at twice the size. Those of sensors do.
-constexpr double kSizes[] = {0.25, 0.5, 1, 2, 4}, kSensorSizes[] = {1, 4}, kDelaySizes[] = {0.01, 0.03, 0.1};
+constexpr double kSizes[] = {0.25, 0.5, 1, 4}, kSensorSizes[] = {1, 4}, kDelaySizes[] = {0.01, 0.03, 0.1};
 /// A size is taken for this much, give or take, before any flight.
 constexpr double kSizeSd = 2;
 /// A typical size of the catalogue is a third of the end of its prior, 1.645 of its coordinate.
@@ -87,7 +87,9 @@ Oracle::Oracle(const Subject& subject, const sim::Randomisation& uncertain) {
       columns.push_back(std::move(axis));
     }
   }
-  information_ = subject.information(subject.parameters(uncertain), columns);
+  std::vector<Smooth> known = subject.parameters(uncertain);
+  for (Smooth& s : subject.background()) known.push_back(std::move(s));
+  information_ = subject.information(known, columns);
 }
 
 /// What an effect adds at any size, from those at which it was tried: in between and below, straight; empty beyond.

@@ -10,6 +10,7 @@
 #include "flappy/vehicle.hpp"
 #include "gap/fit.hpp"
 #include "io/files.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::blind {
 namespace {
@@ -19,8 +20,8 @@ using Eigen::MatrixXd;
 using gap::Signature;
 using gap::Smooth;
 
-/// Reach of a parameter's difference to either side, in standard deviations.
-constexpr double kReach = 0.5;
+/// Reach of a parameter's difference to either side, in standard deviations; of a size's, from none.
+constexpr double kReach = 0.5, kSizeReach = 0.4;
 /// How well a header says when a sample of the IMU was taken (gap/hypothesis.cpp), in steps of the record.
 constexpr int kLagSteps = 1;
 
@@ -189,6 +190,20 @@ std::vector<Smooth> Subject::catalogue(const std::string& effect,
   for (Signature& left : gap::Fitter(flights_, *evidence_, threads_).residuals(candidates)) {
     const Signature change = difference(left_, left);
     result.push_back(change.empty() ? Smooth() : evidence_->smooth(change));
+  }
+  return result;
+}
+
+std::vector<Smooth> Subject::background() const {
+  std::vector<Smooth> result;
+  for (const model::EffectEntry& e : model::effects()) {
+    const std::vector<gap::Unknown> unknowns = gap::unknowns_of(e.info.id);
+    const auto n = static_cast<Index>(unknowns.size());
+    std::vector<Eigen::VectorXd> axes;
+    for (Index i = 0; i < n; ++i)
+      if (unknowns[static_cast<std::size_t>(i)].size) axes.emplace_back(kSizeReach * Eigen::VectorXd::Unit(n, i));
+    for (const Smooth& s : catalogue(e.info.id, axes))
+      if (s.size() > 0) result.emplace_back(gap::background_sd(e.info.id) / kSizeReach * s);
   }
   return result;
 }

@@ -105,7 +105,7 @@ constexpr Background kBackground[] = {{"body_drag", 0.19},        {"wing_inertia
                                       {"wall_effect", 0.06},      {"wing_flexibility", 0.05}, {"wind", 0.05},
                                       {"tether", 0.04},           {"gyro_bias", 0.04},        {"ceiling_effect", 0.035},
                                       {"marker_offset", 0.03}};
-constexpr double kLeastBackground = 0.02;
+constexpr double kLeastBackground = 0.005;
 
 }  // namespace
 

@@ -6,9 +6,9 @@ include(${CMAKE_CURRENT_LIST_DIR}/program.cmake)
 
 run(blind make --out ${WORK}/bench --set development --cases 2
   --part singles singles_current none parameters withheld pairs)
-expect_equal("exit code of make" "${code}" 0)
+expect_equal("exit code of make, which says ${err}" "${code}" 0)
 run(blind score ${WORK}/bench --json ${WORK}/bench.json)
-expect_equal("exit code of score" "${code}" 0)
+expect_equal("exit code of score, which says ${err}" "${code}" 0)
 expect_keys(${WORK}/bench.json cases=NUMBER top1_mocap_imu=NUMBER top1_current=NUMBER group_top1=NUMBER top3=NUMBER
   false_alarm=NUMBER withheld_unknown=NUMBER withheld_confidently_wrong=NUMBER ece=NUMBER pairs_f1=NUMBER hover_abstain=NULL)
 file(STRINGS ${WORK}/bench/score.csv lines)
