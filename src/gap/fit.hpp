@@ -52,11 +52,11 @@ class Fitter {
   Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int iterations) const;
   /// From `start` on, beside another fit: its parameters keep their directions and derivatives.
   Fit fit(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters, int iterations) const;
+  /// The same, from where another fit ended, along its directions.
+  Fit refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const;
   /// Without any effect's size, taken as linear in the hypothesis' own unknowns, whose columns are given (empty: unseen), beside
   /// a fit of the parameters. No residual.
   Fit linear(const Hypothesis& hypothesis, const Fit& parameters, const std::vector<Smooth>& own) const;
-  /// The same, from where another fit ended, along its directions.
-  Fit refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const;
 
  private:
   static Directions beside(const Hypothesis& hypothesis, const Fit& parameters);
