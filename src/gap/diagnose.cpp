@@ -22,13 +22,13 @@ constexpr double kEffectReach = 0.4;
 constexpr double kLeastFurther = 8;
 /// A coordinate of a size that is as good as 0.
 constexpr double kVanished = 0.005;
-/// Shares of the signal that a term which no entry explains may have.
-constexpr double kUnexplained[] = {0.003, 0.01, 0.03, 0.1};
+/// How much larger than what every model gets wrong a term which no entry explains may be.
+constexpr double kUnexplained[] = {2, 4, 8, 16};
 constexpr int kMostTerms = 12;
 /// Share of what the best entry explains that its imperfect equation may leave to others before the cause counts as unknown.
 constexpr double kImperfect = 0.5;
 /// Nats that a term has to bring beyond those of choosing it: single floors are exceeded now and then.
-constexpr double kTermCost = 6;
+constexpr double kTermCost = 10;
 /// What was thought before any flight: how often a gap is of each kind.
 constexpr double kPriorNone = 0.1, kPriorParameters = 0.2, kPriorEffect = 0.55, kPriorUnknown = 0.15;
 /// Nats that an entry may gain on a robot without any effect, for two makers' models differ by more here and there than their
@@ -199,50 +199,70 @@ class Diagnoser {
     return a;
   }
 
-  /// Gives single functions of the regime in single channels more room than every model needs, as long as that pays.
+  /// All terms that there may be, and what choosing one of its kind costs.
+  std::vector<std::pair<Term, double>> all_terms() const {
+    std::vector<std::pair<Term, double>> all;
+    for (const bool every_channel : {false, true})
+      for (const bool every_harmonic : {false, true}) {
+        const std::size_t first = all.size();
+        for (int channel = 0; channel < (every_channel ? 1 : kChannels); ++channel)
+          for (int harmonic = 0; harmonic <= (every_harmonic ? 0 : kHarmonics); ++harmonic) {
+            const Term t{every_channel ? Term::kAll : channel, every_harmonic ? Term::kAll : harmonic};
+            double signal = 0;
+            for (int g = 0; g < kGroups; ++g)
+              if (t.has(g) && has_rows(g / kCoefficients, g % kCoefficients)) signal += evidence_.signal(g);
+            for (int f = 0; signal > 0 && f < evidence_.basis().size(); ++f)
+              all.emplace_back(Term{t.channel, t.harmonic, f}, 0);
+          }
+        constexpr double kKinds = 4;
+        for (std::size_t i = first; i < all.size(); ++i)
+          all[i].second =
+              std::log(kKinds * static_cast<double>(std::size(kUnexplained) * (all.size() - first))) + kTermCost;
+      }
+    return all;
+  }
+
+  /// Gives single functions of the regime more room than every model needs, as long as that pays.
   Answer explain_freely(const Linearised& l, std::size_t effects, double log_prior) const {
     const Columns c = columns_of(l);
-    const Smooth own = form_error(l);
-    Smooth sd = together(evidence_.floor(), own);
-    const Index q = evidence_.basis().size();
-    const Posterior before = posterior(l, c, all_, sd);
-    double now = before.log_evidence;
+    const Smooth floor = evidence_.floor();
+    Smooth sd = together(floor, form_error(l));
+    Posterior now = posterior(l, c, all_, sd);
     Answer a;
     a.kind = Answer::Kind::unknown;
-    Statistics settled = l.statistics;  // with the columns where they are most probable
-    for (std::size_t k = 0; k < c.columns.size(); ++k)
-      evidence_.add(-before.mean[static_cast<Index>(k)], *c.columns[k], settled);
-    const double cost = std::log(static_cast<double>(kChannels * q * std::size(kUnexplained))) + kTermCost;
-    const VectorXd shares = Eigen::Map<const VectorXd>(kUnexplained, std::size(kUnexplained));
-    std::vector<MatrixXd> gains(kChannels);  // found anew where the room changed
-    std::vector<Term> terms;
+    double gained = 0, dearest = 0;
+    const auto all = all_terms();
     for (int n = 0; n < kMostTerms; ++n) {
-      Term best{0, 0, 0, 0};
-      for (int channel = 0; channel < kChannels; ++channel) {
-        MatrixXd& g = gains[static_cast<std::size_t>(channel)];
-        if (g.size() == 0) g = evidence_.local_gains(settled, all_, sd, channel, shares);
-        Index function = 0, share = 0;
-        if (const double gain = g.maxCoeff(&function, &share); gain > best.gain)
-          best = {channel, static_cast<int>(function), shares[share], gain};
+      Statistics settled = l.statistics;  // with the columns where they are most probable
+      for (std::size_t k = 0; k < c.columns.size(); ++k)
+        evidence_.add(-now.mean[static_cast<Index>(k)], *c.columns[k], settled);
+      Term best;
+      double best_cost = 0;
+      best.gain = -1e300;
+      for (const double times : kUnexplained) {
+        const Smooth gains = evidence_.local_gains(settled, all_, sd, times * floor);
+        for (const auto& [term, cost] : all) {
+          double gain = -cost;
+          for (int g = 0; g < kGroups; ++g)
+            if (term.has(g)) gain += gains(g, term.function);
+          if (gain > best.gain) best = {term.channel, term.harmonic, term.function, times, gain}, best_cost = cost;
+          dearest = std::max(dearest, cost);
+        }
       }
-      if (best.gain <= 0) break;
       Smooth room = sd;
-      for (int k = 0; k < kCoefficients; ++k) {
-        const int g = best.channel * kCoefficients + k;
-        room(g, best.function) = std::hypot(sd(g, best.function), best.share * evidence_.signal(g));
-      }
-      const double next = posterior(l, c, all_, room).log_evidence - cost;
-      if (next < now) break;
-      best.gain = next - now;
-      now = next;
+      for (int g = 0; g < kGroups; ++g)
+        if (best.has(g)) room(g, best.function) = std::hypot(sd(g, best.function), best.times * floor(g, best.function));
+      Posterior next = posterior(l, c, all_, room);
+      best.gain = next.log_evidence - now.log_evidence - best_cost;
+      if (best.gain < 0) break;
+      gained += best.gain;
+      now = std::move(next);
       sd = room;
-      gains[static_cast<std::size_t>(best.channel)].resize(0, 0);
-      terms.push_back(best);
+      a.terms.push_back(best);
     }
-    if (terms.empty()) now -= cost;  // a cause has to show somewhere
-    a.terms = std::move(terms);
+    if (a.terms.empty()) gained = -dearest;  // a cause has to show somewhere
     // what the terms gain, beside what is known without them
-    a.log_evidence = log_evidence(l, effects) + now - before.log_evidence + log_prior;
+    a.log_evidence = log_evidence(l, effects) + gained + log_prior;
     return a;
   }
 

@@ -10,11 +10,17 @@
 
 namespace flappy::gap {
 
-/// What no entry explains: a smooth function of the regime in a channel.
+/// What no entry explains: a smooth function of the regime, in a channel and a harmonic of the beat, or in all of them.
 struct Term {
-  int channel = 0, function = 0;  ///< of the basis
-  double share = 0;               ///< of the signal, how large it may be
-  double gain = 0;                ///< nats
+  int channel = kAll, harmonic = kAll;
+  int function = 0;  ///< of the basis
+  double times = 0;  ///< how much larger it may be than what every model gets wrong
+  double gain = 0;   ///< nats
+  static constexpr int kAll = -1;
+  bool has(int group) const {
+    return (channel == kAll || group / kCoefficients == channel) &&
+           (harmonic == kAll || (group % kCoefficients + 1) / 2 == harmonic);
+  }
 };
 
 /// What explains the flights, one of several answers that exclude each other.

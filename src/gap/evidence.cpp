@@ -279,21 +279,19 @@ Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smo
   return result;
 }
 
-MatrixXd Evidence::local_gains(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd,
-                               int channel, const VectorXd& shares) const {
-  MatrixXd gains = MatrixXd::Zero(basis_.size(), shares.size());
-  for (int g = channel * kCoefficients; g < (channel + 1) * kCoefficients; ++g) {
+Smooth Evidence::local_gains(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd,
+                             const Smooth& more_sd) const {
+  Smooth gains = Smooth::Zero(kGroups, basis_.size());
+  for (int g = 0; g < kGroups; ++g) {
     const auto [normal, right] = sums_of(residual, use, g);
     if (normal(0, 0) == 0) continue;
     const WithoutEta without(normal, eta_sd.row(g).transpose());
     // one more coefficient, beside those that were there
     const VectorXd known = normal.diagonal() - without.half.colwise().squaredNorm().transpose();
     const VectorXd left = right - without.half.transpose() * without.of(right);
-    for (Index s = 0; s < shares.size(); ++s) {
-      const double more = shares[s] * groups_[static_cast<std::size_t>(g)].signal;
-      const Eigen::ArrayXd information = more * more * known.array(), score = more * left.array();
-      gains.col(s).array() += 0.5 * (score.square() / (1 + information) - information.log1p());
-    }
+    const Eigen::ArrayXd more = more_sd.row(g).transpose().array();
+    const Eigen::ArrayXd information = more.square() * known.array(), score = more * left.array();
+    gains.row(g) = (0.5 * (score.square() / (1 + information) - information.log1p())).transpose();
   }
   return gains;
 }

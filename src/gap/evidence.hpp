@@ -83,10 +83,10 @@ class Evidence {
   /// `use`: which flights. `eta_sd`: of eta's coefficients.
   Reduced reduce(const Statistics& residual, const std::vector<const Smooth*>& columns, const std::vector<char>& use,
                  const Smooth& eta_sd) const;
-  /// What log p gains when eta of one function in one channel may be as large as a share of the signal besides, while the
-  /// columns stay as they are: [function][share].
-  Eigen::MatrixXd local_gains(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd,
-                              int channel, const Eigen::VectorXd& shares) const;
+  /// What log p gains when a coefficient of eta, each for itself, may be as large as `more_sd` besides, while the columns
+  /// stay as they are.
+  Smooth local_gains(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd,
+                     const Smooth& more_sd) const;
   /// Of the chosen columns, whose theta has the given prior means and sd 1.
   static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns,
                              const Eigen::VectorXd& prior_mean);

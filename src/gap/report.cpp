@@ -106,7 +106,10 @@ Report report_of(const std::vector<std::string>& names, const std::vector<Carrie
     }
     if (a.kind == Answer::Kind::unknown) {
       const RegimeBasis basis(flights);
-      for (const Term& t : a.terms) r.unexplained.push_back({t.channel, basis.name(t.function), t.share, t.gain});
+      for (const Term& t : a.terms)
+        r.unexplained.push_back({t.channel == Term::kAll ? "all" : channel_name(t.channel),
+                                 t.harmonic == Term::kAll ? "all" : std::to_string(t.harmonic), basis.name(t.function),
+                                 t.times, t.gain});
     }
     (effect ? r.candidates : others).push_back(std::move(c));
   }

@@ -43,9 +43,9 @@ struct Moved {
 
 /// A function of the regime that nothing of the catalogue explains.
 struct Unexplained {
-  int channel = 0;
-  std::string function;
-  double share = 0, gain = 0;
+  std::string channel, harmonic, function;  ///< the first two may be "all"
+  double times = 0;                         ///< of what every model gets wrong
+  double gain = 0;                          ///< nats
 };
 
 struct Report {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "model/effects/registry.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::blind {
@@ -171,6 +172,24 @@ TEST(OracleSubject, SensorsDoNotChangeTheFlight) {
   EXPECT_NE(f.log.imu, plain.log.imu);
   EXPECT_NE(f.log.mocap, plain.log.mocap);
   for (std::size_t k = 0; k < 22; ++k) EXPECT_EQ(f.truth[k], plain.truth[k]) << k;
+}
+
+// With j = b' C^-1 b of a column b of the background, what is known of a coefficient of b beside one of variance 1 is
+// j/(1 + j): less than the little that every vehicle has says nothing.
+TEST(OracleSubject, LessThanEveryVehicleHasSaysNothing) {
+  const Case c = flown({});
+  const Subject subject(c, fly_all(c, 2), 2);
+  const std::vector<gap::Smooth> background = subject.background();
+  std::size_t sizes = 0;
+  for (const model::EffectEntry& e : model::effects()) sizes += static_cast<std::size_t>(e.info.sizes);
+  ASSERT_EQ(background.size(), sizes);
+  const std::vector<gap::Smooth> some = {background.front(), background[sizes / 2], background.back()};
+  const MatrixXd alone = subject.information({}, some)[0], beside = subject.information(background, some)[0];
+  for (Index i = 0; i < 3; ++i) {
+    EXPECT_GT(alone(i, i), beside(i, i));
+    EXPECT_LT(beside(i, i), 1);
+    EXPECT_GT(beside(i, i), 0);
+  }
 }
 
 // Effects whose size both sides state in the same units: the entry comes out as what was put in. Poses

@@ -127,7 +127,7 @@ void one_hash(const Case& c, std::uint64_t golden) {
   const bool acting = std::string(c.name) == "actor";
   std::uint64_t small = 0;
   for (const std::string& set : sim::instruction_sets())
-    for (const int threads : {1, 2, 3, 16}) {
+    for (const int threads : {1, 3, 16}) {
       const Fleet<T> fleet = fly<T>(o, acting, 0, kFlappers, threads, set);
       EXPECT_EQ(fleet.hash(), golden) << c.name << ", " << set << ", " << threads << " threads: 0x" << std::hex
                                       << fleet.hash();
@@ -136,15 +136,14 @@ void one_hash(const Case& c, std::uint64_t golden) {
       for (std::size_t i = 0; i < kSmall; ++i) small = small * 31 + fleet.hash(i, i + 1);
     }
   for (const std::string& set : sim::instruction_sets())
-    for (const int threads : {1, 2, 3, 16})
-      for (const std::size_t size : {std::size_t{1}, std::size_t{17}}) {
-        std::uint64_t all = 0;
-        for (std::size_t first = 0; first < kSmall; first += size) {
-          const Fleet<T> fleet = fly<T>(o, acting, first, size, threads, set);
-          for (std::size_t i = 0; i < size; ++i) all = all * 31 + fleet.hash(i, i + 1);
-        }
-        EXPECT_EQ(all, small) << c.name << ", " << set << ", batches of " << size;
+    for (const std::size_t size : {std::size_t{1}, std::size_t{17}}) {
+      std::uint64_t all = 0;
+      for (std::size_t first = 0; first < kSmall; first += size) {
+        const Fleet<T> fleet = fly<T>(o, acting, first, size, 2, set);
+        for (std::size_t i = 0; i < size; ++i) all = all * 31 + fleet.hash(i, i + 1);
       }
+      EXPECT_EQ(all, small) << c.name << ", " << set << ", batches of " << size;
+    }
 }
 
 TEST(ClosedLoopDeterminism, Float) {

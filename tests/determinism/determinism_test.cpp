@@ -83,7 +83,7 @@ template <class T>
 void one_hash(std::uint64_t golden) {
   std::uint64_t small = 0;
   for (const std::string& set : instruction_sets())
-    for (const int threads : {1, 2, 3, 16}) {
+    for (const int threads : {1, 3, 16}) {
       const Batch<T> batch = fly<T>(0, kFlappers, threads, set);
       EXPECT_EQ(batch.hash(), golden) << set << ", " << threads << " threads: 0x" << std::hex << batch.hash();
       EXPECT_EQ(batch.count_status(kFrozen), 0u);
@@ -91,9 +91,8 @@ void one_hash(std::uint64_t golden) {
       for (std::size_t i = 0; i < kSmall; ++i) small = small * 31 + batch.hash(i, i + 1);
     }
   for (const std::string& set : instruction_sets())
-    for (const int threads : {1, 2, 3, 16})
-      for (const std::size_t size : {std::size_t{1}, std::size_t{17}})
-        EXPECT_EQ(hash_in_batches_of<T>(size, threads, set), small) << set << ", batches of " << size;
+    for (const std::size_t size : {std::size_t{1}, std::size_t{17}})
+      EXPECT_EQ(hash_in_batches_of<T>(size, 2, set), small) << set << ", batches of " << size;
 }
 
 TEST(Determinism, Float) { one_hash<float>(kGoldenFloat); }

@@ -99,10 +99,9 @@ void write_tables(const std::filesystem::path& folder, const Report& r) {
   }
   io::write_atomically(folder / "candidates.csv", candidates);
 
-  std::string terms = "channel,function,share_of_signal,gain_nats\n";
+  std::string terms = "channel,harmonic,function,times_usual,gain_nats\n";
   for (const Unexplained& u : r.unexplained)
-    terms +=
-        std::string(channel_name(u.channel)) + "," + u.function + "," + digits(u.share) + "," + digits(u.gain) + "\n";
+    terms += u.channel + "," + u.harmonic + "," + u.function + "," + digits(u.times) + "," + digits(u.gain) + "\n";
   io::write_atomically(folder / "unexplained.csv", terms);
 }
 

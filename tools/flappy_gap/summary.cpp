@@ -18,6 +18,12 @@ std::string listed(const std::vector<std::string>& words, const char* last) {
   return all;
 }
 
+std::string place_of(const Unexplained& u) {
+  if (u.harmonic == "all") return u.channel == "all" ? "all channels" : u.channel;
+  return (u.channel == "all" ? "all channels, " : u.channel + ", ") +
+         (u.harmonic == "0" ? "mean" : "harmonic " + u.harmonic);
+}
+
 std::string verdict_line(const Conclusion& c) {
   const double p = c.probability;
   switch (c.kind) {
@@ -119,9 +125,9 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   if (r.conclusion.kind == Conclusion::Kind::unknown && !r.unexplained.empty()) {
     lines.push_back("what is left depends on:");
     for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
-      lines.push_back(format("  %s on %s, %.0f %% of the signal or so (%.0f nats)",
-                             channel_name(r.unexplained[i].channel), r.unexplained[i].function.c_str(),
-                             100 * r.unexplained[i].share, r.unexplained[i].gain));
+      lines.push_back(format("  %s on %s, %.0f times what models usually get wrong (%.0f nats)",
+                             place_of(r.unexplained[i]).c_str(), r.unexplained[i].function.c_str(),
+                             r.unexplained[i].times, r.unexplained[i].gain));
   }
   std::string others;
   std::size_t shown = 0;
