@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <optional>
 
 #include "gap/model_error.hpp"
 #include "model/effects/registry.hpp"
@@ -24,7 +26,7 @@ constexpr double kLeastFurther = 8;
 constexpr double kVanished = 0.005;
 /// How much larger than what every model gets wrong a term which no entry explains may be.
 constexpr double kUnexplained[] = {2, 4, 8, 16};
-constexpr int kMostTerms = 12;
+constexpr int kMostTerms = 12, kTried = 3;
 /// Share of what the best entry explains that its imperfect equation may leave to others before the cause counts as unknown.
 constexpr double kImperfect = 0.5;
 /// Nats that a term has to bring beyond those of choosing it: single floors are exceeded now and then.
@@ -199,25 +201,29 @@ class Diagnoser {
     return a;
   }
 
-  /// All terms that there may be, and what choosing one of its kind costs.
-  std::vector<std::pair<Term, double>> all_terms() const {
-    std::vector<std::pair<Term, double>> all;
+  struct Possible {
+    Term term;
+    double cost;  ///< nats of choosing it
+  };
+
+  /// All terms that there may be.
+  std::vector<Possible> possible_terms() const {
+    std::vector<Possible> all;
     for (const bool every_channel : {false, true})
       for (const bool every_harmonic : {false, true}) {
         const std::size_t first = all.size();
         for (int channel = 0; channel < (every_channel ? 1 : kChannels); ++channel)
           for (int harmonic = 0; harmonic <= (every_harmonic ? 0 : kHarmonics); ++harmonic) {
-            const Term t{every_channel ? Term::kAll : channel, every_harmonic ? Term::kAll : harmonic};
+            Term t{every_channel ? Term::kAll : channel, every_harmonic ? Term::kAll : harmonic};
             double signal = 0;
             for (int g = 0; g < kGroups; ++g)
               if (t.has(g) && has_rows(g / kCoefficients, g % kCoefficients)) signal += evidence_.signal(g);
-            for (int f = 0; signal > 0 && f < evidence_.basis().size(); ++f)
-              all.emplace_back(Term{t.channel, t.harmonic, f}, 0);
+            for (t.function = 0; signal > 0 && t.function < evidence_.basis().size(); ++t.function)
+              for (const double times : kUnexplained) all.push_back({{t.channel, t.harmonic, t.function, times}, 0});
           }
         constexpr double kKinds = 4;
         for (std::size_t i = first; i < all.size(); ++i)
-          all[i].second =
-              std::log(kKinds * static_cast<double>(std::size(kUnexplained) * (all.size() - first))) + kTermCost;
+          all[i].cost = std::log(kKinds * static_cast<double>(all.size() - first)) + kTermCost;
       }
     return all;
   }
@@ -230,37 +236,44 @@ class Diagnoser {
     Posterior now = posterior(l, c, all_, sd);
     Answer a;
     a.kind = Answer::Kind::unknown;
-    double gained = 0, dearest = 0;
-    const auto all = all_terms();
+    double gained = 0;
+    std::vector<Possible> possible = possible_terms();
     for (int n = 0; n < kMostTerms; ++n) {
       Statistics settled = l.statistics;  // with the columns where they are most probable
       for (std::size_t k = 0; k < c.columns.size(); ++k)
         evidence_.add(-now.mean[static_cast<Index>(k)], *c.columns[k], settled);
-      Term best;
-      double best_cost = 0;
-      best.gain = -1e300;
-      for (const double times : kUnexplained) {
-        const Smooth gains = evidence_.local_gains(settled, all_, sd, times * floor);
-        for (const auto& [term, cost] : all) {
-          double gain = -cost;
-          for (int g = 0; g < kGroups; ++g)
-            if (term.has(g)) gain += gains(g, term.function);
-          if (gain > best.gain) best = {term.channel, term.harmonic, term.function, times, gain}, best_cost = cost;
-          dearest = std::max(dearest, cost);
-        }
+      std::map<double, Smooth> gains;
+      for (const double times : kUnexplained) gains[times] = evidence_.local_gains(settled, all_, sd, times * floor);
+      for (Possible& p : possible) {
+        p.term.gain = -p.cost;
+        for (int g = 0; g < kGroups; ++g)
+          if (p.term.has(g)) p.term.gain += gains[p.term.times](g, p.term.function);
       }
-      Smooth room = sd;
-      for (int g = 0; g < kGroups; ++g)
-        if (best.has(g)) room(g, best.function) = std::hypot(sd(g, best.function), best.times * floor(g, best.function));
-      Posterior next = posterior(l, c, all_, room);
-      best.gain = next.log_evidence - now.log_evidence - best_cost;
-      if (best.gain < 0) break;
-      gained += best.gain;
-      now = std::move(next);
-      sd = room;
-      a.terms.push_back(best);
+      std::ranges::partial_sort(possible, possible.begin() + kTried, std::greater{},
+                                [](const Possible& p) { return p.term.gain; });
+      // of the first, what they gain with columns that follow
+      std::optional<Term> best;
+      Smooth best_sd;
+      Posterior best_posterior;
+      for (int i = 0; i < kTried; ++i) {
+        Term t = possible[static_cast<std::size_t>(i)].term;
+        Smooth room = sd;
+        for (int g = 0; g < kGroups; ++g)
+          if (t.has(g)) room(g, t.function) = std::hypot(sd(g, t.function), t.times * floor(g, t.function));
+        Posterior p = posterior(l, c, all_, room);
+        t.gain = p.log_evidence - now.log_evidence - possible[static_cast<std::size_t>(i)].cost;
+        if (best && t.gain <= best->gain) continue;
+        best = t;
+        best_sd = std::move(room);
+        best_posterior = std::move(p);
+      }
+      if (best->gain < 0) break;
+      gained += best->gain;
+      sd = std::move(best_sd);
+      now = std::move(best_posterior);
+      a.terms.push_back(*best);
     }
-    if (a.terms.empty()) gained = -dearest;  // a cause has to show somewhere
+    if (a.terms.empty()) gained = -possible.front().cost;  // a cause has to show somewhere
     // what the terms gain, beside what is known without them
     a.log_evidence = log_evidence(l, effects) + gained + log_prior;
     return a;
@@ -279,7 +292,7 @@ class Diagnoser {
     std::vector<Candidate> candidates;
     for (const model::EffectEntry& e : model::effects()) {
       const std::string id = e.info.id;
-      if (std::ranges::count(beside, id)) continue;
+      if (std::ranges::count(beside, id) || std::ranges::count(options_.withheld, id)) continue;
       std::vector<std::string> set = beside;
       set.push_back(id);
       const Hypothesis h(uncertain_, set);
@@ -308,8 +321,7 @@ class Diagnoser {
     std::vector<std::string> names;
     for (const Column& column : columns) {
       c.add(column.change, 0);
-      const bool new_name = names.empty() || names.back() != column.effect;
-      if (new_name && !std::ranges::count(options_.withheld, column.effect)) names.push_back(column.effect);
+      if (names.empty() || names.back() != column.effect) names.push_back(column.effect);
     }
     const Reduced reduced = evidence_.reduce(fit.point.statistics, c.columns, all_, evidence_.floor());
     const VectorXd mean = c.mean();

@@ -199,7 +199,7 @@ TEST_F(Benchmark, PlansEveryPart) {
   }
   const std::map<std::string, std::size_t> expected = {{"singles", 145},   {"singles_current", 145}, {"none", 40},
                                                        {"parameters", 40}, {"withheld", 60},         {"pairs", 40},
-                                                       {"hover", 30},      {"typical", 90}};
+                                                       {"hover", 30},      {"typical", 60}};
   EXPECT_EQ(count, expected);
   EXPECT_EQ(outside, 30U);
   EXPECT_EQ(numbers.size(), plan.size());

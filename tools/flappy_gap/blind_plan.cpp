@@ -12,7 +12,7 @@ namespace {
 /// First seeds. Robots flown by hand and by the oracle have seeds below; a part has 1,000.
 constexpr std::uint64_t kDevelopment = 10001, kReported = 700001, kSeedsOfAPart = 1000;
 constexpr std::size_t kSingles = 5, kNone = 40, kParameters = 40, kWithheld = 30, kOutside = 30, kPairs = 40,
-                      kHover = 6, kTypical = 3;
+                      kHover = 6, kTypical = 2;
 constexpr double kOverDetectable = 2, kLargest = 4;
 /// Of effects outside the catalogue of which the table says nothing.
 constexpr double kOutsideSize = 2;
