@@ -100,11 +100,11 @@ struct Background {
   const char* effect;
   double sd;
 };
-constexpr Background kBackground[] = {{"body_drag", 0.19},        {"wing_inertia", 0.18},     {"wake_capture", 0.16},
-                                      {"coulomb_friction", 0.13}, {"stop_compliance", 0.09},  {"clap_and_fling", 0.08},
-                                      {"wall_effect", 0.06},      {"wing_flexibility", 0.05}, {"wind", 0.05},
-                                      {"tether", 0.04},           {"gyro_bias", 0.04},        {"ceiling_effect", 0.035},
-                                      {"marker_offset", 0.03}};
+constexpr Background kBackground[] = {{"body_drag", 0.19},       {"wing_inertia", 0.18},    {"wake_capture", 0.1},
+                                      {"coulomb_friction", 0.1}, {"stop_compliance", 0.06}, {"wing_flexibility", 0.05},
+                                      {"tether", 0.04},          {"gear_backlash", 0.03},   {"driver_bandwidth", 0.025},
+                                      {"added_mass", 0.025},     {"wing_damage", 0.02},     {"ceiling_effect", 0.02},
+                                      {"battery_sag", 0.015}};
 constexpr double kLeastBackground = 0.005;
 
 }  // namespace
