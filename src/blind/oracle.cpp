@@ -121,9 +121,23 @@ double Oracle::best_gain(const VectorXd& truth, Effect hypothesis, const std::ve
   return best;
 }
 
+/// The effect itself as a hypothesis. Differences of carried flights are rough (gap/fit.hpp), the same way wherever they come
+/// from the same flights; so nothing is held against its own: columns are of the sizes tried that the truth is not made of.
+double Oracle::own_gain(const VectorXd& d, Effect truth, double size) const {
+  const Columns& c = effects_[static_cast<std::size_t>(truth)];
+  std::vector<VectorXd> columns;
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < c.at.size(); ++i) {
+    if (d[c.at[i]] != 0) continue;
+    columns.emplace_back(VectorXd::Unit(width(), c.at[i]));
+    sizes.push_back(c.sizes[i]);
+  }
+  return columns.empty() ? best_gain(d, truth, {d}, {size}) : best_gain(d, truth, columns, sizes);
+}
+
 double Oracle::gain(Effect truth, double size) const {
   const VectorXd d = truth_of(truth, size);
-  return d.size() == 0 ? 0 : best_gain(d, truth, {d}, {size});
+  return d.size() == 0 ? 0 : own_gain(d, truth, size);
 }
 
 double Oracle::gain_over(Effect truth, double size, Effect rival) const {
@@ -132,7 +146,7 @@ double Oracle::gain_over(Effect truth, double size, Effect rival) const {
   const Columns& c = effects_[static_cast<std::size_t>(rival)];
   std::vector<VectorXd> columns;
   for (const int at : c.at) columns.emplace_back(VectorXd::Unit(width(), at));
-  return best_gain(d, truth, {d}, {size}) - best_gain(d, rival, columns, c.sizes);
+  return own_gain(d, truth, size) - best_gain(d, rival, columns, c.sizes);
 }
 
 double Oracle::detectable(Effect effect, double nats) const {

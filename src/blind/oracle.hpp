@@ -107,6 +107,7 @@ class Oracle {
 
  private:
   Eigen::VectorXd truth_of(Effect effect, double size) const;
+  double own_gain(const Eigen::VectorXd& d, Effect truth, double size) const;
   double best_gain(const Eigen::VectorXd& truth, Effect hypothesis, const std::vector<Eigen::VectorXd>& columns,
                    const std::vector<double>& sizes) const;
   Eigen::Index width() const { return information_[0].rows(); }

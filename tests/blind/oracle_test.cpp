@@ -81,12 +81,15 @@ TEST(Oracle, FindsTheSizeAndTheRivals) {
       0, 0, 0, 0, 1;
   const auto of = [&](double information) { return MatrixXd(information * rows.transpose() * rows); };
   const Oracle oracle(effects, {of(300), of(200), of(200), of(200)});
-  // F = 300 d^2 and 200 d^2 with d = size up to 1, in between 2 size - 1; prior precision size^2/4 of a coefficient
+  // the truth goes d = size along x up to 1, from there 2 size - 1; the hypothesis, of the size tried that the truth is not
+  // made of, m, with prior precision of its coefficient size^2/4
   const auto expected = [](double size) {
-    const double d = size <= 1 ? size : 2 * size - 1, prior = size * size / 4;
-    const auto total = [&](double share) {
-      const double f = share * d * d;
-      return 0.5 * (f * f / (f + prior) + f / (f + prior) - std::log1p(f / prior));
+    const double d = size <= 1 ? size : 2 * size - 1;
+    const double m = size <= 1 ? 3 : size < 2 ? d : 1, tried = size <= 1 ? 2 : size < 2 ? size : 1;
+    const double prior = tried * tried / 4;
+    const auto total = [&](double information) {
+      const double a = information * m * m, f = information * m * d;
+      return 0.5 * (f * f / (a + prior) + a / (a + prior) - std::log1p(a / prior));
     };
     return total(300) - total(200);
   };
