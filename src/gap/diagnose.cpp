@@ -34,7 +34,7 @@ constexpr double kTermCost = 10;
 /// What was thought before any flight: how often a gap is of each kind.
 constexpr double kPriorNone = 0.1, kPriorParameters = 0.2, kPriorEffect = 0.55, kPriorUnknown = 0.15;
 /// Nats that an entry may gain on a robot without any effect, for two makers' models differ by more here and there than their
-/// floors say: so much of each entry's gain tells nothing. Of 22 development robots the largest was 3.7.
+/// floors say: so much of each entry's gain tells nothing.
 constexpr double kByChance = 8;
 /// For every further effect.
 constexpr double kPriorFurther = 0.1;

@@ -29,7 +29,7 @@ enum class Function {
 double mistaken_share(int channel, int harmonic, Function function);
 
 /// Every real vehicle has a little of every effect, or of something that looks like it: sd of the coordinates of its sizes
-/// (gap/hypothesis.hpp), with which the residuals of 22 further development robots without any are most probable. Only more
+/// (gap/hypothesis.hpp), with which the residuals of 23 further development robots without any are most probable. Only more
 /// than that is an effect.
 double background_sd(const std::string& effect);
 
