@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "determinism/tried.hpp"
 #include "flight/fleets.hpp"
 #include "sim/randomise.hpp"
 
@@ -127,7 +128,7 @@ void one_hash(const Case& c, std::uint64_t golden) {
   const bool acting = std::string(c.name) == "actor";
   std::uint64_t small = 0;
   for (const std::string& set : sim::instruction_sets())
-    for (const int threads : {1, 3, 16}) {
+    for (const int threads : test::kThreads) {
       const Fleet<T> fleet = fly<T>(o, acting, 0, kFlappers, threads, set);
       EXPECT_EQ(fleet.hash(), golden) << c.name << ", " << set << ", " << threads << " threads: 0x" << std::hex
                                       << fleet.hash();
@@ -136,7 +137,7 @@ void one_hash(const Case& c, std::uint64_t golden) {
       for (std::size_t i = 0; i < kSmall; ++i) small = small * 31 + fleet.hash(i, i + 1);
     }
   for (const std::string& set : sim::instruction_sets())
-    for (const std::size_t size : {std::size_t{1}, std::size_t{17}}) {
+    for (const std::size_t size : test::kBatchSizes) {
       std::uint64_t all = 0;
       for (std::size_t first = 0; first < kSmall; first += size) {
         const Fleet<T> fleet = fly<T>(o, acting, first, size, 2, set);
