@@ -8,7 +8,9 @@
 #include <numbers>
 #include <optional>
 
+#include "gap/closure.hpp"
 #include "gap/model_error.hpp"
+#include "gap/verdict.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
@@ -27,12 +29,17 @@ constexpr double kVanished = 0.005;
 /// How much larger than what every model gets wrong a term which no entry explains may be.
 constexpr double kUnexplained[] = {2, 4, 8, 16};
 constexpr int kMostTerms = 12, kTried = 3;
-/// Share of what the best entry explains that its imperfect equation may leave to others before the cause counts as unknown.
-constexpr double kImperfect = 0.5;
 /// Nats that a term has to bring beyond those of choosing it: single floors are exceeded now and then.
 constexpr double kTermCost = 10;
+/// Nats that an entry gains before its equation's errors count: beyond, an unknown cause has to explain as much again.
+constexpr double kLarge = 350;
+/// How much more than the parameters alone an effect may leave, as a share of the gap that they leave.
+constexpr double kWorse = 0.3;
+/// By how much the figures of an effect are farther off than rows and floors alone let expect, and how far a size is off because
+/// the robot's effect has another form than the entry, as a share of itself.
+constexpr double kWider = 1.4, kSizeError = 0.1;
 /// What was thought before any flight: how often a gap is of each kind.
-constexpr double kPriorNone = 0.1, kPriorParameters = 0.2, kPriorEffect = 0.55, kPriorUnknown = 0.15;
+constexpr double kPriorNone = 0.1, kPriorParameters = 0.15, kPriorEffect = 0.6, kPriorUnknown = 0.15;
 /// Nats that an entry may gain on a robot without any effect, for two makers' models differ by more here and there than their
 /// floors say: so much of each entry's gain tells nothing.
 constexpr double kByChance = 8;
@@ -48,7 +55,8 @@ class Diagnoser {
  public:
   Diagnoser(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
             const DiagnoseOptions& options)
-      : uncertain_(uncertain),
+      : flights_(flights),
+        uncertain_(uncertain),
         options_(options),
         threads_(options.threads > 0 ? options.threads : omp_get_num_procs()),
         shared_(Hypothesis(uncertain, {}).shared()),
@@ -100,25 +108,34 @@ class Diagnoser {
         best = std::move(more);
       }
     }
-    // what looks like an entry at first, and leaves more than that entry's form may
+    // what looks like an entry at first, and leaves more than that entry's equation may
     const auto best = std::ranges::max_element(singles, {}, &Answer::log_evidence);
     if (best != singles.end() && best->fitted()) {
       const double log_prior = std::log(kPriorUnknown / static_cast<double>(model::effects().size()));
       Answer beside = explain_freely(best->fit.point, best->effects.size(), log_prior);
       if (!beside.terms.empty() && beside.log_evidence > unknown.log_evidence) unknown = std::move(beside);
-      unknown.log_evidence -= kImperfect * std::max(0.0, best->log_evidence - parameters);
+      unknown.log_evidence -= std::max(0.0, best->log_evidence - parameters - kLarge);
     }
     d.answers.push_back(std::move(unknown));
-    for (Answer& a : singles) d.answers.push_back(std::move(a));
+    for (Answer& a : singles) {
+      if (a.fitted()) widen(a);
+      d.answers.push_back(std::move(a));
+    }
     d.complete = !stopped_;
-    normalise(d);
+    set_probabilities(d.answers);
     d.nominal = nominal.residual;
     hold_out(d);
-    for (int g = 0; g < kGroups; ++g) d.noise_sd.push_back(evidence_.noise_sd(g));
+    d.noise_sd = noise_sd();
     return d;
   }
 
  private:
+  std::vector<double> noise_sd() const {
+    std::vector<double> sd;
+    for (int g = 0; g < kGroups; ++g) sd.push_back(evidence_.noise_sd(g));
+    return sd;
+  }
+
   /// Leaves the fit in parameters_ and returns the nominal vehicle's residual under the noise found with it.
   Linearised fit_parameters(const Hypothesis& plain) {
     const Directions none{MatrixXd(plain.size(), 0), VectorXd(0)};
@@ -433,7 +450,7 @@ class Diagnoser {
       at += s.coordinates.size();
     }
     Fit fit = fitter_.fit(h, h.bounded(start), parameters_, 6);
-    if (fit.point.residual.empty()) {
+    if (fit.point.residual.empty() || worse(fit)) {
       Answer none;
       none.kind = Answer::Kind::effect;
       none.effects = effects;
@@ -449,6 +466,26 @@ class Diagnoser {
     Answer a = weigh(Answer::Kind::effect, effects, fit.point, log_prior);
     a.fit = std::move(fit);
     return a;
+  }
+
+  /// Whether effects, wherever models may be mistaken, leave more in all than the parameters alone.
+  bool worse(const Fit& fit) const {
+    const Surroundings around = surroundings_of(flights_, noise_sd());
+    const auto before = losses_of(around, parameters_.point.residual).mean();
+    const auto after = losses_of(around, fit.point.residual).mean();
+    return before && after && *after - *before > kWorse * (*before - huber_floor());
+  }
+
+  /// Directions of effects are their coordinates.
+  void widen(Answer& a) const {
+    const Hypothesis h(uncertain_, a.effects);
+    const VectorXd mean = a.fit.mean();
+    MatrixXd& covariance = a.fit.posterior.covariance;
+    for (Index i = h.shared(); i < h.size(); ++i) {
+      covariance.row(i) *= kWider;
+      covariance.col(i) *= kWider;
+      if (h.unknowns()[static_cast<std::size_t>(i)].size) covariance(i, i) += std::pow(kSizeError * mean[i], 2);
+    }
   }
 
   /// What is left in every flight with the fit to the others; of a single flight, with its own.
@@ -483,20 +520,13 @@ class Diagnoser {
       }
   }
 
-  void normalise(Diagnosis& d) const {
-    double most = -1e300, sum = 0;
-    for (const Answer& a : d.answers) most = std::max(most, a.log_evidence);
-    for (Answer& a : d.answers) sum += a.probability = std::exp(a.log_evidence - most);
-    for (Answer& a : d.answers) a.probability /= sum;
-    std::ranges::sort(d.answers, std::greater{}, &Answer::log_evidence);
-  }
-
   /// Whether to go on.
   bool progress(double share, const std::string& what) {
     stopped_ = stopped_ || (options_.progress && !options_.progress(share, what));
     return !stopped_;
   }
 
+  const std::vector<CarriedFlight>& flights_;
   const sim::Randomisation& uncertain_;
   const DiagnoseOptions& options_;
   int threads_;

@@ -37,7 +37,7 @@ double background_sd(const std::string& effect);
 struct Mistaken {
   double factor, probability;
 };
-inline constexpr Mistaken kMistaken[] = {{0.7, 0.25}, {1, 0.4}, {1.4, 0.25}, {2, 0.1}};
+inline constexpr Mistaken kMistaken[] = {{0.7, 0.25}, {1, 0.35}, {1.4, 0.25}, {2, 0.1}, {4, 0.05}};
 
 /// How well an entry's equation describes the effect of its name: sd of every coefficient as a share of its own.
 inline constexpr double kFormError = 0.3;

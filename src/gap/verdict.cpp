@@ -1,6 +1,7 @@
 #include "gap/verdict.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "model/effects/registry.hpp"
@@ -12,6 +13,10 @@ namespace {
 constexpr double kOfAll = 0.5, kOfPool = 0.8;
 /// Of its pool, what is worth a name in a group.
 constexpr double kLeastShare = 0.05;
+
+/// Of what speaks for entries: how often it is a cause that no entry has and that looks like one, and how often it is another
+/// entry, whose equation is so far off that a rival's describes it better.
+constexpr double kMimicked = 0.06, kConfused = 0.06;
 
 }  // namespace
 
@@ -36,6 +41,23 @@ std::string pool_name(const std::vector<std::string>& effects) {
   std::string name;
   for (const std::string& g : groups) name += (name.empty() ? "" : "+") + g;
   return name;
+}
+
+void set_probabilities(std::vector<Answer>& answers) {
+  std::ranges::sort(answers, std::greater{}, &Answer::log_evidence);
+  const double most = answers.empty() ? 0 : answers.front().log_evidence;
+  double sum = 0, of_effects = 0, effects = 0;
+  for (Answer& a : answers) sum += a.probability = std::exp(a.log_evidence - most);
+  for (Answer& a : answers) {
+    a.probability /= sum;
+    if (a.kind == Answer::Kind::effect) of_effects += a.probability, effects += 1;
+  }
+  for (Answer& a : answers) {
+    if (a.kind == Answer::Kind::unknown) a.probability += kMimicked * of_effects;
+    if (a.kind == Answer::Kind::effect)
+      a.probability += kConfused * of_effects / effects - (kMimicked + kConfused) * a.probability;
+  }
+  std::ranges::stable_sort(answers, std::greater{}, &Answer::probability);
 }
 
 Conclusion conclude(const std::vector<Answer>& answers) {

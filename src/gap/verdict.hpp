@@ -8,6 +8,10 @@
 
 namespace flappy::gap {
 
+/// Of every answer, from its log evidence; the most probable first. Of what speaks for entries a little goes to an unknown cause,
+/// which may look like one, and to all entries alike.
+void set_probabilities(std::vector<Answer>& answers);
+
 /// The largest mass, rivals that such flights often cannot separate (EffectInfo::group) pooled: a set of effects pools with those whose
 /// effects are of the same groups. Of a pool the most probable set is named where it holds half of everything or four fifths of its
 /// pool; otherwise the pool is, and its verdict is `group`.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -34,6 +35,31 @@ Answer answer(double probability, Answer::Kind kind) {
 }
 
 // ---- verdict
+
+TEST(Verdict, IsNotSureOfEntries) {
+  const auto weighed = [](double log_evidence, Answer a) {
+    a.log_evidence = log_evidence;
+    return a;
+  };
+  std::vector<Answer> all = {weighed(-1000, answer(0, Answer::Kind::parameters)),
+                             weighed(-1000, answer(0, Answer::Kind::unknown)), weighed(-900, answer(0, {"body_drag"})),
+                             weighed(-800, answer(0, {"wind"}))};
+  set_probabilities(all);
+  // 0.06 of what entries hold goes to an unknown cause, 0.06 to both entries alike
+  EXPECT_EQ(all[0].effects, std::vector<std::string>{"wind"});
+  EXPECT_NEAR(all[0].probability, 0.88 + 0.03, 1e-12);
+  EXPECT_EQ(all[1].kind, Answer::Kind::unknown);
+  EXPECT_NEAR(all[1].probability, 0.06, 1e-12);
+  EXPECT_NEAR(all[2].probability, 0.03, 1e-12);
+  EXPECT_NEAR(all[3].probability, 0, 1e-12);
+  // what other answers hold stays
+  all = {weighed(std::log(0.7), answer(0, Answer::Kind::parameters)), weighed(std::log(0.3), answer(0, {"wind"})),
+         weighed(-1000, answer(0, Answer::Kind::unknown))};
+  set_probabilities(all);
+  EXPECT_NEAR(all[0].probability, 0.7, 1e-12);
+  EXPECT_NEAR(all[1].probability, 0.3 * 0.94, 1e-12);
+  EXPECT_NEAR(all[2].probability, 0.3 * 0.06, 1e-12);
+}
 
 TEST(Verdict, NamesTheLargestMass) {
   const Conclusion c = conclude({answer(0.6, {"wind"}), answer(0.3, Answer::Kind::parameters),
