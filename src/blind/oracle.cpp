@@ -21,29 +21,21 @@ constexpr double kSizeSd = 2;
 /// A typical size of the catalogue is a third of the end of its prior, 1.645 of its coordinate.
 constexpr double kTypicalCoordinate = 1.645 / 3;
 constexpr double kLeastSize = 1e-3, kMostSize = 4;
+constexpr double kThird = 1.0 / 3;
 
 /// Effects that draw a direction, and how many others span what they could have drawn. Those of sensors: the catalogue's axes.
 constexpr std::pair<Effect, int> kDirections[] = {
     {Effect::com_offset, 2}, {Effect::inertia_products, 3}, {Effect::wing_damage, 2}, {Effect::wind, 2}};
 
-/// L over a set of flights, less what it is with none.
-double total_gain(const MatrixXd& information, const VectorXd& truth, const MatrixXd& m, const VectorXd& precision) {
-  const MatrixXd a = m.transpose() * information * m;
-  const VectorXd f = m.transpose() * (information * truth);
-  const MatrixXd known = MatrixXd(precision.asDiagonal()) + a;
-  const Eigen::LLT<MatrixXd> llt(known);
-  return 0.5 * (f.dot(llt.solve(f)) + llt.solve(a).trace()) - llt.matrixLLT().diagonal().array().log().sum();
-}
-
 }  // namespace
 
-double held_out_gain(const Information& information, const VectorXd& truth, const MatrixXd& hypothesis,
+double expected_gain(const MatrixXd& information, const VectorXd& truth, const MatrixXd& hypothesis,
                      const VectorXd& precision) {
-  double sum = 0;
-  const double all = total_gain(information[0], truth, hypothesis, precision);
-  for (std::size_t set = 1; set < information.size(); ++set)
-    sum += all - total_gain(information[set], truth, hypothesis, precision);
-  return sum / static_cast<double>(information.size() - 1);
+  const MatrixXd a = hypothesis.transpose() * information * hypothesis;
+  const VectorXd f = hypothesis.transpose() * (information * truth);
+  const Eigen::LLT<MatrixXd> llt(MatrixXd(precision.asDiagonal()) + a);
+  return 0.5 * (f.dot(llt.solve(f)) + llt.solve(a).trace() + precision.array().log().sum()) -
+         llt.matrixLLT().diagonal().array().log().sum();
 }
 
 Oracle::Oracle(const Subject& subject, const sim::Randomisation& uncertain) {
@@ -116,28 +108,29 @@ double Oracle::best_gain(const VectorXd& truth, Effect hypothesis, const std::ve
   for (std::size_t i = 0; i < columns.size(); ++i) {
     m.col(0) = columns[i];
     precision[0] = sizes[i] * sizes[i] / (kSizeSd * kSizeSd);
-    best = std::max(best, held_out_gain(information_, truth, m, precision));
+    best = std::max(best, expected_gain(information_, truth, m, precision) * kThird);
   }
   return best;
 }
 
 /// The effect itself as a hypothesis. Differences of carried flights are rough (gap/fit.hpp), the same way wherever they come
-/// from the same flights; so nothing is held against its own: columns are of the sizes tried that the truth is not made of.
-double Oracle::own_gain(const VectorXd& d, Effect truth, double size) const {
+/// from the same flights; so nothing is held against its own: the truth is here of the next larger size that was tried,
+/// straight, the hypothesis of any other.
+double Oracle::own_gain(Effect truth, double size) const {
   const Columns& c = effects_[static_cast<std::size_t>(truth)];
+  const auto above = static_cast<std::size_t>(std::ranges::lower_bound(c.sizes, size) - c.sizes.begin());
   std::vector<VectorXd> columns;
   std::vector<double> sizes;
   for (std::size_t i = 0; i < c.at.size(); ++i) {
-    if (d[c.at[i]] != 0) continue;
+    if (i == above && c.at.size() > 1) continue;
     columns.emplace_back(VectorXd::Unit(width(), c.at[i]));
     sizes.push_back(c.sizes[i]);
   }
-  return columns.empty() ? best_gain(d, truth, {d}, {size}) : best_gain(d, truth, columns, sizes);
+  return best_gain(size / c.sizes[above] * VectorXd::Unit(width(), c.at[above]), truth, columns, sizes);
 }
 
 double Oracle::gain(Effect truth, double size) const {
-  const VectorXd d = truth_of(truth, size);
-  return d.size() == 0 ? 0 : own_gain(d, truth, size);
+  return truth_of(truth, size).size() == 0 ? 0 : own_gain(truth, size);
 }
 
 double Oracle::gain_over(Effect truth, double size, Effect rival) const {
@@ -146,7 +139,7 @@ double Oracle::gain_over(Effect truth, double size, Effect rival) const {
   const Columns& c = effects_[static_cast<std::size_t>(rival)];
   std::vector<VectorXd> columns;
   for (const int at : c.at) columns.emplace_back(VectorXd::Unit(width(), at));
-  return own_gain(d, truth, size) - best_gain(d, rival, columns, c.sizes);
+  return own_gain(truth, size) - best_gain(d, rival, columns, c.sizes);
 }
 
 double Oracle::detectable(Effect effect, double nats) const {

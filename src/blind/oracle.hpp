@@ -10,9 +10,9 @@
 // A hypothesis has columns M beside the parameters, a ~ N(0, P^-1) of them: r ~ N(0, C + M P^-1 M'). With A = M' C^-1 M and
 // f = M' C^-1 d, the determinant lemma and Woodbury's identity give what it is expected to gain over parameters alone,
 //   L = E log N(r; 0, C + M P^-1 M') - E log N(r; 0, C) = 1/2 (f' (A + P)^-1 f + tr A (A + P)^-1 - log det (1 + P^-1 A))
-// under the truth r ~ N(d, C). Of one flight given the others it is L of all less L of the others: the gain on what is held
-// out, its mean over the flights. With M = d and little prior that is 1/2 F - 1/2 log(F_all/F_others), F = F_all - F_others,
-// F_x = d' C^-1 d: half the information that the held-out flight has, less the price of having learnt the size elsewhere.
+// under the truth r ~ N(d, C). With M = d and little prior that is half the information d' C^-1 d, less the price of learning
+// the size. A third of the flights counts for a third of L: what it gains once the others are known would say how well these
+// teach the errors that every flight shares, floor and background, to mimic the effect, and not how well it shows.
 #pragma once
 
 #include <map>
@@ -25,16 +25,13 @@
 
 namespace flappy::blind {
 
-/// d' C^-1 d of columns beside the parameters: [0] over all flights, [1 + f] over all but flight f.
-using Information = std::vector<Eigen::MatrixXd>;
-
 /// All flights of a case.
 std::vector<Flight> fly_all(const Case& c, int threads);
 
-/// L on the held-out flight. `truth`: d as weights of the columns of `information`; `hypothesis`: M, a column of weights each;
-/// `precision`: of its coefficients, P.
-double held_out_gain(const Information& information, const Eigen::VectorXd& truth, const Eigen::MatrixXd& hypothesis,
-                     const Eigen::VectorXd& precision);
+/// L. `information`: d' C^-1 d of columns; `truth`: d as weights of these; `hypothesis`: M, a column of weights each; `precision`:
+/// of its coefficients, P.
+double expected_gain(const Eigen::MatrixXd& information, const Eigen::VectorXd& truth,
+                     const Eigen::MatrixXd& hypothesis, const Eigen::VectorXd& precision);
 
 /// Whether the catalogue has an entry for it.
 constexpr bool in_catalogue(Effect effect) { return effect < Effect::outside_magnetic_torque; }
@@ -63,8 +60,9 @@ class Subject {
   /// The same of coordinates of an entry of the catalogue, in the simulator.
   std::vector<gap::Smooth> catalogue(const std::string& effect, const std::vector<Eigen::VectorXd>& coordinates) const;
 
-  /// `columns` with the parameters integrated out.
-  Information information(const std::vector<gap::Smooth>& parameters, const std::vector<gap::Smooth>& columns) const;
+  /// d' C^-1 d of `columns`, with the parameters integrated out.
+  Eigen::MatrixXd information(const std::vector<gap::Smooth>& parameters,
+                              const std::vector<gap::Smooth>& columns) const;
 
   /// Of the rows' noise over what the headers declare, median of the groups.
   double noise_ratio() const { return noise_ratio_; }
@@ -73,9 +71,6 @@ class Subject {
  private:
   std::vector<gap::Smooth> sensed(const std::vector<Added>& list) const;
   model::Vehicle moved(const sim::Randomisation& uncertain, std::size_t draw, double variate) const;
-  Eigen::MatrixXd sums(const std::vector<gap::Smooth>& columns, const std::vector<char>& use,
-                       const gap::Smooth& eta_sd) const;
-
   Case case_;
   int threads_;
   std::vector<gap::CarriedFlight> flights_;
@@ -93,12 +88,12 @@ class Oracle {
     std::vector<int> at;        ///< which
     std::vector<int> further;   ///< other directions, at typical size
   };
-  Oracle(std::array<Columns, kEffects> effects, Information information)
+  Oracle(std::array<Columns, kEffects> effects, Eigen::MatrixXd information)
       : effects_(std::move(effects)), information_(std::move(information)) {}
   /// `uncertain`: draws of the parameters, about any vehicle. Some minutes of one processor.
   Oracle(const Subject& subject, const sim::Randomisation& uncertain);
 
-  /// Nats that the truth gains over parameters alone, on a flight held out; 0 where the robot comes apart.
+  /// Nats that the truth gains over parameters alone, on a third of the flights; 0 where the robot comes apart.
   double gain(Effect truth, double size) const;
   /// Nats that it gains over a rival whose sizes are free.
   double gain_over(Effect truth, double size, Effect rival) const;
@@ -107,13 +102,13 @@ class Oracle {
 
  private:
   Eigen::VectorXd truth_of(Effect effect, double size) const;
-  double own_gain(const Eigen::VectorXd& d, Effect truth, double size) const;
+  double own_gain(Effect truth, double size) const;
   double best_gain(const Eigen::VectorXd& truth, Effect hypothesis, const std::vector<Eigen::VectorXd>& columns,
                    const std::vector<double>& sizes) const;
-  Eigen::Index width() const { return information_[0].rows(); }
+  Eigen::Index width() const { return information_.rows(); }
 
   std::array<Columns, kEffects> effects_;
-  Information information_;
+  Eigen::MatrixXd information_;
 };
 
 /// An entry of the catalogue where it is most like an effect of the blind robot.

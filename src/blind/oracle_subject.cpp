@@ -208,30 +208,18 @@ std::vector<Smooth> Subject::background() const {
   return result;
 }
 
-MatrixXd Subject::sums(const std::vector<Smooth>& columns, const std::vector<char>& use, const Smooth& eta_sd) const {
-  const Index q = evidence_->basis().size(), n = static_cast<Index>(columns.size());
+MatrixXd Subject::information(const std::vector<Smooth>& parameters, const std::vector<Smooth>& columns) const {
+  std::vector<const Smooth*> all;
+  for (const Smooth& c : parameters) all.push_back(&c);
+  for (const Smooth& c : columns) all.push_back(&c);
+  const auto p = static_cast<Index>(parameters.size()), n = static_cast<Index>(columns.size());
+  const Index q = evidence_->basis().size();
   const gap::Statistics nothing{
       {flights_.size(), std::vector<Eigen::VectorXd>(gap::kGroups, Eigen::VectorXd::Zero(q))}};
-  std::vector<const Smooth*> pointers;
-  for (const Smooth& c : columns) pointers.push_back(&c);
-  return evidence_->reduce(nothing, pointers, use, eta_sd).sums.topLeftCorner(n, n);
-}
-
-Information Subject::information(const std::vector<Smooth>& parameters, const std::vector<Smooth>& columns) const {
-  std::vector<Smooth> all = parameters;
-  all.insert(all.end(), columns.begin(), columns.end());
-  const auto p = static_cast<Index>(parameters.size()), n = static_cast<Index>(columns.size());
-  Information result;
-  for (std::size_t set = 0; set <= flights_.size(); ++set) {
-    std::vector<char> use(flights_.size(), 1);
-    if (set > 0) use[set - 1] = 0;
-    const MatrixXd s = sums(all, use, evidence_->floor());
-    MatrixXd known = s.topLeftCorner(p, p);
-    known.diagonal().array() += 1;
-    const MatrixXd half = Eigen::LLT<MatrixXd>(known).matrixL().solve(s.topRightCorner(p, n));
-    result.emplace_back(s.bottomRightCorner(n, n) - half.transpose() * half);
-  }
-  return result;
+  const MatrixXd s = evidence_->reduce(nothing, all, std::vector<char>(flights_.size(), 1), evidence_->floor()).sums;
+  const MatrixXd known = s.topLeftCorner(p, p) + MatrixXd::Identity(p, p);
+  const MatrixXd half = Eigen::LLT<MatrixXd>(known).matrixL().solve(s.block(0, p, p, n));
+  return s.block(p, p, n, n) - half.transpose() * half;
 }
 
 }  // namespace flappy::blind

@@ -59,7 +59,7 @@ class Likeness {
     for (Index i = 0; i < size(); ++i) x[i] = of(i).coordinate(of(i).value(x[i]));
     return x;
   }
-  MatrixXd measure(const std::vector<Smooth>& columns) const { return subject_.information(parameters_, columns)[0]; }
+  MatrixXd measure(const std::vector<Smooth>& columns) const { return subject_.information(parameters_, columns); }
   std::vector<Smooth> left_at(const std::vector<VectorXd>& places) const {
     std::vector<Smooth> left = subject_.catalogue(entry_, places);
     for (Smooth& s : left)

@@ -122,9 +122,9 @@ std::string to_toml(const OracleCommand& o, std::size_t vehicles, const std::vec
       o.vehicle + " --randomise " + o.randomise + " --vehicles " + std::to_string(vehicles) + " --seed " +
       std::to_string(o.seed) + " --out " + o.out + "\n# " + date + ", commit " + io::commit() + ", " + processor() +
       "\n#\n"
-      "# detectable       10 nats over parameters alone on the held-out third of 30 s, median; missing: more than 4\n"
+      "# detectable       10 nats over parameters alone on each third of 30 s, median; missing: more than 4\n"
       "# undetectable     twice that is more than 4, or more than the catalogue finds plausible\n"
-      "# gain_at_typical  nats at size 1, median\n"
+      "# gain_at_typical  nats on a third at size 1, median\n"
       "# inseparable      rivals over which the truth gains less than 10 nats at twice the detectable size, or at 4\n"
       "# misfit           what the catalogue's entry leaves of the effect at that size, and its figures there; one "
       "vehicle\n"
