@@ -41,8 +41,8 @@ constexpr double kWider = 1.4, kSizeError = 0.1;
 /// What was thought before any flight: how often a gap is of each kind.
 constexpr double kPriorNone = 0.1, kPriorParameters = 0.15, kPriorEffect = 0.6, kPriorUnknown = 0.15;
 /// Nats that an entry may gain on a robot without any effect, for two makers' models differ by more here and there than their
-/// floors say: so much of each entry's gain tells nothing.
-constexpr double kByChance = 8;
+/// floors say: so much of its gain tells nothing, and more of what a further entry gains, to which the first one's errors are left.
+constexpr double kByChance = 8, kByChanceBeside = 16;
 /// For every further effect.
 constexpr double kPriorFurther = 0.1;
 
@@ -197,7 +197,9 @@ class Diagnoser {
     double sum = 0;
     for (const double e : each) sum += std::exp(e - most);
     const double all = most + std::log(sum), gain = all - plain_;
-    return effects == 0 ? all : plain_ + std::max(gain - kByChance * static_cast<double>(effects), std::min(gain, 0.0));
+    if (effects == 0) return all;
+    const double by_chance = kByChance + kByChanceBeside * static_cast<double>(effects - 1);
+    return plain_ + std::max(gain - by_chance, std::min(gain, 0.0));
   }
 
   static Smooth together(const Smooth& a, const Smooth& b) { return (a.array().square() + b.array().square()).sqrt(); }
