@@ -96,18 +96,18 @@ VectorXd Oracle::truth_of(Effect effect, double size) const {
   return d;
 }
 
-/// Of an effect's columns, each beside its further directions, the one that explains the truth best.
-double Oracle::best_gain(const VectorXd& truth, Effect hypothesis, const std::vector<VectorXd>& columns,
-                         const std::vector<double>& sizes) const {
-  const std::vector<int>& further = effects_[static_cast<std::size_t>(hypothesis)].further;
-  const auto n = static_cast<Index>(further.size());
+/// Of the sizes tried of an effect but one, each beside its further directions, the one that explains the truth best.
+double Oracle::best_gain(const VectorXd& truth, Effect hypothesis, std::size_t but) const {
+  const Columns& c = effects_[static_cast<std::size_t>(hypothesis)];
+  const auto n = static_cast<Index>(c.further.size());
   MatrixXd m = MatrixXd::Zero(width(), n + 1);
   VectorXd precision = VectorXd::Constant(n + 1, 1 / (kSizeSd * kSizeSd));
-  for (Index i = 0; i < n; ++i) m(further[static_cast<std::size_t>(i)], i + 1) = 1;
+  for (Index i = 0; i < n; ++i) m(c.further[static_cast<std::size_t>(i)], i + 1) = 1;
   double best = 0;  // its size may be none
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    m.col(0) = columns[i];
-    precision[0] = sizes[i] * sizes[i] / (kSizeSd * kSizeSd);
+  for (std::size_t i = 0; i < c.at.size(); ++i) {
+    if (i == but) continue;
+    m.col(0) = VectorXd::Unit(width(), c.at[i]);
+    precision[0] = c.sizes[i] * c.sizes[i] / (kSizeSd * kSizeSd);
     best = std::max(best, expected_gain(information_, truth, m, precision) * kThird);
   }
   return best;
@@ -119,14 +119,8 @@ double Oracle::best_gain(const VectorXd& truth, Effect hypothesis, const std::ve
 double Oracle::own_gain(Effect truth, double size) const {
   const Columns& c = effects_[static_cast<std::size_t>(truth)];
   const auto above = static_cast<std::size_t>(std::ranges::lower_bound(c.sizes, size) - c.sizes.begin());
-  std::vector<VectorXd> columns;
-  std::vector<double> sizes;
-  for (std::size_t i = 0; i < c.at.size(); ++i) {
-    if (i == above && c.at.size() > 1) continue;
-    columns.emplace_back(VectorXd::Unit(width(), c.at[i]));
-    sizes.push_back(c.sizes[i]);
-  }
-  return best_gain(size / c.sizes[above] * VectorXd::Unit(width(), c.at[above]), truth, columns, sizes);
+  return best_gain(size / c.sizes[above] * VectorXd::Unit(width(), c.at[above]), truth,
+                   c.at.size() > 1 ? above : kNone);
 }
 
 double Oracle::gain(Effect truth, double size) const {
@@ -136,10 +130,7 @@ double Oracle::gain(Effect truth, double size) const {
 double Oracle::gain_over(Effect truth, double size, Effect rival) const {
   const VectorXd d = truth_of(truth, size);
   if (d.size() == 0) return 0;
-  const Columns& c = effects_[static_cast<std::size_t>(rival)];
-  std::vector<VectorXd> columns;
-  for (const int at : c.at) columns.emplace_back(VectorXd::Unit(width(), at));
-  return own_gain(truth, size) - best_gain(d, rival, columns, c.sizes);
+  return own_gain(truth, size) - best_gain(d, rival, kNone);
 }
 
 double Oracle::detectable(Effect effect, double nats) const {

@@ -71,6 +71,7 @@ class Subject {
  private:
   std::vector<gap::Smooth> sensed(const std::vector<Added>& list) const;
   model::Vehicle moved(const sim::Randomisation& uncertain, std::size_t draw, double variate) const;
+
   Case case_;
   int threads_;
   std::vector<gap::CarriedFlight> flights_;
@@ -103,8 +104,8 @@ class Oracle {
  private:
   Eigen::VectorXd truth_of(Effect effect, double size) const;
   double own_gain(Effect truth, double size) const;
-  double best_gain(const Eigen::VectorXd& truth, Effect hypothesis, const std::vector<Eigen::VectorXd>& columns,
-                   const std::vector<double>& sizes) const;
+  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+  double best_gain(const Eigen::VectorXd& truth, Effect hypothesis, std::size_t but) const;
   Eigen::Index width() const { return information_.rows(); }
 
   std::array<Columns, kEffects> effects_;
