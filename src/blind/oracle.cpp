@@ -84,16 +84,18 @@ Oracle::Oracle(const Subject& subject, const sim::Randomisation& uncertain) {
   information_ = subject.information(known, columns);
 }
 
-/// What an effect adds at any size, from those at which it was tried: in between and below, straight; empty beyond.
+/// The first size tried that is no smaller; as many as there are where there is none.
+std::size_t Oracle::tried(Effect effect, double size) const {
+  const Columns& c = effects_[static_cast<std::size_t>(effect)];
+  return static_cast<std::size_t>(std::ranges::lower_bound(c.sizes, size) - c.sizes.begin());
+}
+
+/// What an effect adds at any size: straight of the next larger one that was tried; empty beyond.
 VectorXd Oracle::truth_of(Effect effect, double size) const {
   const Columns& c = effects_[static_cast<std::size_t>(effect)];
-  const auto above = static_cast<std::size_t>(std::ranges::lower_bound(c.sizes, size) - c.sizes.begin());
+  const std::size_t above = tried(effect, size);
   if (above == c.sizes.size()) return {};
-  VectorXd d = VectorXd::Zero(width());
-  const double low = above > 0 ? c.sizes[above - 1] : 0, share = (size - low) / (c.sizes[above] - low);
-  d[c.at[above]] = share;
-  if (above > 0) d[c.at[above - 1]] = 1 - share;
-  return d;
+  return size / c.sizes[above] * VectorXd::Unit(width(), c.at[above]);
 }
 
 /// Of the sizes tried of an effect but one, each beside its further directions, the one that explains the truth best.
@@ -114,27 +116,24 @@ double Oracle::best_gain(const VectorXd& truth, Effect hypothesis, std::size_t b
 }
 
 /// The effect itself as a hypothesis. Differences of carried flights are rough (gap/fit.hpp), the same way wherever they come
-/// from the same flights; so nothing is held against its own: the truth is here of the next larger size that was tried,
-/// straight, the hypothesis of any other.
-double Oracle::own_gain(Effect truth, double size) const {
-  const Columns& c = effects_[static_cast<std::size_t>(truth)];
-  const auto above = static_cast<std::size_t>(std::ranges::lower_bound(c.sizes, size) - c.sizes.begin());
-  return best_gain(size / c.sizes[above] * VectorXd::Unit(width(), c.at[above]), truth,
-                   c.at.size() > 1 ? above : kNone);
-}
-
+/// from the same flights; so nothing is held against its own: the hypothesis is of any other size tried than the truth.
 double Oracle::gain(Effect truth, double size) const {
-  return truth_of(truth, size).size() == 0 ? 0 : own_gain(truth, size);
+  const VectorXd d = truth_of(truth, size);
+  if (d.size() == 0) return 0;
+  const bool alone = effects_[static_cast<std::size_t>(truth)].at.size() == 1;
+  return best_gain(d, truth, alone ? kNone : tried(truth, size));
 }
 
 double Oracle::gain_over(Effect truth, double size, Effect rival) const {
   const VectorXd d = truth_of(truth, size);
-  if (d.size() == 0) return 0;
-  return own_gain(truth, size) - best_gain(d, rival, kNone);
+  return d.size() == 0 ? 0 : gain(truth, size) - best_gain(d, rival, kNone);
 }
 
 double Oracle::detectable(Effect effect, double nats) const {
-  const auto enough = [&](double size) { return gain(effect, size) >= nats; };
+  // where another size that was tried takes over, the gain may fall
+  const auto enough = [&](double size) {
+    return gain(effect, size) >= nats && (2 * size > kMostSize || gain(effect, 2 * size) >= nats);
+  };
   constexpr double kStep = 1.1;
   double high = kLeastSize;
   while (high < kMostSize && !enough(high)) high = std::min(kMostSize, high * kStep);

@@ -98,12 +98,12 @@ class Oracle {
   double gain(Effect truth, double size) const;
   /// Nats that it gains over a rival whose sizes are free.
   double gain_over(Effect truth, double size, Effect rival) const;
-  /// Where gain() reaches `nats`; infinite beyond size 4.
+  /// Where gain() reaches `nats`, there and at twice the size; infinite beyond size 4.
   double detectable(Effect effect, double nats) const;
 
  private:
+  std::size_t tried(Effect effect, double size) const;
   Eigen::VectorXd truth_of(Effect effect, double size) const;
-  double own_gain(Effect truth, double size) const;
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
   double best_gain(const Eigen::VectorXd& truth, Effect hypothesis, std::size_t but) const;
   Eigen::Index width() const { return information_.rows(); }

@@ -73,7 +73,7 @@ Subject::Subject(Case c, std::vector<Flight> flights, int threads)
                            "; accepted: robots that fly");
     flights_.emplace_back(gap::Recording(name, std::move(flights[k].log), case_.vehicle));
   }
-  evidence_ = std::make_unique<gap::Evidence>(flights_);
+  evidence_ = std::make_unique<gap::Evidence>(flights_, threads_);
   std::vector<double> declared;
   for (int g = 0; g < gap::kGroups; ++g) declared.push_back(evidence_->noise_sd(g));
 
@@ -82,7 +82,7 @@ Subject::Subject(Case c, std::vector<Flight> flights, int threads)
   Signature measured;
   for (const gap::CarriedFlight& f : flights_) measured.push_back(f.measured());
   evidence_->learn_noise(difference(std::move(measured), carried_));
-  left_ = gap::Fitter(flights_, *evidence_, threads_).residuals({{case_.vehicle}})[0];
+  left_ = gap::residuals(flights_, {{case_.vehicle}}, threads_)[0];
 
   std::vector<double> ratios;
   for (int g = 0; g < gap::kGroups; ++g)
@@ -130,7 +130,7 @@ std::vector<Smooth> Subject::sensed(const std::vector<Added>& list) const {
   for (std::vector<flight::FlightLog>& seen : logs) {
     std::vector<gap::CarriedFlight> flights;
     for (std::size_t k = 0; k < kFlights; ++k) flights.push_back(flights_[k].with_log(std::move(seen[k])));
-    const Signature left = gap::Fitter(flights, *evidence_, threads_).residuals({{case_.vehicle}})[0];
+    const Signature left = gap::residuals(flights, {{case_.vehicle}}, threads_)[0];
     result.push_back(evidence_->smooth(difference(left, left_)));
   }
   return result;
@@ -168,7 +168,7 @@ std::vector<Smooth> Subject::simulated_parameters(const sim::Randomisation& unce
   for (std::size_t d = 0; d < uncertain.draws(); ++d)
     for (const double to : {kReach, -kReach}) candidates.push_back({moved(uncertain, d, to)});
   for (const double to : {kReach, -kReach}) candidates.push_back({case_.vehicle, to * kLagSteps * gap::kStep_s});
-  std::vector<Signature> left = gap::Fitter(flights_, *evidence_, threads_).residuals(candidates);
+  std::vector<Signature> left = gap::residuals(flights_, candidates, threads_);
   std::vector<Smooth> result;
   for (std::size_t i = 0; i < left.size(); i += 2)
     if (const Signature change = difference(std::move(left[i + 1]), left[i]); !change.empty())
@@ -187,7 +187,7 @@ std::vector<Smooth> Subject::catalogue(const std::string& effect,
     candidates.push_back(std::move(c));
   }
   std::vector<Smooth> result;
-  for (Signature& left : gap::Fitter(flights_, *evidence_, threads_).residuals(candidates)) {
+  for (Signature& left : gap::residuals(flights_, candidates, threads_)) {
     const Signature change = difference(left_, left);
     result.push_back(change.empty() ? Smooth() : evidence_->smooth(change));
   }

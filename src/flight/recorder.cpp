@@ -103,16 +103,19 @@ struct Recorder<T>::Storage {
   Fleet<T>& fleet;
   std::size_t flapper;
   sim::RandomKey key;
-  model::Motor motors[2];
   FlightLog log;
   std::vector<Column> truth = std::vector<Column>(kTruthNames.size());
   TickSampler power{0}, wings{0};
-  sim::FlapperState state;  // at the last control tick
+  // at the last control tick
+  sim::FlapperState state;
   double held_V[2] = {0, 0};
+  struct {
+    sim::Block<T> block;
+    std::vector<T> effect_states;
+  } metered;  // where power.csv is asked for
   double step_hz;
 
-  Storage(const FlyConfig& config, Fleet<T>& f, std::size_t i, const model::Vehicle& vehicle)
-      : fleet(f), flapper(i), motors{vehicle.left.motor, vehicle.right.motor} {
+  Storage(const FlyConfig& config, Fleet<T>& f, std::size_t i, const model::Vehicle& vehicle) : fleet(f), flapper(i) {
     const FleetOptions& o = f.options();
     key = {o.seed, o.first_flapper + static_cast<std::uint32_t>(i), 0, sim::Stream::power};
     step_hz = 1 / o.batch.step_s;
@@ -133,8 +136,22 @@ struct Recorder<T>::Storage {
     log.command.phase_rad.emplace();
     if (h.power) log.power.emplace(), power = TickSampler(h.power->rate_hz);
     if (h.wings) log.wings.emplace(), wings = TickSampler(h.wings->rate_hz);
-    state = f.batch().state(i);
+    if (h.power) {  // a meter needs the rows of effects, whatever is in force
+      f.batch().storage().keep_effects(0);
+      f.batch().storage().put_effect_rows(i, vehicle);
+    }
+    look();
     add_truth(time_s(f.batch().storage().steps));
+  }
+
+  void look() {
+    state = fleet.batch().state(flapper);
+    if (!log.power) return;
+    auto& body = fleet.batch().storage();
+    const std::size_t block = flapper / sim::kLanes<T>;
+    const T* states = body.effects_of(block).states;
+    metered.block = body.blocks[block];
+    metered.effect_states.assign(states, states + body.state_size());
   }
 
   double time_s(std::int64_t step) const { return static_cast<double>(step) / step_hz; }
@@ -192,20 +209,31 @@ struct Recorder<T>::Storage {
     return sim::normal(key, index);
   }
 
-  /// Of the state at the start of a period and the voltages from then on, as the command's times have them.
+  /// Of the state at the start of a period and the voltages from then on, as the command's times have them: what a meter in the
+  /// first physics step reads, which a copy takes once more.
   void add_power(double t_s) {
     const PowerHeader& h = *log.header.power;
     if (!power.due(t_s)) return;
     const std::uint32_t n = power.first_index();
-    const auto current = [&](std::uint32_t side) {
-      const model::Motor& m = motors[side];
-      return (held_V[side] - m.torque_constant_Nm_A * m.gear_ratio * state.stroke_rate_rad_s[side]) / m.resistance_ohm +
-             h.current_noise_A * normal(sim::Stream::power, n + 1 + side);
+    auto& body = fleet.batch().storage();
+    constexpr std::size_t kLanes = sim::kLanes<T>;
+    const std::size_t lane = flapper % kLanes;
+    T voltages_V[2 * kLanes] = {}, meter[sim::kMeterRows * kLanes];
+    for (std::size_t side = 0; side < 2; ++side) voltages_V[side * kLanes + lane] = static_cast<T>(held_V[side]);
+    sim::BlockEffects<T> in_force = body.effects_of(flapper / kLanes);
+    in_force.states = metered.effect_states.data();
+    in_force.voltages_V = voltages_V;
+    in_force.meter = meter;
+    sim::StepPlan plan = body.plan();
+    plan.steps_per_update = 1;
+    body.kernel(metered.block, in_force, plan, 0, 1, nullptr);
+    const auto noisy = [&](double value, double sd, std::uint32_t k) {
+      return value + sd * normal(sim::Stream::power, n + k);
     };
     log.power->t_s.push_back(tidy(t_s + h.latency_s));
-    log.power->battery_V.push_back(h.battery_nominal_V + h.voltage_noise_V * normal(sim::Stream::power, n));
-    log.power->left_current_A.push_back(current(0));
-    log.power->right_current_A.push_back(current(1));
+    log.power->battery_V.push_back(noisy(h.battery_nominal_V * static_cast<double>(meter[lane]), h.voltage_noise_V, 0));
+    log.power->left_current_A.push_back(noisy(static_cast<double>(meter[kLanes + lane]), h.current_noise_A, 1));
+    log.power->right_current_A.push_back(noisy(static_cast<double>(meter[2 * kLanes + lane]), h.current_noise_A, 2));
   }
 
   void add_wings(double t_s) {
@@ -237,7 +265,7 @@ struct Recorder<T>::Storage {
     sample_tick();
     if (log.wings) add_wings(time_s(begin));
 
-    state = fleet.batch().state(flapper);
+    look();
     add_truth(time_s(end));
     for (const auto& s : fleet.imu_samples(flapper)) {
       ImuStream& imu = log.imu;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "model/effects/registry.hpp"
+#include "gap/screening.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -12,8 +12,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// How far a coordinate moves for its column.
-constexpr double kReach = 0.4;
 /// Of the largest residual, in units of the noise, below which it is none.
 constexpr double kStandsOut = 2;
 /// Least rms contribution of a column, in units of the noise.
@@ -162,30 +160,21 @@ std::map<std::string, Baseline> baselines(const std::vector<CarriedFlight>& flig
   std::vector<std::string> effects;
   for (Index i = 0; i < plain.size(); ++i) {
     VectorXd there = at;
-    there[i] += kReach;
+    there[i] += kSizeReach;
     candidates.push_back(plain.candidate(there));
     effects.emplace_back();
   }
-  for (const model::EffectEntry& e : model::effects()) {
-    if (std::ranges::count(withheld, std::string(e.info.id))) continue;
-    const Hypothesis h(uncertain, {e.info.id});
-    for (Index i = plain.size(); i < h.size(); ++i) {
-      if (!h.unknowns()[static_cast<std::size_t>(i)].size) continue;
-      VectorXd there = h.start();
-      there.head(plain.size()) = at;
-      there[i] = kReach;
-      candidates.push_back(h.candidate(there));
-      effects.emplace_back(e.info.id);
-    }
+  for (SizeStep& s : size_steps(uncertain, {}, at, withheld)) {
+    candidates.push_back(std::move(s.candidate));
+    effects.push_back(std::move(s.effect));
   }
-  Evidence evidence(flights);
-  std::vector<Signature> rows = Fitter(flights, evidence, threads).residuals(candidates);
+  std::vector<Signature> rows = residuals(flights, candidates, threads);
   const Signature& residual = d.parameters.point.residual;
   std::vector<Signature> columns;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (rows[k].empty()) continue;
     for (std::size_t f = 0; f < flights.size(); ++f)
-      for (std::size_t i = 0; i < rows[k][f].size(); ++i) rows[k][f][i] = (residual[f][i] - rows[k][f][i]) / kReach;
+      for (std::size_t i = 0; i < rows[k][f].size(); ++i) rows[k][f][i] = (residual[f][i] - rows[k][f][i]) / kSizeReach;
     columns.push_back(std::move(rows[k]));
     r.effects.push_back(effects[k]);
   }

@@ -102,7 +102,7 @@ CarriedFlight::CarriedFlight(Recording recording) : recording_(std::move(recordi
     for (const std::size_t i : power_sample_)
       power.insert(power.end(), {p.battery_V[i], p.left_current_A[i], p.right_current_A[i]});
     put_power(power, measured_);
-    for (std::size_t i = 0; i < power.size(); i += kMetered) power[i] -= r.log.header.power->battery_nominal_V;
+    for (std::size_t i = 0; i < power.size(); i += kMetered) power[i] -= r.full * r.log.header.power->battery_nominal_V;
     put_power(power, signal_);
   }
   compare_streams();
@@ -275,7 +275,7 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
       const double* now = &meter[(power_step_[metered] + 1 + static_cast<std::size_t>(r.steps[k]) - step) * kMeter];
       for (std::size_t i = 0; i < kMeter; ++i) {
         const double sample = now[i] + late * (now[i] - now[i + kMeter]);
-        power.push_back(i < kVehicles ? r.log.header.power->battery_nominal_V * sample : sample);
+        power.push_back(i < kVehicles ? r.full * r.log.header.power->battery_nominal_V * sample : sample);
       }
     }
     if (r.log.power) std::copy_n(&meter[static_cast<std::size_t>(r.steps[k]) * kMeter], kMeter, meter.data());

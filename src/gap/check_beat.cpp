@@ -52,8 +52,9 @@ Turn turn_of(const Column& t_s, const std::vector<const Column*>& columns, doubl
 Finding compare(const std::string& name, const Column& t_s, const std::vector<const Column*>& columns,
                 double turn_rad_s, double volts_rad_s) {
   // Changing inputs move the phase of what is felt by tenths of a radian, once over a flight of at least sixty beats.
-  constexpr double kAllowed = 3e-3;
+  constexpr double kAllowed = 1e-3, kAllowedBeats = 0.18;
   const double duration_s = t_s.back() - t_s.front(), beat_s = 2 * std::numbers::pi / turn_rad_s;
+  const double allowed = std::max(kAllowed, kAllowedBeats * beat_s / duration_s);
   const auto not_tested = [&](const char* why) { return Finding{name, Verdict::not_tested, why, {}}; };
   if (duration_s < 60 * beat_s) return not_tested("shorter than 60 beats");
   if (static_cast<double>(t_s.size()) < 4 * duration_s / beat_s) return not_tested("too few samples in a beat");
@@ -61,10 +62,10 @@ Finding compare(const std::string& name, const Column& t_s, const std::vector<co
   if (seen.steady < 0.8) return not_tested("the beat is not steady, or lost in the noise");
   const double ratio = (turn_rad_s + seen.rad_s) / (turn_rad_s + volts_rad_s);
   const std::string text = format("beats %.5f times as often as the voltages", ratio);
-  const bool good = std::abs(ratio - 1) <= kAllowed;
+  const bool good = std::abs(ratio - 1) <= allowed;
   return {name,
           good ? Verdict::ok : Verdict::warning,
-          good ? text : text + format(", 1 +- %g expected: clocks run at different speeds", kAllowed),
+          good ? text : text + format(", 1 +- %g expected: clocks run at different speeds", allowed),
           {{"ratio", ratio}}};
 }
 

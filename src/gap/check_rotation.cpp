@@ -121,25 +121,24 @@ bool check_clock(Context& c) {
       format(", %.1f +- %.1f ms expected from latencies and bandwidth", 1e3 * (declared_s + filter_s), 1e3 * allowed_s);
   const double off_s = std::abs(lag->value - filter_s);
   const bool good = off_s <= allowed_s;
+  const double change_s = first && last ? last->value - first->value : 0, per_s = change_s / (end_s - begin_s);
+  const bool runs_off = drifts && std::abs(per_s) > kLargestDrift;
   c.say("clock", good ? Verdict::ok : Verdict::warning,
         seen + expected + (good ? "" : ": clocks apart, or a wrong latency"),
         {{"lag_s", lag->value}, {"lag_sd_s", lag->sd}, {"correlation", sync->correlation}},
-        off_s > allowed_s + kLargestDelay_s && !drifts ? LogPlace{kImu} : LogPlace{});
+        off_s > allowed_s + kLargestDelay_s && !runs_off ? LogPlace{kImu} : LogPlace{});
 
   // A millisecond over a flight is a fifth of a radian of the beat, which no check here minds.
   if (!drifts && (!first || !last || std::hypot(first->sd, last->sd) > 0.0025)) {
     c.say("clock speed", Verdict::not_tested, "too short, or too little rotation at the beginning or the end");
     return true;
   }
-  const double change_s = last->value - first->value, per_s = change_s / (end_s - begin_s);
   c.say("clock speed", drifts ? Verdict::warning : Verdict::ok,
         format("gyro against mocap moves by %.2f ms in %.3g s, at most %.2f ms expected", 1e3 * change_s,
                end_s - begin_s, 1e3 * noticed_s()) +
             (drifts ? format(": clocks run at different speeds, by %.0f ppm", 1e6 * per_s) : ""),
         {{"change_s", change_s}, {"per_s", per_s}},
-        drifts && std::abs(per_s) > kLargestDrift
-            ? LogPlace{kImu, line_at(c.log.imu.t_s, noticed_s() / std::abs(per_s))}
-            : LogPlace{});
+        runs_off ? LogPlace{kImu, line_at(c.log.imu.t_s, noticed_s() / std::abs(per_s))} : LogPlace{});
   return true;
 }
 

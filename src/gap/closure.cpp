@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <random>
 
 namespace flappy::gap {
@@ -55,6 +56,19 @@ Losses losses_of(const Surroundings& around, const Signature& residual) {
     }
   }
   return l;
+}
+
+double sd_of_difference(const Losses& a, const Losses& b) {
+  if (a.sum.size() != b.sum.size() || a.sum.size() < 2) return 0;
+  const auto total = [](const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0); };
+  const double rows = total(a.count), n = static_cast<double>(a.sum.size());
+  const double mean = (total(a.sum) - total(b.sum)) / rows;
+  double scatter = 0;
+  for (std::size_t i = 0; i < a.sum.size(); ++i) {
+    const double d = a.sum[i] - b.sum[i] - mean * a.count[i];
+    scatter += d * d;
+  }
+  return std::sqrt(scatter * n / (n - 1)) / rows;
 }
 
 std::optional<Closure> closure_of(const Losses& refit, const Losses& effect, double floor) {

@@ -21,6 +21,8 @@ struct Losses {
   std::optional<double> mean() const;
 };
 Losses losses_of(const Surroundings& around, const Signature& residual);
+/// Sd of the difference of two means, from its scatter over blocks.
+double sd_of_difference(const Losses& a, const Losses& b);
 
 struct Closure {
   double value = 0, low = 0, high = 0;  ///< 90 % of draws of blocks with replacement lie between

@@ -43,8 +43,14 @@ std::vector<Stream> streams_of(const FlightLog& log) {
                               {kImu, &s.t_s, h.imu.rate_hz, {}}};
   if (h.mocap.position_noise_m > 0) list[1].measured = {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz};
   if (h.imu.gyro_noise_rad_s > 0) list[2].measured = {&s.gyro_x_rad_s, &s.gyro_y_rad_s, &s.gyro_z_rad_s};
-  if (log.power) list.push_back({kPower, &log.power->t_s, h.power->rate_hz, {}});
-  if (log.wings) list.push_back({kWings, &log.wings->t_s, h.wings->rate_hz, {}});
+  if (log.power) {
+    list.push_back({kPower, &log.power->t_s, h.power->rate_hz, {}});
+    if (h.power->current_noise_A > 0) list.back().measured = {&log.power->left_current_A, &log.power->right_current_A};
+  }
+  if (log.wings) {
+    list.push_back({kWings, &log.wings->t_s, h.wings->rate_hz, {}});
+    if (h.wings->noise_rad > 0) list.back().measured = {&log.wings->left_stroke_rad, &log.wings->right_stroke_rad};
+  }
   return list;
 }
 
@@ -164,8 +170,9 @@ std::vector<DataFault> data_faults(const FlightLog& log, const std::filesystem::
   if (faults.empty()) {
     const CheckReport report = check_flight(log);
     faults = wrong_clocks(log, report);
+    const bool clocks_off = !faults.empty();  // so currents go with other voltages
     for (const Finding& f : report.findings) {
-      const bool named = f.fault.file.empty() || f.check == "clock speed" ||
+      const bool named = f.fault.file.empty() || f.check == "clock speed" || (clocks_off && f.fault.file == kPower) ||
                          std::ranges::find(faults, f.fault.file, &DataFault::file) != faults.end();
       if (!named) faults.push_back({f.fault.file, f.fault.line, f.check + ": " + f.text});
     }

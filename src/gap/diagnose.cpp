@@ -10,6 +10,7 @@
 
 #include "gap/closure.hpp"
 #include "gap/model_error.hpp"
+#include "gap/screening.hpp"
 #include "gap/verdict.hpp"
 #include "model/effects/registry.hpp"
 
@@ -20,8 +21,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Reach of the first difference along a size.
-constexpr double kEffectReach = 0.4;
 /// What a further effect has to gain in the linear screening to be fitted.
 constexpr double kLeastFurther = 8;
 /// A coordinate of a size that is as good as 0.
@@ -33,11 +32,6 @@ constexpr int kMostTerms = 12, kTried = 3;
 constexpr double kTermCost = 10;
 /// Nats that an entry gains before its equation's errors count: beyond, an unknown cause has to explain as much again.
 constexpr double kLarge = 350;
-/// How much more than the parameters alone an effect may leave, as a share of the gap that they leave.
-constexpr double kWorse = 0.3;
-/// By how much the figures of an effect are farther off than rows and floors alone let expect, and how far a size is off because
-/// the robot's effect has another form than the entry, as a share of itself.
-constexpr double kWider = 1.4, kSizeError = 0.1;
 /// What was thought before any flight: how often a gap is of each kind.
 constexpr double kPriorNone = 0.1, kPriorParameters = 0.15, kPriorEffect = 0.6, kPriorUnknown = 0.15;
 /// Nats that an entry may gain on a robot without any effect, for two makers' models differ by more here and there than their
@@ -45,11 +39,6 @@ constexpr double kPriorNone = 0.1, kPriorParameters = 0.15, kPriorEffect = 0.6, 
 constexpr double kByChance = 8, kByChanceBeside = 16;
 /// For every further effect.
 constexpr double kPriorFurther = 0.1;
-
-/// Of a size that cannot be negative: log of twice the probability that N(mean, sd^2) is positive, as half its prior was.
-double log_twice_positive(double mean, double sd) {
-  return std::log(std::max(std::erfc(-mean / (sd * std::numbers::sqrt2)), 1e-300));
-}
 
 class Diagnoser {
  public:
@@ -59,9 +48,8 @@ class Diagnoser {
         uncertain_(uncertain),
         options_(options),
         threads_(options.threads > 0 ? options.threads : omp_get_num_procs()),
-        shared_(Hypothesis(uncertain, {}).shared()),
         all_(flights.size(), 1),
-        evidence_(flights),
+        evidence_(flights, threads_),
         fitter_(flights, evidence_, threads_) {}
 
   Diagnosis run() {
@@ -70,20 +58,22 @@ class Diagnoser {
     const Hypothesis plain(uncertain_, {});
     const Linearised nominal = fit_parameters(plain);
     progress(0.3, "screening effects");
-    const std::vector<Column> columns = effect_columns({}, parameters_);
+    const std::vector<SizeColumn> columns = size_columns({}, parameters_);
     std::vector<Smooth> background;
-    for (const Column& c : columns) background.push_back(background_sd(c.effect) * c.change);
+    for (const SizeColumn& c : columns) background.push_back(background_sd(c.effect) * c.change);
     fitter_.set_background(std::move(background));
     parameters_ = fitter_.refit(plain, parameters_, 4);
     d.parameters = parameters_;
-    d.answers.push_back(weigh(Answer::Kind::none, {}, nominal, std::log(kPriorNone)));
-    plain_ = log_evidence(parameters_.point, 0);
-    d.answers.push_back(weigh(Answer::Kind::parameters, {}, parameters_.point, std::log(kPriorParameters)));
-    Answer unknown = explain_freely(parameters_.point, 0, std::log(kPriorUnknown));
+    around_ = surroundings_of(flights_, noise_sd());
+    loss_ = losses_of(around_, parameters_.point.residual);
+    d.answers.push_back(weigh(Answer::Kind::none, plain, nominal, std::log(kPriorNone)));
+    plain_ = log_evidence(plain, parameters_.point);
+    d.answers.push_back(weigh(Answer::Kind::parameters, plain, parameters_.point, std::log(kPriorParameters)));
+    Answer unknown = explain_freely(plain, parameters_.point, std::log(kPriorUnknown));
     const double parameters = d.answers[1].log_evidence;
 
     std::vector<Answer> singles;
-    const std::vector<Screened> screened = screen(columns, parameters_);
+    const std::vector<Screened> screened = screen(evidence_, fitter_, parameters_, columns);
     for (std::size_t i = 0; i < screened.size(); ++i) {
       const Screened& s = screened[i];
       Answer a;
@@ -98,7 +88,7 @@ class Diagnoser {
       Answer best = singles.front();
       for (int n = 2; n <= options_.most_effects; ++n) {
         if (!progress(0.7 + 0.1 * n, "looking beside " + best.effects.back())) break;
-        const auto beside = screen(effect_columns(best.effects, best.fit), best.fit);
+        const auto beside = screen(evidence_, fitter_, best.fit, size_columns(best.effects, best.fit));
         if (beside.empty() || beside.front().gain < kLeastFurther) break;
         std::vector<Screened> set = screened_of(best);
         set.push_back(beside.front());
@@ -112,13 +102,13 @@ class Diagnoser {
     const auto best = std::ranges::max_element(singles, {}, &Answer::log_evidence);
     if (best != singles.end() && best->fitted()) {
       const double log_prior = std::log(kPriorUnknown / static_cast<double>(model::effects().size()));
-      Answer beside = explain_freely(best->fit.point, best->effects.size(), log_prior);
+      Answer beside = explain_freely(Hypothesis(uncertain_, best->effects), best->fit.point, log_prior);
       if (!beside.terms.empty() && beside.log_evidence > unknown.log_evidence) unknown = std::move(beside);
       unknown.log_evidence -= std::max(0.0, best->log_evidence - parameters - kLarge);
     }
     d.answers.push_back(std::move(unknown));
     for (Answer& a : singles) {
-      if (a.fitted()) widen(a);
+      if (a.fitted()) widen(a.fit, Hypothesis(uncertain_, a.effects));
       d.answers.push_back(std::move(a));
     }
     d.complete = !stopped_;
@@ -151,44 +141,14 @@ class Diagnoser {
     return fitter_.linearise(plain, plain.start(), none);
   }
 
-  /// Of a prediction, from what is left before and after it moved by `span`; empty where it came apart.
-  Smooth change(const Signature& before, Signature after, double span) const {
-    if (after.empty()) return {};
-    for (std::size_t f = 0; f < after.size(); ++f)
-      for (std::size_t i = 0; i < after[f].size(); ++i) after[f][i] = (before[f][i] - after[f][i]) / span;
-    return evidence_.smooth(after);
-  }
-
-  /// Columns of a linearised hypothesis, its prior means, and the background's.
-  struct Columns {
-    std::vector<const Smooth*> columns;
-    std::vector<int> chosen;
-    std::vector<double> prior_mean;
-    VectorXd mean() const {
-      return Eigen::Map<const VectorXd>(prior_mean.data(), static_cast<Index>(prior_mean.size()));
-    }
-    void add(const Smooth& column, double mean) {
-      chosen.push_back(static_cast<int>(columns.size()));
-      columns.push_back(&column);
-      prior_mean.push_back(mean);
-    }
-  };
-  Columns columns_of(const Linearised& l) const {
-    Columns c;
-    for (std::size_t k = 0; k < l.columns.size(); ++k)
-      if (l.columns[k].size() > 0) c.add(l.columns[k], -l.directions.axes.col(static_cast<Index>(k)).dot(l.at));
-    for (const Smooth& b : fitter_.background()) c.add(b, 0);
-    return c;
-  }
-
   Posterior posterior(const Linearised& l, const Columns& c, const std::vector<char>& use, const Smooth& sd) const {
     return Evidence::posterior(evidence_.reduce(l.statistics, c.columns, use, sd), c.chosen, c.mean());
   }
 
   /// Whatever models are mistaken by; of what so many effects gain over the parameters, what is more than chance.
-  double log_evidence(const Linearised& l, std::size_t effects) const {
-    const Columns c = columns_of(l);
-    const Smooth own = form_error(l);
+  double log_evidence(const Hypothesis& h, const Linearised& l) const {
+    const Columns c = fitter_.columns_of(l);
+    const Smooth own = fitter_.form_error(h, l);
     const Smooth floor = evidence_.floor();
     std::vector<double> each;
     for (const Mistaken& m : kMistaken)
@@ -197,26 +157,18 @@ class Diagnoser {
     double sum = 0;
     for (const double e : each) sum += std::exp(e - most);
     const double all = most + std::log(sum), gain = all - plain_;
-    if (effects == 0) return all;
-    const double by_chance = kByChance + kByChanceBeside * static_cast<double>(effects - 1);
+    if (h.effects().empty()) return all;
+    const double by_chance = kByChance + kByChanceBeside * static_cast<double>(h.effects().size() - 1);
     return plain_ + std::max(gain - by_chance, std::min(gain, 0.0));
   }
 
   static Smooth together(const Smooth& a, const Smooth& b) { return (a.array().square() + b.array().square()).sqrt(); }
 
-  /// What the equations of effects get wrong of themselves.
-  Smooth form_error(const Linearised& l) const {
-    Smooth own = Smooth::Zero(kGroups, evidence_.basis().size());
-    for (std::size_t k = static_cast<std::size_t>(shared_); k < l.columns.size(); ++k)
-      if (l.columns[k].size() > 0) own += kFormError * l.at[static_cast<Index>(k)] * l.columns[k];
-    return own.cwiseAbs();
-  }
-
-  Answer weigh(Answer::Kind kind, std::vector<std::string> effects, const Linearised& l, double log_prior) const {
+  Answer weigh(Answer::Kind kind, const Hypothesis& h, const Linearised& l, double log_prior) const {
     Answer a;
     a.kind = kind;
-    a.effects = std::move(effects);
-    a.log_evidence = log_evidence(l, a.effects.size()) + log_prior;
+    a.effects = h.effects();
+    a.log_evidence = log_evidence(h, l) + log_prior;
     return a;
   }
 
@@ -248,13 +200,14 @@ class Diagnoser {
   }
 
   /// Gives single functions of the regime more room than every model needs, as long as that pays.
-  Answer explain_freely(const Linearised& l, std::size_t effects, double log_prior) const {
-    const Columns c = columns_of(l);
+  Answer explain_freely(const Hypothesis& h, const Linearised& l, double log_prior) const {
+    const Columns c = fitter_.columns_of(l);
     const Smooth floor = evidence_.floor();
-    Smooth sd = together(floor, form_error(l));
+    Smooth sd = together(floor, fitter_.form_error(h, l));
     Posterior now = posterior(l, c, all_, sd);
     Answer a;
     a.kind = Answer::Kind::unknown;
+    a.beside = h.effects();
     double gained = 0;
     std::vector<Possible> possible = possible_terms();
     for (int n = 0; n < kMostTerms; ++n) {
@@ -294,100 +247,28 @@ class Diagnoser {
     }
     if (a.terms.empty()) gained = -possible.front().cost;  // a cause has to show somewhere
     // what the terms gain, beside what is known without them
-    a.log_evidence = log_evidence(l, effects) + gained + log_prior;
+    a.log_evidence = log_evidence(h, l) + gained + log_prior;
     return a;
   }
 
-  /// What a size of an effect changes.
-  struct Column {
-    std::string effect;
-    Index unknown;  ///< of the effect's
-    Smooth change;  ///< for a unit
-  };
-
-  /// Of every entry, beside others: sizes step from 0, shapes stay.
-  std::vector<Column> effect_columns(const std::vector<std::string>& beside, const Fit& fit) const {
-    std::vector<Column> columns;
+  /// What every size would change beside a fit.
+  std::vector<SizeColumn> size_columns(const std::vector<std::string>& beside, const Fit& fit) const {
+    std::vector<SizeColumn> columns;
     std::vector<Candidate> candidates;
-    for (const model::EffectEntry& e : model::effects()) {
-      const std::string id = e.info.id;
-      if (std::ranges::count(beside, id) || std::ranges::count(options_.withheld, id)) continue;
-      std::vector<std::string> set = beside;
-      set.push_back(id);
-      const Hypothesis h(uncertain_, set);
-      const Index first = fit.point.at.size();
-      VectorXd at = h.start();
-      at.head(first) = fit.point.at;
-      for (Index i = first; i < h.size(); ++i) {
-        if (!h.unknowns()[static_cast<std::size_t>(i)].size) continue;
-        VectorXd there = at;
-        there[i] = kEffectReach;
-        columns.push_back({id, i - first, {}});
-        candidates.push_back(h.candidate(there));
-      }
+    for (SizeStep& s : size_steps(uncertain_, beside, fit.point.at, options_.withheld)) {
+      columns.push_back({s.effect, s.unknown, {}});
+      candidates.push_back(std::move(s.candidate));
     }
-    std::vector<Signature> rows = fitter_.residuals(candidates);
-    for (std::size_t i = 0; i < columns.size(); ++i)
-      columns[i].change = change(fit.point.residual, std::move(rows[i]), kEffectReach);
-    std::erase_if(columns, [](const Column& c) { return c.change.size() == 0; });
+    std::vector<Signature> rows = residuals(flights_, candidates, threads_);
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      if (rows[i].empty()) continue;  // it comes apart
+      for (std::size_t f = 0; f < rows[i].size(); ++f)
+        for (std::size_t k = 0; k < rows[i][f].size(); ++k)
+          rows[i][f][k] = (fit.point.residual[f][k] - rows[i][f][k]) / kSizeReach;
+      columns[i].change = evidence_.smooth(rows[i]);
+    }
+    std::erase_if(columns, [](const SizeColumn& c) { return c.change.size() == 0; });
     return columns;
-  }
-
-  /// What every effect would gain beside others, as far as a linear model sees.
-  std::vector<Screened> screen(const std::vector<Column>& columns, const Fit& fit) const {
-    Columns c = columns_of(fit.point);
-    const std::vector<int> base = c.chosen;
-    std::vector<std::string> names;
-    for (const Column& column : columns) {
-      c.add(column.change, 0);
-      if (names.empty() || names.back() != column.effect) names.push_back(column.effect);
-    }
-    const Reduced reduced = evidence_.reduce(fit.point.statistics, c.columns, all_, evidence_.floor());
-    const VectorXd mean = c.mean();
-    const auto solve = [&](const std::vector<std::size_t>& own) {
-      std::vector<int> chosen = base;
-      for (const std::size_t i : own) chosen.push_back(static_cast<int>(base.size() + i));
-      return Evidence::posterior(reduced, chosen, mean(chosen));
-    };
-    const double without = solve({}).log_evidence;
-    std::vector<Screened> ranking;
-    for (const std::string& name : names) {
-      const std::vector<Unknown> unknowns = unknowns_of(name);
-      std::vector<std::size_t> own;
-      for (std::size_t i = 0; i < columns.size(); ++i)
-        if (columns[i].effect == name) own.push_back(i);
-      const std::size_t all = own.size();
-      Screened s{name, 0, VectorXd::Zero(static_cast<Index>(unknowns.size()))};
-      while (!own.empty()) {
-        const Posterior p = solve(own);
-        const auto value = [&](std::size_t k) { return p.mean[static_cast<Index>(base.size() + k)]; };
-        const auto sd = [&](std::size_t k) {
-          const auto i = static_cast<Index>(base.size() + k);
-          return std::sqrt(p.covariance(i, i));
-        };
-        const auto one_sided = [&](std::size_t k) {
-          return unknowns[static_cast<std::size_t>(columns[own[k]].unknown)].low >= 0;
-        };
-        if (own.size() == all) {
-          s.gain = p.log_evidence - without;
-          for (std::size_t k = 0; k < own.size(); ++k)
-            if (one_sided(k)) s.gain += log_twice_positive(value(k), sd(k));
-        }
-        // of sizes with one sign, the one that comes out farthest on the other is none
-        std::size_t worst = own.size();
-        for (std::size_t k = 0; k < own.size(); ++k)
-          if (one_sided(k) && value(k) < 0 && (worst == own.size() || value(k) < value(worst))) worst = k;
-        if (worst < own.size()) {
-          own.erase(own.begin() + static_cast<std::ptrdiff_t>(worst));
-          continue;
-        }
-        for (std::size_t k = 0; k < own.size(); ++k) s.coordinates[columns[own[k]].unknown] = value(k);
-        break;
-      }
-      ranking.push_back(std::move(s));
-    }
-    std::ranges::sort(ranking, std::greater{}, &Screened::gain);
-    return ranking;
   }
 
   /// Where a fit left its effects, to go on from.
@@ -418,23 +299,24 @@ class Diagnoser {
   }
 
   /// An entry that would gain nothing: what the flights do not tell of it stays as it was thought before.
-  Answer leave_open(const Screened& s, const std::vector<Column>& columns) const {
+  Answer leave_open(const Screened& s, const std::vector<SizeColumn>& columns) const {
     Answer a;
     a.kind = Answer::Kind::effect;
     a.effects = {s.effect};
     const Hypothesis h(uncertain_, a.effects);
     std::vector<Smooth> own(unknowns_of(s.effect).size());
-    for (const Column& c : columns)
+    for (const SizeColumn& c : columns)
       if (c.effect == s.effect) own[static_cast<std::size_t>(c.unknown)] = c.change;
     a.fit = fitter_.linear(h, parameters_, own);
-    // of its first size what is probable beyond 0, with all else as that has it
+    a.log_evidence = plain_ + std::min(s.gain, 0.0) + log_prior_of_one();
     Posterior& p = a.fit.posterior;
     const Index first = h.shared();
+    if (h.unknowns()[static_cast<std::size_t>(first)].low < 0) return a;
+    // of its first size what is probable beyond 0, with all else as that has it
     const double mean = p.mean[first], sd = std::sqrt(p.covariance(first, first)), t = mean / sd;
     const double beyond =
         std::exp(-0.5 * t * t) / (std::sqrt(std::numbers::pi / 2) * std::erfc(-t / std::numbers::sqrt2));
     p.mean += p.covariance.col(first) / sd * (t > -5 ? beyond : -t);
-    a.log_evidence = plain_ + std::min(s.gain, 0.0) + log_prior_of_one();
     return a;
   }
 
@@ -452,7 +334,7 @@ class Diagnoser {
       at += s.coordinates.size();
     }
     Fit fit = fitter_.fit(h, h.bounded(start), parameters_, 6);
-    if (fit.point.residual.empty() || worse(fit)) {
+    if (fit.point.residual.empty() || refuted(loss_, losses_of(around_, fit.point.residual))) {
       Answer none;
       none.kind = Answer::Kind::effect;
       none.effects = effects;
@@ -465,29 +347,9 @@ class Diagnoser {
       const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
       if (u.size && u.low >= 0) log_prior += std::log(2.0);
     }
-    Answer a = weigh(Answer::Kind::effect, effects, fit.point, log_prior);
+    Answer a = weigh(Answer::Kind::effect, h, fit.point, log_prior);
     a.fit = std::move(fit);
     return a;
-  }
-
-  /// Whether effects, wherever models may be mistaken, leave more in all than the parameters alone.
-  bool worse(const Fit& fit) const {
-    const Surroundings around = surroundings_of(flights_, noise_sd());
-    const auto before = losses_of(around, parameters_.point.residual).mean();
-    const auto after = losses_of(around, fit.point.residual).mean();
-    return before && after && *after - *before > kWorse * (*before - huber_floor());
-  }
-
-  /// Directions of effects are their coordinates.
-  void widen(Answer& a) const {
-    const Hypothesis h(uncertain_, a.effects);
-    const VectorXd mean = a.fit.mean();
-    MatrixXd& covariance = a.fit.posterior.covariance;
-    for (Index i = h.shared(); i < h.size(); ++i) {
-      covariance.row(i) *= kWider;
-      covariance.col(i) *= kWider;
-      if (h.unknowns()[static_cast<std::size_t>(i)].size) covariance(i, i) += std::pow(kSizeError * mean[i], 2);
-    }
   }
 
   /// What is left in every flight with the fit to the others; of a single flight, with its own.
@@ -495,7 +357,7 @@ class Diagnoser {
     std::vector<Candidate> candidates;
     std::vector<Signature*> of;
     const auto add = [&](const Hypothesis& h, const Linearised& l, const Smooth& sd, Signature& left) {
-      const Columns c = columns_of(l);
+      const Columns c = fitter_.columns_of(l);
       for (std::size_t f = 0; f < all_.size(); ++f) {
         std::vector<char> others = all_;
         if (all_.size() > 1) others[f] = 0;
@@ -512,9 +374,9 @@ class Diagnoser {
     for (Answer& a : d.answers)
       if (a.fitted()) {
         const Hypothesis h(uncertain_, a.effects);
-        add(h, a.fit.point, together(evidence_.floor(), form_error(a.fit.point)), a.left);
+        add(h, a.fit.point, together(evidence_.floor(), fitter_.form_error(h, a.fit.point)), a.left);
       }
-    std::vector<Signature> rows = fitter_.residuals(candidates);
+    std::vector<Signature> rows = residuals(flights_, candidates, threads_);
     for (std::size_t i = 0; i < of.size(); ++i)
       for (std::size_t f = 0; f < all_.size(); ++f) {
         Signature& s = rows[i * all_.size() + f];
@@ -532,11 +394,12 @@ class Diagnoser {
   const sim::Randomisation& uncertain_;
   const DiagnoseOptions& options_;
   int threads_;
-  Index shared_;  ///< of all hypotheses' unknowns
   std::vector<char> all_;
-  mutable Evidence evidence_;
+  Evidence evidence_;
   Fitter fitter_;
   Fit parameters_;
+  Surroundings around_;
+  Losses loss_;       ///< of the parameters alone
   double plain_ = 0;  ///< log evidence of the parameters alone
   bool stopped_ = false;
 };

@@ -29,19 +29,13 @@ struct Answer {
   std::vector<std::string> effects;
   double log_evidence = 0;  ///< of all flights
   double probability = 0;
-  std::vector<Term> terms;  ///< of an unknown cause
+  std::vector<Term> terms;          ///< of an unknown cause
+  std::vector<std::string> beside;  ///< of an unknown cause: effects that its terms are beside
   /// Of effects and parameters. An effect that would gain nothing is weighed as far as a linear model sees: no residual, and
   /// its size is what flights that tell nothing of it leave probable.
   Fit fit;
   Signature left;  ///< of an effect that was fitted: in each flight what is left with the fit to the others
   bool fitted() const { return !fit.point.residual.empty(); }
-};
-
-/// What an effect would explain beside the fitted parameters, as far as a linear model sees.
-struct Screened {
-  std::string effect;
-  double gain = 0;              ///< nats
-  Eigen::VectorXd coordinates;  ///< of its unknowns
 };
 
 struct DiagnoseOptions {

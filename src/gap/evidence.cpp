@@ -43,7 +43,8 @@ double median(std::vector<double> v) {
 
 }  // namespace
 
-Evidence::Evidence(const std::vector<CarriedFlight>& flights) : flights_(flights), basis_(flights), groups_(kGroups) {
+Evidence::Evidence(const std::vector<CarriedFlight>& flights, int threads)
+    : flights_(flights), threads_(threads), basis_(flights), groups_(kGroups) {
   for (const CarriedFlight& f : flights) weights_.emplace_back(f.beats() * kRowsPerBeat, 1.0);
   for (int channel = 0; channel < kChannels; ++channel) {
     double all = 0;
@@ -105,7 +106,7 @@ void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
 
 void Evidence::find_noise(const Signature& residual, Find what) {
   const Index q = basis_.size();
-#pragma omp parallel for schedule(dynamic) num_threads(2)
+#pragma omp parallel for schedule(dynamic) num_threads(threads_)
   for (int g = 0; g < kGroups; ++g) {
     const int channel = g / kCoefficients;
     if (!has_rows(channel, g % kCoefficients)) continue;

@@ -9,7 +9,6 @@
 //            found from what even the whole basis does not explain; heavy-tailed: rows far off count less (Student t)
 // theta and eta are integrated out (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 2.7), so
 //   log p(residual) = -1/2 r^T K^-1 r - 1/2 log det K + const
-// and what whole flights say of another is the difference of two of these.
 #pragma once
 
 #include <Eigen/Dense>
@@ -65,7 +64,7 @@ struct Posterior {
 
 class Evidence {
  public:
-  explicit Evidence(const std::vector<CarriedFlight>& flights);
+  Evidence(const std::vector<CarriedFlight>& flights, int threads);
 
   const RegimeBasis& basis() const { return basis_; }
   /// Noise is as the headers declare it, until it is learnt from what a good fit leaves: its scale, its autocorrelation, and
@@ -111,6 +110,7 @@ class Evidence {
   void for_whitened(std::size_t flight, int group, const Use& use) const;
 
   const std::vector<CarriedFlight>& flights_;
+  int threads_;
   RegimeBasis basis_;
   std::vector<Group> groups_;
   Signature weights_;

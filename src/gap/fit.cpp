@@ -24,42 +24,49 @@ constexpr double kConverged = 0.02;
 /// Nats that another linearisation has to bring.
 constexpr double kWorthwhile = 0.05;
 
-std::vector<char> all_of(std::size_t flights) { return std::vector<char>(flights, 1); }
-
 }  // namespace
 
-std::vector<Signature> Fitter::residuals(const std::vector<Candidate>& candidates) const {
+VectorXd Columns::mean() const {
+  return Eigen::Map<const VectorXd>(prior_mean.data(), static_cast<Index>(prior_mean.size()));
+}
+
+void Columns::add(const Smooth& column, double mean) {
+  chosen.push_back(static_cast<int>(columns.size()));
+  columns.push_back(&column);
+  prior_mean.push_back(mean);
+}
+
+std::vector<Signature> residuals(const std::vector<CarriedFlight>& flights, const std::vector<Candidate>& candidates,
+                                 int threads) {
   // candidates whose sensors agree share a log
   std::map<EffectValues, std::vector<std::size_t>> by_sensors;
   for (std::size_t i = 0; i < candidates.size(); ++i)
     by_sensors[sensor_effects(candidates[i].vehicle.effects)].push_back(i);
   std::vector<Signature> list(candidates.size());
-  const auto compare = [&](const std::vector<CarriedFlight>& flights, const std::vector<std::size_t>& which,
-                           int threads) {
+  const auto compare = [&](const std::vector<CarriedFlight>& seen, const std::vector<std::size_t>& which, int at_once) {
     std::vector<Candidate> group;
     for (const std::size_t i : which) group.push_back(candidates[i]);
-    std::vector<Signature> predicted = predict_all(flights, group, threads);
+    std::vector<Signature> predicted = predict_all(seen, group, at_once);
     for (std::size_t g = 0; g < which.size(); ++g) {
       Signature& s = predicted[g];
       const bool whole = std::ranges::none_of(s, [](const Rows& rows) { return rows.empty(); });
-      for (std::size_t f = 0; whole && f < flights.size(); ++f)
-        for (std::size_t i = 0; i < s[f].size(); ++i) s[f][i] = flights[f].measured()[i] - s[f][i];
+      for (std::size_t f = 0; whole && f < seen.size(); ++f)
+        for (std::size_t i = 0; i < s[f].size(); ++i) s[f][i] = seen[f].measured()[i] - s[f][i];
       if (whole) list[which[g]] = std::move(s);
     }
   };
   std::vector<std::pair<EffectValues, std::vector<std::size_t>>> corrected;
   for (auto& [sensors, which] : by_sensors) {
-    if (sensors.empty()) compare(flights_, which, threads_);
+    if (sensors.empty()) compare(flights, which, threads);
     else corrected.emplace_back(sensors, which);
   }
   std::exception_ptr failed;
-#pragma omp parallel for schedule(dynamic) num_threads(threads_)
+#pragma omp parallel for schedule(dynamic) num_threads(threads)
   for (std::size_t k = 0; k < corrected.size(); ++k) {
     try {
-      std::vector<CarriedFlight> flights;
-      for (const CarriedFlight& f : flights_)
-        flights.push_back(f.with_log(without(corrected[k].first, f.recording().log)));
-      compare(flights, corrected[k].second, 1);
+      std::vector<CarriedFlight> seen;
+      for (const CarriedFlight& f : flights) seen.push_back(f.with_log(without(corrected[k].first, f.recording().log)));
+      compare(seen, corrected[k].second, 1);
     } catch (...) {  // nothing may leave a parallel loop
 #pragma omp critical
       failed = std::current_exception();
@@ -86,7 +93,7 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
     candidates.push_back(hypothesis.candidate(up));
     candidates.push_back(hypothesis.candidate(down));
   }
-  std::vector<Signature> rows = residuals(candidates);
+  std::vector<Signature> rows = residuals(flights_, candidates, threads_);
   Linearised l{at, std::move(directions), std::move(rows[0]), {}, known};
   for (std::size_t d = 0; d < spans.size(); ++d) {
     Signature &up = rows[1 + 2 * d], &down = rows[2 + 2 * d];
@@ -113,15 +120,16 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
     VectorXd shift = VectorXd::Zero(k);
     for (Index d = 0; d < k; ++d) {
       if (l.columns[static_cast<std::size_t>(d)].size() == 0) continue;
-      // rows of a Hadamard matrix: every direction goes as often up as down, and no two together
-      const int sign = __builtin_popcount(static_cast<unsigned>((d + 1) & i)) % 2 ? -1 : 1;
+      // columns of a Hadamard matrix but its first: every direction goes as often up as down, and of any seven that follow one
+      // another no two together
+      const int sign = __builtin_popcount(static_cast<unsigned>((d % (kAround - 1) + 1) & i)) % 2 ? -1 : 1;
       shift[d] = kAroundReach * sign * l.directions.reach[d];
     }
     const VectorXd there = hypothesis.bounded(l.at + l.directions.axes.leftCols(k) * shift);
     shifts.push_back(l.directions.axes.leftCols(k).transpose() * (there - l.at));
     candidates.push_back(hypothesis.candidate(there));
   }
-  const std::vector<Signature> rows = residuals(candidates);
+  const std::vector<Signature> rows = residuals(flights_, candidates, threads_);
   double n = 1;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (rows[i].empty()) continue;
@@ -137,31 +145,38 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
     for (VectorXd& sum : flight) sum /= n;
 }
 
-void Fitter::add_background(std::vector<const Smooth*>& columns, std::vector<int>& chosen) const {
-  for (const Smooth& b : background_) {
-    chosen.push_back(static_cast<int>(columns.size()));
-    columns.push_back(&b);
+Columns Fitter::columns_of(const Linearised& point) const {
+  Columns c;
+  for (std::size_t d = 0; d < point.columns.size(); ++d)
+    if (point.columns[d].size() > 0)
+      c.add(point.columns[d], -point.directions.axes.col(static_cast<Index>(d)).dot(point.at));
+  for (const Smooth& b : background_) c.add(b, 0);
+  return c;
+}
+
+Smooth Fitter::form_error(const Hypothesis& hypothesis, const Linearised& point) const {
+  std::map<std::string, Smooth> whole;
+  for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
+    const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(i)];
+    const Smooth& column = point.columns[static_cast<std::size_t>(i)];
+    if (!u.size || column.size() == 0) continue;
+    Smooth& own = whole[u.effect];
+    if (own.size() == 0) own = Smooth::Zero(column.rows(), column.cols());
+    own += point.at[i] * column;
   }
+  Smooth squares = Smooth::Zero(kGroups, evidence_.basis().size());
+  for (const auto& [effect, own] : whole) squares += (kFormError * own).cwiseAbs2();
+  return squares.cwiseSqrt();
 }
 
 Posterior Fitter::solve(const Linearised& point) const {
-  const Index k = point.directions.reach.size();
-  std::vector<const Smooth*> columns;
-  std::vector<int> chosen;
+  const Columns c = columns_of(point);
+  const Posterior p = Evidence::posterior(
+      evidence_.reduce(point.statistics, c.columns, all_flights(), evidence_.floor()), c.chosen, c.mean());
   std::vector<Index> seen;
-  for (Index d = 0; d < k; ++d) {
-    if (point.columns[static_cast<std::size_t>(d)].size() == 0) continue;
-    chosen.push_back(static_cast<int>(columns.size()));
-    columns.push_back(&point.columns[static_cast<std::size_t>(d)]);
-    seen.push_back(d);
-  }
-  const auto own = static_cast<Index>(columns.size());
-  add_background(columns, chosen);
-  const Reduced reduced = evidence_.reduce(point.statistics, columns, all_of(flights_.size()), evidence_.floor());
-  VectorXd prior_mean = VectorXd::Zero(static_cast<Index>(columns.size()));
-  const VectorXd start = -(point.directions.axes.transpose() * point.at);
-  prior_mean.head(own) = start(seen);
-  const Posterior p = Evidence::posterior(reduced, chosen, prior_mean);
+  for (std::size_t d = 0; d < point.columns.size(); ++d)
+    if (point.columns[d].size() > 0) seen.push_back(static_cast<Index>(d));
+  const auto own = static_cast<Index>(seen.size()), k = static_cast<Index>(point.columns.size());
   Posterior all{p.log_evidence, VectorXd::Zero(k), MatrixXd::Identity(k, k)};
   all.mean(seen) = p.mean.head(own);
   all.covariance(seen, seen) = p.covariance.topLeftCorner(own, own);
@@ -174,12 +189,10 @@ MatrixXd Fit::covariance() const {
 }
 
 double Fitter::cost(const Statistics& residual, const VectorXd& at) const {
-  std::vector<const Smooth*> columns;
-  std::vector<int> chosen;
-  add_background(columns, chosen);
-  const Reduced reduced = evidence_.reduce(residual, columns, all_of(flights_.size()), evidence_.floor());
-  const VectorXd none = VectorXd::Zero(static_cast<Index>(columns.size()));
-  return 0.5 * at.squaredNorm() - Evidence::posterior(reduced, chosen, none).log_evidence;
+  Columns c;
+  for (const Smooth& b : background_) c.add(b, 0);
+  const Reduced reduced = evidence_.reduce(residual, c.columns, all_flights(), evidence_.floor());
+  return 0.5 * at.squaredNorm() - Evidence::posterior(reduced, c.chosen, c.mean()).log_evidence;
 }
 
 /// Those of the parameters' fit, and the effects' own.
@@ -244,10 +257,10 @@ Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iteration
 
 Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const {
   if (fit.point.residual.empty()) return fit;  // comes apart
-  for (fit.iterations = 1;; ++fit.iterations) {
+  for (int n = 1;; ++n) {
     const Linearised& l = fit.point;
     fit.posterior = solve(l);
-    if (fit.iterations >= iterations) return fit;
+    if (n >= iterations) return fit;
     const VectorXd step = l.directions.axes * fit.posterior.mean;
     if (step.cwiseAbs().maxCoeff() < kConverged) return fit;
     // the longest share of the step that pays, all tried at once
@@ -258,7 +271,7 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
       tries.push_back(hypothesis.bounded(l.at + share * step));
       candidates.push_back(hypothesis.candidate(tries.back()));
     }
-    const std::vector<Signature> left = residuals(candidates);
+    const std::vector<Signature> left = residuals(flights_, candidates, threads_);
     const double before = cost(evidence_.statistics(l.residual), l.at);
     std::size_t best = tries.size();
     double best_cost = before;

@@ -26,23 +26,37 @@ struct Linearised {
 struct Fit {
   Linearised point;
   Posterior posterior;  ///< along the directions, relative to `point.at`
-  int iterations = 0;
   /// Of the coordinates.
   Eigen::VectorXd mean() const;
   Eigen::MatrixXd covariance() const;
 };
 
+/// Columns beside each other, and the prior means of their coefficients.
+struct Columns {
+  std::vector<const Smooth*> columns;
+  std::vector<int> chosen;  ///< all of them
+  std::vector<double> prior_mean;
+  Eigen::VectorXd mean() const;
+  void add(const Smooth& column, double mean);
+};
+
+/// Residuals under many candidates; empty signatures for vehicles that come apart.
+std::vector<Signature> residuals(const std::vector<CarriedFlight>& flights, const std::vector<Candidate>& candidates,
+                                 int threads);
+
 class Fitter {
  public:
-  Fitter(const std::vector<CarriedFlight>& flights, Evidence& evidence, int threads)
+  Fitter(const std::vector<CarriedFlight>& flights, const Evidence& evidence, int threads)
       : flights_(flights), evidence_(evidence), threads_(threads) {}
 
   /// Columns that may take what they can beside every hypothesis, with standard normal coefficients.
   void set_background(std::vector<Smooth> columns) { background_ = std::move(columns); }
-  const std::vector<Smooth>& background() const { return background_; }
+  std::vector<char> all_flights() const { return std::vector<char>(flights_.size(), 1); }
+  /// The columns of a point that do not come apart, then the background's.
+  Columns columns_of(const Linearised& point) const;
+  /// What the equations of its effects get wrong of themselves: shares of all that the sizes of each change.
+  Smooth form_error(const Hypothesis& hypothesis, const Linearised& point) const;
 
-  /// Residuals under many candidates; empty signatures for vehicles that come apart.
-  std::vector<Signature> residuals(const std::vector<Candidate>& candidates) const;
   /// `known`: columns of the first directions, which need not be found again.
   Linearised linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
                        const std::vector<Smooth>& known = {}) const;
@@ -64,12 +78,11 @@ class Fitter {
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
   Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const;
   void average(const Hypothesis& hypothesis, Linearised& l) const;
-  void add_background(std::vector<const Smooth*>& columns, std::vector<int>& chosen) const;
   Posterior solve(const Linearised& point) const;
   double cost(const Statistics& residual, const Eigen::VectorXd& at) const;
 
   const std::vector<CarriedFlight>& flights_;
-  Evidence& evidence_;
+  const Evidence& evidence_;
   int threads_;
   std::vector<Smooth> background_;
 };

@@ -59,24 +59,20 @@ struct Expected {
 };
 
 /// Nothing where its vehicle comes apart.
-std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, const Smooth& floor) {
+std::optional<Expected> expect(const Rival& rival, const Fitter& fitter) {
   const Linearised l = fitter.linearise(rival.hypothesis, rival.at, rival.directions);
   if (l.residual.empty()) return {};
-  Expected e{l.statistics, {}, Smooth::Zero(floor.rows(), floor.cols())};
+  Expected e{l.statistics, {}, fitter.form_error(rival.hypothesis, l)};
   const Index k = rival.covariance.rows();
   if (k == 0) return e;  // without a gap nothing is uncertain
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(rival.covariance);
   for (Index i = 0; i < k; ++i) {
-    Smooth sum = Smooth::Zero(floor.rows(), floor.cols());
+    Smooth sum = Smooth::Zero(e.form.rows(), e.form.cols());
     for (Index d = 0; d < k; ++d) {
       const Smooth& column = l.columns[static_cast<std::size_t>(d)];
       if (column.size() > 0) sum += eigen.eigenvectors()(d, i) * column;
     }
     e.uncertain.emplace_back(std::sqrt(std::max(0.0, eigen.eigenvalues()[i])) * sum);
-  }
-  for (Index d = rival.hypothesis.shared(); d < k; ++d) {
-    const Smooth& column = l.columns[static_cast<std::size_t>(d)];
-    if (column.size() > 0) e.form += kFormError * rival.at[d] * column;
   }
   return e;
 }
@@ -112,12 +108,11 @@ std::optional<NextExperiment> judge(const Manoeuvre& m, const std::vector<Rival>
     list.emplace_back(Recording(m.name, std::move(*flown.front().log), rivals.front().candidate().vehicle));
     return list;
   }();
-  Evidence evidence(flight);
+  const Evidence evidence(flight, 1);
   const Fitter fitter(flight, evidence, 1);
-  const Smooth floor = evidence.floor();
   std::vector<Expected> expected;
   for (const Rival& r : rivals) {
-    std::optional<Expected> e = expect(r, fitter, floor);
+    std::optional<Expected> e = expect(r, fitter);
     if (!e) return {};
     expected.push_back(std::move(*e));
   }

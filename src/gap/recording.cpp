@@ -15,6 +15,11 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kFrequencyReach = 0.02;
 /// At both ends, so that a flight whose clocks are corrected still holds it.
 constexpr double kMargin_s = 0.05;
+/// The battery's first samples, and what in them is more than their noise.
+constexpr std::size_t kFirstSamples = 20;
+constexpr double kFuller = 1.02;
+/// Of the usual interval between commands: a longer one is a gap.
+constexpr double kLongestHold = 5;
 
 TorsoAt torso_at(const flight::TorsoMotion& m) {
   TorsoAt t;
@@ -37,7 +42,7 @@ Recording::Recording(const std::filesystem::path& folder, flight::FlightLog flig
       log(std::move(flight_log)),
       track(log, folder),
       begin_s(std::max(track.begin_s(), log.command.t_s.front()) + kMargin_s),
-      last_s(track.end_s() - kMargin_s) {
+      last_s(std::min(track.end_s(), log.command.t_s.back()) - kMargin_s) {
   prepare(folder.string());
 }
 
@@ -70,7 +75,8 @@ void Recording::lay_grid() {
   if (first >= bounds.size() || bounds[first] >= last_s) return;
   begin_s = bounds[first];
   double now_s = begin_s;
-  torso.push_back(torso_at(track.at(begin_s)));
+  torso.push_back(torso_at(track.at(std::max(begin_s, track.begin_s()))));
+  const std::vector<std::pair<double, double>> undriven = undriven_s();
   for (std::size_t k = first + 1; k < bounds.size() && bounds[k] <= last_s + kStep_s / 2; ++k) {
     // a gap is flown in pieces, so that the torso stays on its record
     const int pieces = std::max(1, static_cast<int>(std::lround((bounds[k] - now_s) / usual_s)));
@@ -85,9 +91,26 @@ void Recording::lay_grid() {
       torso.push_back(torso_at(track.at(at_s)));
       force_m_s2.push_back(track.mean_force_m_s2(from_s, now_s));
       const bool flies = torso.back().position_m[2] > least_z_m;
-      valid.push_back(flies && track.covers(std::max(from_s, track.begin_s()), at_s) ? 1 : 0);
+      const bool driven =
+          std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
+      valid.push_back(flies && driven && track.covers(std::max(from_s, track.begin_s()), at_s) ? 1 : 0);
     }
   }
+}
+
+/// Where commands are missing, and until wings have forgotten what they were driven by instead.
+std::vector<std::pair<double, double>> Recording::undriven_s() const {
+  const flight::Column& t_s = log.command.t_s;
+  flight::Column intervals_s;
+  for (std::size_t i = 1; i < t_s.size(); ++i) intervals_s.push_back(t_s[i] - t_s[i - 1]);
+  const auto middle = intervals_s.begin() + static_cast<std::ptrdiff_t>(intervals_s.size() / 2);
+  std::ranges::nth_element(intervals_s, middle);
+  const double longest_s = kLongestHold * *middle;
+  std::vector<std::pair<double, double>> spans;
+  for (std::size_t i = 1; i < t_s.size(); ++i)
+    if (t_s[i] - t_s[i - 1] > longest_s)
+      spans.emplace_back(t_s[i - 1] + longest_s, t_s[i] + kSpinUpBeats / log.header.flapping_Hz);
+  return spans;
 }
 
 void Recording::read_voltages() {
@@ -95,6 +118,15 @@ void Recording::read_voltages() {
   for (const int n : steps) total += static_cast<std::size_t>(n);
   sim::step_voltages({log.command.t_s, log.command.left_voltage_V, log.command.right_voltage_V}, begin_s, kStep_s,
                      total, left_V, right_V);
+  if (!log.power) return;
+  const flight::Column& battery_V = log.power->battery_V;
+  const std::size_t n = std::min<std::size_t>(kFirstSamples, battery_V.size());
+  double sum_V = 0;
+  for (std::size_t i = 0; i < n; ++i) sum_V += battery_V[i];
+  full = sum_V / static_cast<double>(n) / log.header.power->battery_nominal_V;
+  if (full < kFuller) full = 1;
+  for (std::vector<double>* side : {&left_V, &right_V})
+    for (double& v : *side) v *= full;
 }
 
 /// The beat's phase as the log has it, or that of the sine that fits the voltages best.

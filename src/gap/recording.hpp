@@ -30,6 +30,9 @@ struct Recording {
   std::string name;
   double least_z_m = 0;      ///< lower, the ground may be touched
   double density_ratio = 1;  ///< of the air that day, over that of the vehicle's file
+  /// Voltage of a full battery over its nominal one: commands are volts of the latter. Below it a battery gives way, which is the
+  /// robot's affair.
+  double full = 1;
   flight::FlightLog log;
   flight::Track track;
   sim::World world;
@@ -61,6 +64,7 @@ struct Recording {
  private:
   void prepare(const std::string& place);
   void lay_grid();
+  std::vector<std::pair<double, double>> undriven_s() const;
   void read_voltages();
   void find_phase();
   void read_regimes();

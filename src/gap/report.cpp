@@ -30,6 +30,12 @@ std::vector<double> over_noise(const std::vector<Place>& places, const std::stri
   return ratio;
 }
 
+/// The most probable one.
+const Answer* best_fitted(const Diagnosis& d) {
+  const auto best = std::ranges::find_if(d.answers, &Answer::fitted);
+  return best == d.answers.end() ? nullptr : &*best;
+}
+
 Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 }  // namespace
@@ -74,10 +80,8 @@ std::string unit_of(const std::string& name) {
   return text;
 }
 
-Report report_of(const std::vector<std::string>& names, const std::vector<CarriedFlight>& flights,
-                 const sim::Randomisation& uncertain, const Diagnosis& d) {
+Report answers_of(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain, const Diagnosis& d) {
   Report r;
-  r.flights = names;
   r.complete = d.complete;
   r.conclusion = conclude(d.answers);
   const Surroundings around = surroundings_of(flights, d.noise_sd);
@@ -85,21 +89,22 @@ Report report_of(const std::vector<std::string>& names, const std::vector<Carrie
   const Losses refit = losses_of(around, d.refit);
   r.nominal = losses_of(around, d.nominal).mean();
   r.refit = refit.mean();
-  const Answer* best = nullptr;
   std::vector<Reported> others;
   for (const Answer& a : d.answers) {
     const bool effect = a.kind == Answer::Kind::effect;
-    Reported c{a.kind, a.effects, effect ? pool_name(a.effects) : kind_name(a.kind), a.probability, a.log_evidence, {},
-               {},     {}};
-    if (effect) {
-      c.sizes = sizes_of(a, uncertain);
-    }
+    Reported c;
+    c.kind = a.kind;
+    c.effects = a.effects;
+    c.group = effect ? pool_name(a.effects) : kind_name(a.kind);
+    c.probability = a.probability;
+    c.log_evidence = a.log_evidence;
+    if (effect) c.sizes = sizes_of(a, uncertain);
     if (a.fitted()) {
       const Losses left = losses_of(around, a.left);
       c.loss = left.mean();
+      c.gain_sd = sd_of_difference(refit, left);
       c.closure = closure_of(refit, left, r.noise_floor);
-      if (best == nullptr) {
-        best = &a;
+      if (&a == best_fitted(d)) {
         r.effect = c.loss;
         r.closure = c.closure;
       }
@@ -110,6 +115,7 @@ Report report_of(const std::vector<std::string>& names, const std::vector<Carrie
         r.unexplained.push_back({t.channel == Term::kAll ? "all" : channel_name(t.channel),
                                  t.harmonic == Term::kAll ? "all" : std::to_string(t.harmonic), basis.name(t.function),
                                  t.times, t.gain});
+      r.beside = a.beside;
     }
     (effect ? r.candidates : others).push_back(std::move(c));
   }
@@ -118,6 +124,15 @@ Report report_of(const std::vector<std::string>& names, const std::vector<Carrie
   if (concluded.kind == Answer::Kind::effect)
     r.moved = moved_by(concluded.fit, Hypothesis(uncertain, concluded.effects));
   else r.moved = moved_by(d.parameters, Hypothesis(uncertain, {}));
+  return r;
+}
+
+Report report_of(const std::vector<std::string>& names, const std::vector<CarriedFlight>& flights,
+                 const sim::Randomisation& uncertain, const Diagnosis& d) {
+  Report r = answers_of(flights, uncertain, d);
+  r.flights = names;
+  const Surroundings around = surroundings_of(flights, d.noise_sd);
+  const Answer* best = best_fitted(d);
   const Signature* stages[] = {&d.nominal, &d.refit, best != nullptr ? &best->left : nullptr};
   for (std::size_t i = 0; i < 3; ++i) {
     if (stages[i] != nullptr) {
@@ -139,7 +154,14 @@ Report report_of(const std::vector<std::string>& names, std::vector<DataFault> f
 }
 
 Json diagnosis_json(const Report& r) {
-  Json faults = Json::array(), where = Json::array(), candidates = Json::array(), closed_loop = Json::array();
+  Json faults = Json::array(), where = Json::array(), candidates = Json::array(), closed_loop = Json::array(),
+       unexplained = Json::array();
+  for (const Unexplained& u : r.unexplained)
+    unexplained.push_back({{"channel", u.channel},
+                           {"harmonic", u.harmonic},
+                           {"function", u.function},
+                           {"times_usual", u.times},
+                           {"gain_nats", u.gain}});
   const auto finite = [](double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); };
   for (const ClosedLoop& c : r.closed_loop)
     closed_loop.push_back({{"flight", c.flight},
@@ -174,6 +196,7 @@ Json diagnosis_json(const Report& r) {
                  {"probability", r.conclusion.probability}}},
                {"where", where},
                {"candidates", candidates},
+               {"unexplained", {{"beside", r.beside}, {"terms", unexplained}}},
                {"gap",
                 {{"nominal", number(r.nominal)},
                  {"refit", number(r.refit)},

@@ -21,7 +21,7 @@ struct Size {
   std::string unit;
 };
 
-/// Of the effects of an answer; none where it was not fitted.
+/// Of the effects of an answer.
 std::vector<Size> sizes_of(const Answer& answer, const sim::Randomisation& uncertain);
 
 /// An answer as reported.
@@ -31,7 +31,8 @@ struct Reported {
   std::string group;  ///< of no effect: its kind
   double probability = 0, log_evidence = 0;
   std::vector<Size> sizes;
-  std::optional<double> loss;  ///< E
+  std::optional<double> loss;  ///< E, where it was fitted
+  double gain_sd = 0;          ///< of E_refit - E
   std::optional<Closure> closure;
 };
 
@@ -55,7 +56,8 @@ struct Report {
   Conclusion conclusion;
   std::vector<Reported> candidates;  ///< effects, the most probable first; then the kinds without one
   std::vector<Unexplained> unexplained;
-  std::vector<Moved> moved;  ///< parameters beside the concluded effects, the farthest first
+  std::vector<std::string> beside;  ///< effects that are in force beside what is unexplained
+  std::vector<Moved> moved;         ///< parameters beside the concluded effects, the farthest first
   std::vector<Place> places;
   std::optional<double> nominal, refit, effect;  ///< E; the effect: of the best candidate with one
   double noise_floor = 0;
@@ -70,6 +72,9 @@ inline constexpr const char* kStages[] = {"nominal", "refit", "effect"};
 
 /// Of data that forbid a diagnosis.
 Report report_of(const std::vector<std::string>& names, std::vector<DataFault> faults);
+/// Without names and places.
+Report answers_of(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
+                  const Diagnosis& diagnosis);
 /// `names`: of the flights' folders.
 Report report_of(const std::vector<std::string>& names, const std::vector<CarriedFlight>& flights,
                  const sim::Randomisation& uncertain, const Diagnosis& diagnosis);

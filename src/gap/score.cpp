@@ -10,6 +10,8 @@
 namespace flappy::gap {
 namespace {
 
+using model::group_of;
+
 using Names = std::vector<std::string>;
 using Cases = std::vector<const ScoredCase*>;
 
@@ -25,13 +27,6 @@ bool same(Names a, Names b) {
 
 bool holds(const Names& all, const Names& some) {
   return std::ranges::all_of(some, [&](const std::string& s) { return std::ranges::count(all, s) > 0; });
-}
-
-/// Effects of one group are one.
-std::string group_of(const std::string& effect) {
-  const int index = model::effect_index(effect.c_str());
-  const std::string group = index < 0 ? "" : model::effects()[static_cast<std::size_t>(index)].info.group;
-  return group.empty() ? effect : group;
 }
 
 bool names_effects(const Prediction& p) { return p.kind == "effect" || p.kind == "group"; }
@@ -88,8 +83,9 @@ void count_covered(const ScoredCase& c, std::size_t& covered, std::size_t& all) 
 /// What a verdict says is at work; of a group, its most probable member.
 Names at_work(const Prediction& p) {
   if (p.kind == "effect") return p.effects;
-  if (p.kind == "group" && !p.sets.empty()) return p.sets.front().effects;
-  return {};
+  if (p.kind != "group") return {};
+  const auto most = std::ranges::find_if(p.sets, [&](const FittedSet& s) { return holds(p.effects, s.effects); });
+  return most == p.sets.end() ? Names() : most->effects;
 }
 
 /// Over the names of all cases together.
@@ -243,6 +239,8 @@ ScoreLine pairs_line(const Cases& cases) {
 
 }  // namespace
 
+bool abstains(const Prediction& p) { return p.kind == "group" || p.probability < kAbstains; }
+
 bool right(const Truth& t, const Prediction& p) {
   if (t.part == "none") return p.kind == "none" || p.kind == "parameters";
   if (t.part == "parameters") return p.kind == "parameters";
@@ -251,6 +249,7 @@ bool right(const Truth& t, const Prediction& p) {
 }
 
 std::optional<double> closure(const ScoredCase& c) {
+  if (c.prediction.kind == "data") return 0;
   const FittedSet* truth = fitted(c.prediction, c.truth.effects);
   std::optional<double> refit = c.prediction.refit;
   if ((truth == nullptr || !truth->left) && c.true_fit) {
@@ -274,7 +273,7 @@ bool needs_true_fit(const ScoredCase& c) {
 Scores score(const std::vector<ScoredCase>& cases) {
   Scores s;
   const Cases singles = of_parts(cases, {"singles"}), harmless = of_parts(cases, {"none", "parameters"}),
-              withheld = of_parts(cases, {"withheld"});
+              withheld = of_parts(cases, {"withheld"}), hover = of_parts(cases, {"hover"});
   s.main.push_back(first_line("top1_mocap_imu", "right effect first, mocap and IMU", 0.80, 0.92, singles));
   s.main.push_back(first_line("top1_current", "right effect first, current logged too", 0.85, 0.95,
                               of_parts(cases, {"singles_current"})));
@@ -295,9 +294,13 @@ Scores score(const std::vector<ScoredCase>& cases) {
   s.main.push_back(coverage_line(singles));
   s.main.push_back(pairs_line(of_parts(cases, {"pairs"})));
   s.main.push_back(line("hover_abstain", "hover only: abstains where not identifiable", Bar::at_least, 0.80, 0.80,
-                        share(of_parts(cases, {"hover"}), [](const ScoredCase& c) {
-                          return c.prediction.kind == "group" || c.prediction.probability < kAbstains;
+                        share(hover, [](const ScoredCase& c) { return abstains(c.prediction); })));
+  s.main.push_back(line("hover_proposes", "and proposes a manoeuvre that tells the truth from a rival", Bar::at_least,
+                        0, 0.80, share(hover, [](const ScoredCase& c) {
+                          return abstains(c.prediction) && holds(c.prediction.next, c.truth.effects);
                         })));
+  s.main.back().must = "-";
+  s.main.back().meets_must.reset();
   const Cases typical = of_parts(cases, {"typical"});
   s.typical.push_back(first_line("top1_mocap_imu", "right effect first, mocap and IMU", 0.80, 0.92, typical));
   add_naming(s.typical, typical);

@@ -37,6 +37,8 @@ struct Prediction {
   double none = 0, parameters = 0, unknown = 0;
   std::optional<double> nominal, refit, floor;  ///< E
   std::map<std::string, Baseline> baselines;    ///< by kBaselines
+  /// Of a verdict that abstains: the two answers that the manoeuvre proposed tells apart, effects joined by +; or none.
+  std::vector<std::string> next;
 };
 inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "stlsq"};
 
@@ -71,6 +73,9 @@ struct Scores {
 };
 
 Scores score(const std::vector<ScoredCase>& cases);
+
+/// Whether a verdict names no one answer as the likelier one: `group`, or less than one half.
+bool abstains(const Prediction& prediction);
 
 /// Whether the verdict is what it should be.
 bool right(const Truth& truth, const Prediction& prediction);

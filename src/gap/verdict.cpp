@@ -14,6 +14,12 @@ constexpr double kOfAll = 0.5, kOfPool = 0.8;
 /// Of its pool, what is worth a name in a group.
 constexpr double kLeastShare = 0.05;
 
+/// Of refuted().
+constexpr double kWorse = 0.3;
+/// By how much the figures of an effect are farther off than rows and floors alone let expect, and how far a size is off because
+/// the robot's effect has another form than the entry, as a share of itself.
+constexpr double kWider = 1.4, kSizeError = 0.1;
+
 /// Of what speaks for entries: how often it is a cause that no entry has and that looks like one, and how often it is another
 /// entry, whose equation is so far off that a rival's describes it better.
 constexpr double kMimicked = 0.06, kConfused = 0.06;
@@ -32,15 +38,26 @@ const char* kind_name(Answer::Kind kind) {
 
 std::string pool_name(const std::vector<std::string>& effects) {
   std::vector<std::string> groups;
-  for (const std::string& e : effects) {
-    const int index = model::effect_index(e.c_str());
-    const std::string group = index < 0 ? "" : model::effects()[static_cast<std::size_t>(index)].info.group;
-    groups.push_back(group.empty() ? e : group);
-  }
+  for (const std::string& e : effects) groups.push_back(model::group_of(e));
   std::ranges::sort(groups);
   std::string name;
   for (const std::string& g : groups) name += (name.empty() ? "" : "+") + g;
   return name;
+}
+
+bool refuted(const Losses& parameters, const Losses& effects) {
+  const auto before = parameters.mean(), after = effects.mean();
+  return before && after && *after - *before > kWorse * (*before - huber_floor());
+}
+
+void widen(Fit& fit, const Hypothesis& hypothesis) {
+  const Eigen::VectorXd mean = fit.mean();
+  Eigen::MatrixXd& covariance = fit.posterior.covariance;
+  for (Eigen::Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
+    covariance.row(i) *= kWider;
+    covariance.col(i) *= kWider;
+    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].size) covariance(i, i) += std::pow(kSizeError * mean[i], 2);
+  }
 }
 
 void set_probabilities(std::vector<Answer>& answers) {

@@ -1,12 +1,20 @@
-// What the probabilities of a diagnosis come to.
+// What a diagnosis may claim: which fits stand, how wide their intervals are, what probabilities come to.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "gap/closure.hpp"
 #include "gap/diagnose.hpp"
 
 namespace flappy::gap {
+
+/// Whether effects, wherever models may be mistaken, leave more in all than the parameters alone: by more than a share of the gap
+/// that these leave.
+bool refuted(const Losses& parameters, const Losses& effects);
+
+/// Makes the figures of the effects of a fit, along whose coordinates its directions are, as uncertain as they are.
+void widen(Fit& fit, const Hypothesis& hypothesis);
 
 /// Of every answer, from its log evidence; the most probable first. Of what speaks for entries a little goes to an unknown cause,
 /// which may look like one, and to all entries alike.

@@ -171,6 +171,13 @@ void AtomicFile::commit() {
 
 void AtomicFile::refuse(int error) const { refuse_file(path_, "cannot be written", error); }
 
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!error && access(folder.c_str(), W_OK) != 0) error = std::error_code(errno, std::generic_category());
+  if (error) throw InputError(folder.string() + ": cannot be written: " + error.message());
+}
+
 void sync_folder(const std::filesystem::path& folder) {
   const int descriptor = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) refuse_file(folder, "cannot be read", errno);

@@ -56,6 +56,9 @@ class AtomicFile {
   std::FILE* file_ = nullptr;
 };
 
+/// Makes a folder, and those above it, where it is not there yet. InputError where nothing can be written in it.
+void make_folder(const std::filesystem::path& folder);
+
 /// Brings the names of a folder's files onto the disk.
 void sync_folder(const std::filesystem::path& folder);
 

@@ -372,8 +372,7 @@ nlohmann::ordered_json json_of(const TrainSummary& s) {
 
 TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
   std::error_code error;
-  fs::create_directories(options.folder, error);
-  if (error) throw io::InputError(options.folder.string() + ": cannot be written: " + error.message());
+  io::make_folder(options.folder);
   const io::FolderLock lock(options.folder);
   const auto has_run = [&] {
     const auto left = checkpoints_in(options.folder);

@@ -109,10 +109,12 @@ FLAPPY_INLINE void find_wall(const ActiveEffects<T>& effects, Surroundings<T>& s
 }
 
 template <class T>
-FLAPPY_INLINE Hinges<T> hinges_of(const SideParameters<T>& p, const SideFigures<T>& figures, const T& voltage_V) {
+FLAPPY_INLINE Hinges<T> hinges_of(const SideParameters<T>& p, const SideFigures<T>& figures, const SideState<T>& x,
+                                  const T& voltage_V) {
   const T none(-0.0);
   return {T(1),
           voltage_V,
+          x.stroke_rate_rad_s,
           figures.resistance_ohm,
           p.stroke_torque_per_V_Nm,
           p.stroke_damping_Nm_s,
@@ -167,12 +169,12 @@ struct Acting<true, T> {
 /// What the motors draw.
 template <class T>
 FLAPPY_INLINE void read_meter(const Surroundings<T>& s, const Sides<Hinges<T>>& hinges, Element<T>* meter, int stride) {
-  const auto current = [](const Hinges<T>& h, const SideFigures<T>& f, const SideState<T>& x) {
-    return T(T(h.voltage_V - f.back_emf_V_s * x.stroke_rate_rad_s) / h.resistance_ohm);
+  const auto current = [](const Hinges<T>& h, const SideFigures<T>& f) {
+    return T(T(h.voltage_V - f.back_emf_V_s * h.motor_rate_rad_s) / h.resistance_ohm);
   };
   hinges.left.source_share.store(meter);
-  current(hinges.left, s.figures.left, s.x.left).store(meter + stride);
-  current(hinges.right, s.figures.right, s.x.right).store(meter + 2 * stride);
+  current(hinges.left, s.figures.left).store(meter + stride);
+  current(hinges.right, s.figures.right).store(meter + 2 * stride);
 }
 
 /// Stage by stage, in the order of effect.hpp.
@@ -297,7 +299,8 @@ FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const Stat
              {zero, zero, zero},
              {v_left, v_right},
              zero},
-            {hinges_of(p.left, figures.left, voltages.left_V), hinges_of(p.right, figures.right, voltages.right_V)},
+            {hinges_of(p.left, figures.left, x.left, voltages.left_V),
+             hinges_of(p.right, figures.right, x.right, voltages.right_V)},
             *effects.own,
             voltages,
             {},

@@ -61,11 +61,13 @@ TEST(Oracle, FindsTheSizeAndTheRivals) {
   give(Effect::added_mass) = {{1, 2}, {0, 1}, {}};
   give(Effect::body_drag) = {{1}, {2}, {3}};
   give(Effect::tether) = {{1}, {4}, {}};
-  // rows: added_mass goes along x, at size 2 three times as far; body_drag along x + y, further along x - y; tether along z
-  MatrixXd rows(3, 5);
-  rows << 1, 3, 1, 1, 0,  //
-      0, 0, 1, -1, 0,     //
-      0, 0, 0, 0, 1;
+  give(Effect::wall_effect) = {{1, 2}, {5, 6}, {}};
+  // rows: added_mass goes along x, at size 2 three times as far; body_drag along x + y, further along x - y; tether along z,
+  // and wall_effect, which is smaller at size 2
+  MatrixXd rows(3, 7);
+  rows << 1, 3, 1, 1, 0, 0, 0,  //
+      0, 0, 1, -1, 0, 0, 0,     //
+      0, 0, 0, 0, 1, 1, 0.9;
   const Oracle oracle(effects, 300 * rows.transpose() * rows);
   // the truth is straight of the next larger size tried, 1 or 3 along x; the hypothesis, of the other one, m, with prior
   // precision of its coefficient size^2/4
@@ -82,9 +84,13 @@ TEST(Oracle, FindsTheSizeAndTheRivals) {
   const double found = oracle.detectable(Effect::added_mass, 10);
   EXPECT_NEAR(expected(found), 10, 1e-3);
   EXPECT_TRUE(std::isinf(oracle.detectable(Effect::added_mass, 1e6)));
+  const double lasting = oracle.detectable(Effect::wall_effect, 20);
+  EXPECT_GT(oracle.gain(Effect::wall_effect, lasting), 22);
+  EXPECT_NEAR(oracle.gain(Effect::wall_effect, 2 * lasting), 20, 1e-3);
   // body_drag and its direction together are as good, but for what one more coefficient costs; tether says nothing of it
   // a third of 1/2 log(1 + 600 / 0.25)
-  EXPECT_LT(std::abs(oracle.gain_over(Effect::added_mass, 1, Effect::body_drag)), 1.3);
+  for (const double size : {1.0, 1.5})
+    EXPECT_LT(std::abs(oracle.gain_over(Effect::added_mass, size, Effect::body_drag)), 1.3) << size;
   EXPECT_NEAR(oracle.gain_over(Effect::added_mass, 1, Effect::tether), oracle.gain(Effect::added_mass, 1), 0.5);
 }
 

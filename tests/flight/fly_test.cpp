@@ -296,6 +296,34 @@ TEST(Recorder, NoiseIsAsDeclaredAndTheSumHidesNothing) {
   EXPECT_EQ(clean.command.inputs->difference_V[1600], 1);
 }
 
+// A battery of 2 ohm that fades by 0.1 V/C: with what both motors draw from it, I = (V_l i_l + V_r i_r) / nominal, the log
+// holds nominal - 2 I - 0.1 Q, but for what Q is summed from here: 500 samples a second of currents that the beat shakes.
+TEST(Recorder, LogsABatteryThatGivesWay) {
+  const Folder folder;
+  fly(read_fly_config(
+          source_path("configs/fly/open_loop.toml"),
+          {"vehicle.effects.battery_sag.source_ohm=2", "vehicle.effects.battery_sag.fade_V_C=0.1",
+           "vehicle.effects.battery_sag.nominal_V=18", "log.power.voltage_noise_V=0", "log.power.current_noise_A=0"}),
+      {.log_folder = folder / "log"});
+  const FlightLog log = read_flight_log(folder / "log");
+  const PowerStream& p = *log.power;
+  const double nominal_V = log.header.power->battery_nominal_V;
+  ASSERT_EQ(nominal_V, 18);
+  double charge_C = 0, least_V = nominal_V;
+  for (std::size_t k = 0; k + 1 < p.t_s.size(); ++k) {
+    const double t_s = p.t_s[k] - log.header.power->latency_s;
+    const auto at =
+        static_cast<std::size_t>(std::ranges::upper_bound(log.command.t_s, t_s + 1e-9) - log.command.t_s.begin()) - 1;
+    const double drawn_A = (log.command.left_voltage_V[at] * p.left_current_A[k] +
+                            log.command.right_voltage_V[at] * p.right_current_A[k]) /
+                           nominal_V;
+    EXPECT_NEAR(p.battery_V[k], nominal_V - 2 * drawn_A - 0.1 * charge_C, 0.02 + 0.02 * 0.1 * charge_C) << k;
+    charge_C += drawn_A * (p.t_s[k + 1] - p.t_s[k]);
+    least_V = std::min(least_V, p.battery_V[k]);
+  }
+  EXPECT_LT(least_V, 17.5) << "nothing was tested";
+}
+
 TEST(Recorder, DeclaresTheVehicleOnlyWhereItIsThatOfTheFile) {
   const Folder folder;
   fly(read_fly_config(kHover, {"flight.duration_s=0.1", "vehicle.torso.mass_kg=11e-3"}),

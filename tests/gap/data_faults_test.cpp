@@ -54,9 +54,9 @@ void thin(const Columns& columns, const std::function<bool(std::size_t)>& kept) 
     *c = left;
   }
 }
-void run_fast(Column& t_s) {
+void run_fast(Column& t_s, double speed = 1.01) {
   const double start = t_s.front();
-  for (double& t : t_s) t = start + (t - start) * 1.01;
+  for (double& t : t_s) t = start + (t - start) * speed;
 }
 /// As a person would who kept the first seconds only.
 void keep_first(FlightLog& log, double seconds) {
@@ -140,6 +140,20 @@ std::vector<Planted> all_faults() {
          thin(command(log), [&](std::size_t i) { return i < n * 2 / 5; });
        },
        "command.csv", 1000, kEnd, "60 % of the flight's samples are missing, at most 50 % can be"},
+      {"a meter frozen",
+       [](FlightLog& log) {
+         for (Column* c : {&log.power->left_current_A, &log.power->right_current_A})
+           std::fill(c->begin() + static_cast<std::ptrdiff_t>(c->size() * 2 / 5), c->end(), c->back());
+       },
+       "power.csv", 1000, kEnd, "60 % of the flight's samples are missing, at most 50 % can be"},
+      {"voltages' clock a little fast", [](FlightLog& log) { run_fast(log.command.t_s, 1.002); }, "command.csv", 300,
+       600, "runs off those of the other streams by 0.2 %"},
+      {"IMU's clock late, and drifting a little",
+       [](FlightLog& log) {
+         run_fast(log.imu.t_s, 1.0005);
+         for (double& t : log.imu.t_s) t += 0.4;
+       },
+       "imu.csv", 2, 2, "clocks apart, or a wrong latency"},
       {"motion capture frozen",
        [](FlightLog& log) {
          for (Column* c : mocap(log)) {

@@ -92,11 +92,62 @@ TEST(Carried, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
     }
 }
 
+TEST(Recording, FliesWhatWasDriven) {
+  const std::vector<CarriedFlight> flights = flown(
+      "hummingbird_nominal", {"log.power.battery_nominal_V=18", "log.power.rate_hz=500", "log.power.latency_s=0.001",
+                              "log.power.voltage_noise_V=0.02", "log.power.current_noise_A=0.01"});
+  const Recording& whole = flights[0].recording();
+  flight::FlightLog log = whole.log;
+  flight::CommandStream& c = log.command;
+  const double start_s = c.t_s.front(), from_s = start_s + 3, to_s = start_s + 3.5, end_s = start_s + 6;
+  const flight::Column t_s = c.t_s;
+  for (flight::Column* column : {&c.t_s, &c.left_voltage_V, &c.right_voltage_V, &*c.phase_rad, &c.inputs->amplitude_V,
+                                 &c.inputs->difference_V, &c.inputs->bias_V, &c.inputs->split_cycle}) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < t_s.size(); ++i)
+      if ((t_s[i] < from_s || t_s[i] > to_s) && t_s[i] < end_s) (*column)[kept++] = (*column)[i];
+    column->resize(kept);
+  }
+  for (double& v : log.power->battery_V) v *= 1.1;
+  const Recording r("flight", log, nominal());
+  EXPECT_LT(r.end_s.back(), end_s);
+  EXPECT_GT(r.end_s.back(), end_s - 0.1);
+  // until the wings have forgotten: six beats of 34 Hz
+  for (std::size_t k = 0; k < r.intervals(); ++k) {
+    const double begin_s = r.end_s[k] - r.interval_s(k);
+    if (begin_s > from_s + 0.006 && r.end_s[k] < to_s + 6.0 / 34) EXPECT_FALSE(r.valid[k]) << begin_s - start_s;
+    else if (r.end_s[k] < from_s || begin_s > to_s + 6.1 / 34)
+      EXPECT_EQ(r.valid[k], whole.valid[k]) << begin_s - start_s;
+  }
+  // a battery fuller than nominal drives that much harder; 0.02 V of noise in each of twenty samples of 18 V
+  EXPECT_NEAR(r.full, 1.1, 5 * 0.02 / 18 / std::sqrt(20));
+  EXPECT_DOUBLE_EQ(r.left_V[1000], r.full * whole.left_V[1000]);
+  EXPECT_EQ(whole.full, 1);
+}
+
+// Of two effects that oppose each other each errs by 0.3 of what its sizes change; shapes are no more of it.
+TEST(Fit, EveryEquationErrsByItself) {
+  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
+  const Evidence evidence(flights, 2);
+  const Fitter fitter(flights, evidence, 2);
+  const sim::Randomisation prior = uncertain();
+  const Hypothesis h(prior, {"ground_effect", "spring_hardening"});
+  Linearised l{Eigen::VectorXd::Zero(h.size()), Fitter::axes(h), {}, {}, {}};
+  for (Index i = 0; i < h.size(); ++i) {
+    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+    if (i >= h.shared()) l.at[i] = u.effect == "ground_effect" ? 2 : -2;
+    l.columns.push_back(Smooth::Constant(kGroups, evidence.basis().size(), u.size ? 1 : 50));
+  }
+  ASSERT_EQ(h.size() - h.shared(), 3) << "two sizes and a length";
+  EXPECT_NEAR(fitter.form_error(h, l).maxCoeff(), 0.3 * 2 * std::sqrt(2), 1e-12);
+  EXPECT_NEAR(fitter.form_error(h, l).minCoeff(), 0.3 * 2 * std::sqrt(2), 1e-12);
+}
+
 TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   const std::vector<CarriedFlight> flights = flown("hummingbird_identified");
   const sim::Randomisation prior = uncertain();
   const Hypothesis plain(prior, {});
-  Evidence evidence(flights);
+  Evidence evidence(flights, 2);
   const Fitter fitter(flights, evidence, 2);
   const Linearised start =
       fitter.linearise(plain, plain.start(), {Eigen::MatrixXd(plain.size(), 0), Eigen::VectorXd(0)});

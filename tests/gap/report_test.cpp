@@ -12,7 +12,10 @@
 #include "flappy_gap/summary.hpp"
 #include "flight/fly.hpp"
 #include "flight/fly_fixture.hpp"
+#include "io/config.hpp"
 #include "model/effects/registry.hpp"
+#include "refusal.hpp"
+#include "vehicles.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -111,6 +114,38 @@ TEST(Verdict, PoolsSetsByTheGroupsOfTheirEffects) {
       conclude({answer(0.3, {"wind", "body_drag"}), answer(0.28, {"body_drag", "tether"}), answer(0.42, {"wind"})});
   EXPECT_EQ(c.kind, Conclusion::Kind::group);
   EXPECT_EQ(c.effects, (std::vector<std::string>{"wind", "body_drag", "tether"}));
+}
+
+// Between what refitted parameters leave and the floor lies the gap; three tenths of it more is too much.
+TEST(Verdict, RefutesWhatLeavesMore) {
+  const double floor = huber_floor();
+  const auto losses = [](double mean) { return Losses{{8 * mean, 4 * mean}, {8, 4}}; };
+  const Losses before = losses(floor + 1);
+  EXPECT_FALSE(refuted(before, losses(floor + 1.29)));
+  EXPECT_TRUE(refuted(before, losses(floor + 1.31)));
+  EXPECT_FALSE(refuted(before, losses(floor)));
+  EXPECT_FALSE(refuted(before, {})) << "a vehicle that came apart has no loss";
+}
+
+// Of coordinates with sd 0.2 and covariance 0.01: 1.4 times as wide, and a size of 2 by a tenth of itself besides.
+TEST(Verdict, WidensSizesAndShapes) {
+  const auto uncertain =
+      sim::read_randomisation(test::nominal(), io::Config::load(test::source_path("configs/gap/priors.toml")).root());
+  const Hypothesis h(uncertain, {"ground_effect"});  // one size, one shape
+  Fit fit;
+  fit.point.directions = Fitter::axes(h);
+  fit.point.at = h.start();
+  fit.posterior.mean = Eigen::VectorXd::Zero(h.size());
+  const Eigen::Index size = h.shared(), shape = size + 1;
+  ASSERT_EQ(h.size(), shape + 1);
+  fit.posterior.mean[size] = 2;
+  fit.posterior.covariance = 0.04 * Eigen::MatrixXd::Identity(h.size(), h.size());
+  fit.posterior.covariance(size, shape) = fit.posterior.covariance(shape, size) = 0.01;
+  widen(fit, h);
+  EXPECT_NEAR(fit.covariance()(size, size), 1.96 * 0.04 + 0.04, 1e-12);
+  EXPECT_NEAR(fit.covariance()(shape, shape), 1.96 * 0.04, 1e-12);
+  EXPECT_NEAR(fit.covariance()(size, shape), 1.96 * 0.01, 1e-12);
+  EXPECT_NEAR(fit.covariance()(0, 0), 0.04, 1e-12) << "parameters stay";
 }
 
 // ---- what is written
@@ -214,8 +249,8 @@ std::string contents(const std::filesystem::path& path) { return io::read_text(p
 void expect_schema(const nlohmann::ordered_json& j) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : j.items()) keys.push_back(key);
-  EXPECT_EQ(keys, (std::vector<std::string>{"schema", "flights", "data_faults", "verdict", "where", "candidates", "gap",
-                                            "closed_loop", "next_experiment"}));
+  EXPECT_EQ(keys, (std::vector<std::string>{"schema", "flights", "data_faults", "verdict", "where", "candidates",
+                                            "unexplained", "gap", "closed_loop", "next_experiment"}));
   double sum = 0;
   for (const auto& c : j["candidates"]) {
     sum += c["probability"].get<double>();
@@ -243,7 +278,7 @@ TEST(RunDiagnose, ReadsNoTruth) {
   command.flights = {options.log_folder.string()};
   command.out = folder / "out";
   for (const model::EffectEntry& e : model::effects())
-    if (std::string(e.info.id) != "wind") command.withheld.push_back(e.info.id);
+    if (std::string(e.info.id) != "clap_and_fling") command.withheld.push_back(e.info.id);
   const std::filesystem::path truth = options.log_folder / "truth.csv";
   const std::string honest = contents(truth);
   const auto result = [&] {
@@ -274,6 +309,32 @@ TEST(RunDiagnose, ReadsNoTruth) {
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
             "warning: " + (folder / "out/residuals.svg").string() + ": is not written: gnuplot is not installed\n");
   EXPECT_FALSE(std::filesystem::exists(folder / "out/residuals.svg"));
+}
+
+// Where `run_diagnose` complains before it reads a flight; of the vehicle with the place in its file.
+TEST(RunDiagnose, RefusesWhatItCannotAnswer) {
+  const flight::Folder folder;
+  DiagnoseCommand command;
+  command.vehicle = kConfigs + "vehicles/hummingbird_nominal.toml";
+  command.priors = kConfigs + "gap/priors.toml";
+  command.flights = {(folder / "").string(), (folder / ".").string()};
+  const auto refusal = [&] { return test::refusal([&] { run_diagnose(command); }); };
+  EXPECT_EQ(refusal(),
+            "command line: --flights: " + command.flights[1] + " is given twice; accepted: each flight once");
+  command.flights.pop_back();
+  const std::string nominal = contents(command.vehicle);
+  command.vehicle = (folder / "v.toml").string();
+  const auto with = [&](const std::string& text) { std::ofstream(command.vehicle) << text; };
+  with(nominal + "\n[effects.wind]\nx_m_s = 0.1\n");
+  EXPECT_TRUE(refusal().ends_with(
+      ": effects: what is missing is asked of the vehicle as it was believed; accepted: a vehicle without effects"))
+      << refusal();
+  EXPECT_TRUE(refusal().starts_with(command.vehicle + ":")) << refusal();
+  std::string fast = nominal;
+  with(fast.replace(fast.find("hold_s = 1e-3"), 13, "hold_s = 5e-5"));
+  EXPECT_TRUE(
+      refusal().ends_with(": driver.hold_s: flights are replayed by steps of 1e-04 s; accepted: a multiple of that"))
+      << refusal();
 }
 
 }  // namespace

@@ -176,6 +176,8 @@ TEST(Score, ClosureIsMeasuredAgainstTheTrueEffect) {
   ScoredCase none = c;
   none.prediction.kind = "parameters";
   EXPECT_NEAR(*main_score({c, none, c}, "closure_median").value, 0.75, 1e-12);
+  c.prediction.kind = "data";
+  EXPECT_DOUBLE_EQ(*closure(c), 0) << "nor does one that refuses the data";
   c.truth.part = "pairs";
   EXPECT_FALSE(needs_true_fit(c));
 }
@@ -197,7 +199,8 @@ TEST(Score, PairsAreScoredByTheirNames) {
       judged("pairs", {"wind", "com_offset"}, "effect", {"com_offset", "wind"}, 0.9),
       judged("pairs", {"wind", "com_offset"}, "effect", {"wind"}, 0.9),
       judged("pairs", {"wind", "com_offset"}, "effect", {"tether", "body_drag"}, 0.9),
-      judged("pairs", {"wind", "com_offset"}, "group", {"wind", "tether"}, 0.9, {fitted({"wind"}, 0.4)}),
+      judged("pairs", {"wind", "com_offset"}, "group", {"wind", "tether"}, 0.9,
+             {fitted({"mocap_tilt"}, 0.45), fitted({"wind"}, 0.4)}),  // the most probable set is no member of the group
       judged("pairs", {"wind", "com_offset"}, "unknown", {}, 0.9)};
   // hits 2 + 1 + 0 + 1 + 0; names 2 + 1 + 2 + 1 + 0 stated, 10 true
   EXPECT_NEAR(*main_score(cases, "pairs_f1").value, 2 * 4.0 / 16, 1e-12);
@@ -209,6 +212,12 @@ TEST(Score, HoverAbstains) {
                                          judged("hover", {"tether"}, "effect", {"tether"}, 0.6),
                                          judged("hover", {"tether"}, "parameters", {}, 0.9)};
   EXPECT_DOUBLE_EQ(*main_score(cases, "hover_abstain").value, 0.5);
+  EXPECT_DOUBLE_EQ(*main_score(cases, "hover_proposes").value, 0);
+  std::vector<ScoredCase> proposing = cases;
+  proposing[0].prediction.next = {"wind", "tether"};
+  proposing[1].prediction.next = {"wind", "com_offset"};  // neither is the truth
+  proposing[2].prediction.next = {"wind", "tether"};      // does not abstain
+  EXPECT_DOUBLE_EQ(*main_score(proposing, "hover_proposes").value, 0.25);
   EXPECT_FALSE(main_score(cases, "ece").value) << "hover is no rich excitation";
 }
 

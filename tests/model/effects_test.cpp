@@ -61,7 +61,8 @@ struct Bench {
   }
   StateRows<One> state() { return {memory, 1, One(0) < One(1)}; }
   Sides<Hinges<One>> hinges(double left_V, double right_V) {
-    return {sim::hinges_of(p.left, figures.left, One(left_V)), sim::hinges_of(p.right, figures.right, One(right_V))};
+    return {sim::hinges_of(p.left, figures.left, x.left, One(left_V)),
+            sim::hinges_of(p.right, figures.right, x.right, One(right_V))};
   }
   /// Hinges as `Effect` leaves them.
   template <class Effect, int n>
@@ -433,6 +434,17 @@ TEST(GearBacklash, PlaysFreelyThroughHalfTheGap) {
   for (int i = 0; i < 5000; ++i) s.step(5);
   EXPECT_NEAR(s.memory[0], gap / 2 + spring / stiffness, 0.1 * spring / stiffness);
   EXPECT_EQ(s.memory[4], 0);  // no voltage on the right
+}
+
+// The motor's own rate is what induces its voltage.
+TEST(GearBacklash, TellsTheMotorsRate) {
+  Bench b;
+  b.x.left.stroke_rate_rad_s = One(30);
+  b.memory[1] = 12;  // of the left, faster than its wing
+  const One q[1] = {One(0.05)};
+  const auto h = b.hinges<GearBacklash>(q, 5, 5);
+  EXPECT_EQ(value(h.left.motor_rate_rad_s), 42);
+  EXPECT_EQ(value(h.right.motor_rate_rad_s), value(b.x.right.stroke_rate_rad_s));
 }
 
 TEST(GearBacklash, TendsToTheRigidGear) {

@@ -161,6 +161,29 @@ TEST_F(Benchmark, GoesOnWhereItWasStopped) {
   EXPECT_EQ(asked_, 2);
 }
 
+TEST_F(Benchmark, TakesNoPredictionOnceLabelsAreOpen) {
+  ASSERT_TRUE(make(2));
+  ScoreCommand c = command();
+  const Predictor whole = c.predictor;
+  c.threads = 1;
+  c.predictor = [&](const Question& q) {
+    if (asked_ == 2) throw io::InputError("stopped");  // in the fit of a true effect
+    return whole(q);
+  };
+  EXPECT_EQ(test::refusal([&] { blind_score(c); }), "stopped");
+  const fs::path sums = root_ / "bench" / "predictions.sha256";
+  fs::remove(sums);
+  fs::remove(root_ / "bench" / "predictions" / "0001.json");
+  EXPECT_EQ(test::refusal([&] { blind_score(command()); }),
+            sums.string() + ": is missing, though labels were opened; accepted: what was sealed");
+  EXPECT_EQ(asked_, 2);
+  // nor is a folder gone on with under another plan
+  fs::remove(root_ / "bench" / "manifest.json");
+  EXPECT_EQ(
+      test::refusal([&] { make(3); }),
+      (root_ / "bench").string() + ": begun with another plan; accepted: the same options, or a name for a new folder");
+}
+
 TEST_F(Benchmark, PlansEveryPart) {
   const auto of = read_detectability(root_ / "detectable.toml");
   const std::vector<PlannedCase> plan = plan_cases(of, {});
@@ -184,7 +207,10 @@ TEST_F(Benchmark, PlansEveryPart) {
       ASSERT_EQ(c.effects.size(), 2U);
       EXPECT_NE(c.effects[0].id, c.effects[1].id);
     }
-    if (c.part == "singles") EXPECT_EQ(c.separable, c.effects[0].id != "wind");
+    const std::vector<std::string> rivals(c.effects.size() == 1 && c.effects[0].id == "wind" ? 1 : 0, "tether");
+    if (c.part == "singles") EXPECT_EQ(c.inseparable, rivals);
+    // nothing that gains too little at typical size is told from anything
+    if (c.part == "typical") EXPECT_EQ(c.inseparable.size(), model::effects().size() - 1);
     if (c.part == "withheld" && c.effects[0].id == "wind")
       EXPECT_EQ(std::ranges::count(c.withheld, "tether"), 1) << "of its group";
     if (c.part == "withheld" && c.withheld.empty()) {

@@ -43,7 +43,7 @@ expect_refused("--effect wind: no size; accepted: ID=SIZE, as ground_effect=1" $
 file(GLOB left ${WORK}/c*)
 expect_equal("files left by a refusal" "${left}" "")
 file(WRITE ${WORK}/note.txt "")
-expect_refused("${WORK}/note.txt: is a file; accepted: a folder, or a name for a new one" ${fly} --out ${WORK}/note.txt)
+expect_refused("${WORK}/note.txt: cannot be written: Not a directory" ${fly} --out ${WORK}/note.txt)
 
 # Escapes under a policy that adds nothing: nobody arrives, and whoever left the bounds is counted.
 file(WRITE ${WORK}/policy.h "#define FLAPPY_POLICY_OBS 29\n#define FLAPPY_POLICY_ACT 4\n"
@@ -65,6 +65,6 @@ expect_refused("${SOURCE}/configs/fly/hover.toml: is nothing that this robot can
   ${escape} --policy ${WORK}/policy.h --config ${SOURCE}/configs/fly/hover.toml)
 
 # Before hours of work, not after.
-expect_refused("${WORK}/gone/sizes.toml: cannot be written; accepted: a file in a folder that exists"
+expect_refused("${WORK}/gone/sizes.toml: cannot be written: No such file or directory"
   oracle --vehicle ${vehicle} --randomise ${SOURCE}/configs/randomisation/published.toml --priors ${SOURCE}/configs/gap/priors.toml
   --out ${WORK}/gone/sizes.toml)

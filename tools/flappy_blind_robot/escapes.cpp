@@ -1,5 +1,7 @@
 #include "escapes.hpp"
 
+#include <omp.h>
+
 #include <cstdio>
 
 #include "blind/escape.hpp"
@@ -80,19 +82,26 @@ learn::Outcome outcome_of(const Escape& e) {
 Json fly_escapes(const EscapeOptions& o) {
   const EscapeRules rules = rules_of(o);
   const Case robot = Robots(o.robot).robot(o.draw);
-  if (!o.robot.out.empty()) make_folder(o.robot.out);
+  if (!o.robot.out.empty()) io::make_folder(o.robot.out);
   std::vector<Escape> escapes(o.count);
   io::ProgressLine progress("escapes");
   io::stop_on_interrupt();
   std::size_t done = 0;
-#pragma omp parallel for schedule(dynamic)
+  std::string failed;
+#pragma omp parallel for schedule(dynamic) num_threads(omp_get_num_procs())
   for (std::size_t i = 0; i < o.count; ++i) {
     if (io::interrupted()) continue;
-    escapes[i] = escape(robot, i, rules);
+    try {
+      escapes[i] = escape(robot, i, rules);
+    } catch (const std::exception& e) {  // of the policy: nothing may leave a parallel loop
+#pragma omp critical
+      failed = e.what();
+    }
 #pragma omp critical
     progress.show(static_cast<double>(++done) / static_cast<double>(o.count));
   }
   progress.clear();
+  if (!failed.empty()) throw io::InputError(o.policy + ": " + failed + "; accepted: a policy for every observation");
   if (io::interrupted()) throw io::InputError("stopped: no escape was judged; accepted: all of them");
   std::vector<learn::Outcome> outcomes;
   std::size_t crashed = 0, out_of_bounds = 0;

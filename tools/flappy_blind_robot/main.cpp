@@ -15,7 +15,7 @@ Json fly_case(const RobotOptions& o, Programme programme) {
   const Robots robots(o);
   const std::filesystem::path folder(o.out);
   std::error_code error;
-  if (std::filesystem::exists(folder, error)) make_folder(o.out);
+  if (std::filesystem::exists(folder, error)) io::make_folder(folder);
   const Drawn drawn = robots.fly(programme);
   Json crashes = Json::array(), list = Json::array();
   for (std::size_t draw = 0; draw < drawn.lost.size(); ++draw) {
@@ -23,7 +23,7 @@ Json fly_case(const RobotOptions& o, Programme programme) {
     std::printf("draw %zu: flight %zu %s; the next draw\n", draw, lost.flight, lost.how.c_str());
     crashes.push_back(lost.how);
   }
-  make_folder(o.out);
+  io::make_folder(folder);
   for (std::size_t k = 0; k < kFlights; ++k) {
     const Flight& flight = drawn.flights[k];
     const std::filesystem::path to = folder / ("flight_" + std::to_string(k + 1));

@@ -56,7 +56,7 @@ struct Finding {
   double gain_at_typical = 0;
   bool undetectable = false;
   TrueValue value;  ///< at twice the detectable size, of the first vehicle
-  std::vector<std::string> inseparable;
+  std::vector<std::string> inseparable, inseparable_at_typical;
 };
 
 /// Whether an entry's figures are beyond what is plausible.
@@ -88,12 +88,13 @@ std::vector<Finding> weigh(const std::vector<Development>& vehicles, const sim::
     const double size = std::min(2 * f.detectable, kMostSize);
     if (in_catalogue(effect)) f.value = true_value(*vehicles[0].subject, parameters, effect, size);
     if (!f.undetectable && in_catalogue(effect) && f.value.misfit < kMostMisfit) f.undetectable = beyond_prior(f.value);
-    for (std::size_t r = 0; r < kEffects; ++r) {
-      const auto rival = static_cast<Effect>(r);
-      if (r == e || !in_catalogue(rival)) continue;
-      if (median(over_vehicles([&](const Oracle& o) { return o.gain_over(effect, size, rival); })) < kNats)
-        f.inseparable.push_back(effect_names()[r]);
-    }
+    for (const auto& [at, rivals] : {std::pair{size, &f.inseparable}, std::pair{1.0, &f.inseparable_at_typical}})
+      for (std::size_t r = 0; r < kEffects; ++r) {
+        const auto rival = static_cast<Effect>(r);
+        if (r == e || !in_catalogue(rival)) continue;
+        if (median(over_vehicles([&](const Oracle& o) { return o.gain_over(effect, at, rival); })) < kNats)
+          rivals->push_back(effect_names()[r]);
+      }
   }
   return findings;
 }
@@ -111,6 +112,12 @@ std::string rounded(double x) {
   return io::toml_number(std::strtod(text, nullptr));
 }
 
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& n : names) text += (text.empty() ? "" : ", ") + io::toml_string(n);
+  return text;
+}
+
 std::string to_toml(const OracleCommand& o, std::size_t vehicles, const std::vector<Finding>& findings) {
   char date[20];
   const std::time_t now = std::time(nullptr);
@@ -125,7 +132,8 @@ std::string to_toml(const OracleCommand& o, std::size_t vehicles, const std::vec
       "# detectable       10 nats over parameters alone on each third of 30 s, median; missing: more than 4\n"
       "# undetectable     twice that is more than 4, or more than the catalogue finds plausible\n"
       "# gain_at_typical  nats on a third at size 1, median\n"
-      "# inseparable      rivals over which the truth gains less than 10 nats at twice the detectable size, or at 4\n"
+      "# inseparable      rivals over which the truth gains less than 10 nats at twice the detectable size, or at 4;\n"
+      "#                  inseparable_at_typical at size 1; missing: all, as it gains less over parameters alone\n"
       "# misfit           what the catalogue's entry leaves of the effect at that size, and its figures there; one "
       "vehicle\n"
       "schema = 1\n";
@@ -134,9 +142,9 @@ std::string to_toml(const OracleCommand& o, std::size_t vehicles, const std::vec
     text += "\n[" + effect_names()[e] + "]\n";
     if (std::isfinite(f.detectable)) text += "detectable = " + rounded(f.detectable) + "\n";
     text += std::string("undetectable = ") + (f.undetectable ? "true" : "false") + "\n";
-    text += "gain_at_typical = " + rounded(f.gain_at_typical) + "\ninseparable = [";
-    for (const std::string& r : f.inseparable) text += (&r == f.inseparable.data() ? "" : ", ") + io::toml_string(r);
-    text += "]\n";
+    text += "gain_at_typical = " + rounded(f.gain_at_typical) + "\n";
+    text += "inseparable = [" + listed(f.inseparable) + "]\n";
+    if (f.gain_at_typical >= kNats) text += "inseparable_at_typical = [" + listed(f.inseparable_at_typical) + "]\n";
     if (!in_catalogue(static_cast<Effect>(e))) continue;
     text += "misfit = " + rounded(f.value.misfit) + "\n";
     if (f.value.misfit >= kMostMisfit) continue;
@@ -164,10 +172,7 @@ void print(const std::vector<Finding>& findings) {
 
 Json run_oracle(const OracleCommand& o) {
   const Case declared = declared_case(o.vehicle);
-  const std::filesystem::path folder = std::filesystem::absolute(o.out).parent_path();
-  std::error_code error;
-  if (!std::filesystem::is_directory(folder, error) || std::filesystem::is_directory(o.out, error))
-    throw io::InputError(o.out + ": cannot be written; accepted: a file in a folder that exists");
+  { const io::AtomicFile refused_before_the_work(o.out); }
   const auto draws = [&](const std::string& file) {
     return sim::read_randomisation(declared.vehicle, io::Config::load(file).root());
   };
@@ -200,6 +205,7 @@ Json run_oracle(const OracleCommand& o) {
                                   {"undetectable", f.undetectable},
                                   {"gain_at_typical", f.gain_at_typical},
                                   {"inseparable", f.inseparable},
+                                  {"inseparable_at_typical", f.inseparable_at_typical},
                                   {"misfit", f.value.misfit},
                                   {"catalogue", f.value.values}};
   }

@@ -56,16 +56,6 @@ Drawn Robots::fly(Programme programme) const {
   return fly_drawn(c, randomisation_, seed_);
 }
 
-void make_folder(const std::string& out) {
-  std::error_code error;
-  if (fs::exists(out, error) && !fs::is_directory(out, error))
-    throw io::InputError(out + ": is a file; accepted: a folder, or a name for a new one");
-  fs::create_directories(out, error);
-  if (error)
-    throw io::InputError(out + ": cannot be made: " + error.message() +
-                         "; accepted: a folder, or a name for a new one");
-}
-
 void write(const Flight& f, const fs::path& to, bool truth) {
   flight::write_flight_log(to, f.log);
   if (truth) flight::write_truth(to, flight::kMotionNames, f.truth);

@@ -31,8 +31,6 @@ class Robots {
   sim::Randomisation randomisation_;
 };
 
-/// A folder for logs; io::InputError where `out` cannot be one.
-void make_folder(const std::string& out);
 void write(const Flight& f, const std::filesystem::path& to, bool truth);
 
 }  // namespace flappy::blind

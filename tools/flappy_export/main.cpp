@@ -1,6 +1,4 @@
 // flappy-export: a finished run as TorchScript and as C headers that prove themselves.
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -79,14 +77,6 @@ void print(const char* what, const OutputError& e, const std::vector<flight::Sig
 
 Json json_of(const OutputError& e) { return {{"largest", e.largest}, {"rms", e.rms}}; }
 
-/// Before the work, which takes a while.
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!error && access(folder.c_str(), W_OK) != 0) error = std::error_code(errno, std::generic_category());
-  if (error) throw io::InputError(folder.string() + ": cannot be written: " + error.message());
-}
-
 /// All or nothing, but for a power failure between two renames; nothing of an earlier export stays beside it.
 void write_all(const fs::path& folder, const std::map<std::string, std::string>& files) {
   std::vector<std::unique_ptr<io::AtomicFile>> written;
@@ -106,7 +96,7 @@ void run(const Request& request, const io::Program& program) {
   const auto signals = run.fly.fleet.task.observation();
   Export e;
   e.files["flappy_controller.h"] = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
-  make_folder(request.out);
+  io::make_folder(request.out);
   e.flown = deploy::roll_out(run.fly, 0, kProofFlights);
   if (!std::ranges::all_of(e.flown.action, [](float x) { return std::isfinite(x); }))
     throw io::InputError((fs::path(request.run) / "best.json").string() +

@@ -15,14 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error)
-    throw io::InputError(folder.string() + ": cannot be made: " + error.message() +
-                         "; accepted: a folder, or a name for a new one");
-}
-
 class Maker {
  public:
   explicit Maker(const MakeCommand& command)
@@ -35,8 +27,8 @@ class Maker {
         drawn_(sim::read_randomisation(declared_.vehicle, io::Config::load(command.randomise).root())) {}
 
   bool run() {
-    make_folder(sealed_);
-    make_folder(command_.out / "cases");
+    io::make_folder(sealed_);
+    io::make_folder(command_.out / "cases");
     const io::FolderLock lock(command_.out);
     if (fs::exists(command_.out / "manifest.json"))
       throw io::InputError(command_.out.string() + ": has a manifest already; accepted: a name for a new folder");
@@ -71,7 +63,7 @@ class Maker {
     Json label;
     try {
       fs::remove_all(case_folder(p));  // half of it may be there
-      make_folder(case_folder(p));
+      io::make_folder(case_folder(p));
       const blind::Drawn flown = blind::fly_drawn(c, p.randomised ? drawn_ : as_declared_, p.seed);
       for (std::size_t k = 0; k < flown.flights.size(); ++k)
         flight::write_flight_log(case_folder(p) / ("flight_" + std::to_string(k + 1)), flown.flights[k].log);

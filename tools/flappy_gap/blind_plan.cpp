@@ -19,19 +19,6 @@ constexpr double kOutsideSize = 2;
 /// What hover alone does not show.
 constexpr const char* kHidden[] = {"ground_effect", "ceiling_effect", "body_drag", "tether", "marker_offset"};
 
-std::string group_of(const std::string& effect) {
-  return model::effects()[static_cast<std::size_t>(model::effect_index(effect.c_str()))].info.group;
-}
-
-/// An entry of the catalogue with all that it is grouped with.
-std::vector<std::string> whole_group(const std::string& effect) {
-  std::vector<std::string> all;
-  const std::string group = group_of(effect);
-  for (const model::EffectEntry& e : model::effects())
-    if (e.info.id == effect || (!group.empty() && e.info.group == group)) all.emplace_back(e.info.id);
-  return all;
-}
-
 class Planner {
  public:
   Planner(const std::map<std::string, Detectability>& detectability, const PlanOptions& options)
@@ -67,7 +54,7 @@ class Planner {
     part("withheld", kWithheld + kOutside, [&](std::size_t k, PlannedCase& c) {
       if (k < kWithheld) {
         single(k, c);
-        c.withheld = whole_group(c.effects.front().id);
+        c.withheld = model::whole_group(c.effects.front().id);
       } else {
         c.effects = {outside_[(k - kWithheld) % outside_.size()]};
       }
@@ -80,7 +67,7 @@ class Planner {
     part("typical", kTypical * catalogue_.size(), [&](std::size_t k, PlannedCase& c) {
       const std::string& id = catalogue_[k % catalogue_.size()];
       c.effects = {{id, 1}};
-      c.separable = of_.at(id).inseparable.empty();
+      c.inseparable = of_.at(id).inseparable_at_typical;
     });
     number();
     return std::move(cases_);
@@ -115,12 +102,12 @@ class Planner {
   void single(std::size_t k, PlannedCase& c) const {
     const std::string& id = detectable_[k % detectable_.size()];
     c.effects = {at_twice(id)};
-    c.separable = of_.at(id).inseparable.empty();
+    c.inseparable = of_.at(id).inseparable;
   }
 
   void pair(PlannedCase& c) {
     const std::string& first = detectable_[below(detectable_.size())];
-    const std::vector<std::string> group = whole_group(first);
+    const std::vector<std::string> group = model::whole_group(first);
     std::vector<std::string> others = detectable_;
     std::erase_if(others, [&](const std::string& id) { return std::ranges::count(group, id) > 0; });
     if (others.empty()) throw io::InputError("--detectable: all are of one group; accepted: a table of the oracle");
@@ -158,10 +145,18 @@ std::map<std::string, Detectability> read_detectability(const std::filesystem::p
     if (!d.undetectable || t.has("detectable")) d.detectable = t.number("detectable", io::positive(kLargest));
     if (!d.undetectable && kOverDetectable * d.detectable > kLargest)
       t.fail("detectable", "twice that is beyond size 4", "undetectable = true");
-    d.inseparable = t.strings("inseparable");
-    for (const std::string& rival : d.inseparable)
-      if (model::effect_index(rival.c_str()) < 0)
-        t.fail("inseparable", "no effect \"" + rival + "\"", "identifiers of docs/effects.md");
+    const auto rivals = [&](const char* key) {
+      const std::vector<std::string> list = t.strings(key);
+      for (const std::string& rival : list)
+        if (model::effect_index(rival.c_str()) < 0)
+          t.fail(key, "no effect \"" + rival + "\"", "identifiers of docs/effects.md");
+      return list;
+    };
+    d.inseparable = rivals("inseparable");
+    if (t.has("inseparable_at_typical")) d.inseparable_at_typical = rivals("inseparable_at_typical");
+    else
+      for (const model::EffectEntry& e : model::effects())
+        if (e.info.id != id) d.inseparable_at_typical.emplace_back(e.info.id);
     // for the reader of the file
     t.number_or("gain_at_typical", 0);
     t.number_or("misfit", 0);

@@ -15,8 +15,9 @@ namespace flappy::gap {
 /// What the oracle on the maker's side found of an effect, in the blind robot's sizes.
 struct Detectability {
   double detectable = 0;
-  bool undetectable = false;             ///< twice the size is beyond what can be, or beyond the prior
-  std::vector<std::string> inseparable;  ///< rivals that it cannot be told from at twice the size
+  bool undetectable = false;  ///< twice the size is beyond what can be, or beyond the prior
+  /// Rivals that it cannot be told from at twice the size, and at the typical one.
+  std::vector<std::string> inseparable, inseparable_at_typical;
 };
 
 /// Of every effect of the catalogue, and of those outside that the table has. InputError where one is missing.
@@ -30,8 +31,8 @@ struct PlannedCase {
   std::uint64_t seed = 0;
   bool hover = false, power = false;
   bool randomised = true;
-  bool separable = true;
-  std::vector<std::string> withheld;  ///< from the catalogue
+  std::vector<std::string> inseparable;  ///< rivals that these flights do not tell from the truth
+  std::vector<std::string> withheld;     ///< from the catalogue
 };
 
 struct PlanOptions {

@@ -15,10 +15,11 @@ struct Question {
   std::filesystem::path vehicle, priors;
   std::vector<std::string> withheld;  ///< entries that the catalogue is to lack
   bool baselines = true;
+  std::filesystem::path experiments;  ///< manoeuvres to propose one of, where the verdict abstains; empty: none
 };
 using Predictor = std::function<Prediction(const Question&)>;
 
-/// Diagnoses on one thread; flights that cannot be replayed are a fault of the data.
+/// Diagnoses on one thread.
 Prediction predict(const Question& question);
 
 }  // namespace flappy::gap

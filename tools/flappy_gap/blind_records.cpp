@@ -67,7 +67,7 @@ Manifest read_manifest(const std::filesystem::path& folder) {
 }
 
 Truth Label::truth() const {
-  Truth t{planned.part, {}, planned.separable, true_values};
+  Truth t{planned.part, {}, planned.inseparable.empty(), true_values};
   for (const blind::BlindEffect& e : planned.effects) t.effects.push_back(e.id);
   return t;
 }
@@ -76,7 +76,7 @@ Json to_json(const PlannedCase& p) {
   Json effects = Json::array();
   for (const blind::BlindEffect& e : p.effects) effects.push_back({{"id", e.id}, {"size", e.size}});
   return {{"number", p.number},    {"part", p.part},   {"effects", effects},         {"seed", p.seed},
-          {"hover", p.hover},      {"power", p.power}, {"randomised", p.randomised}, {"separable", p.separable},
+          {"hover", p.hover},      {"power", p.power}, {"randomised", p.randomised}, {"inseparable", p.inseparable},
           {"withheld", p.withheld}};
 }
 
@@ -97,7 +97,7 @@ Label label_from(const Json& json) {
   p.hover = json.at("hover");
   p.power = json.at("power");
   p.randomised = json.at("randomised");
-  p.separable = json.at("separable");
+  p.inseparable = json.at("inseparable").get<Names>();
   p.withheld = json.at("withheld").get<Names>();
   l.draw = json.at("draw");
   l.true_values = json.at("true_values").get<std::map<std::string, double>>();
@@ -122,6 +122,7 @@ Json to_json(const Prediction& p) {
           {"parameters", p.parameters},
           {"unknown", p.unknown},
           {"gap", {{"nominal", optional(p.nominal)}, {"refit", optional(p.refit)}, {"noise_floor", optional(p.floor)}}},
+          {"next", p.next},
           {"baselines", baselines}};
 }
 
@@ -144,6 +145,7 @@ Prediction prediction_from(const Json& json) {
   p.nominal = optional_from(gap.at("nominal"));
   p.refit = optional_from(gap.at("refit"));
   p.floor = optional_from(gap.at("noise_floor"));
+  p.next = json.at("next").get<Names>();
   for (const auto& [name, b] : json.at("baselines").items())
     p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
   return p;

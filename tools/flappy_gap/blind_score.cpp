@@ -21,6 +21,9 @@ namespace fs = std::filesystem;
   throw io::InputError(file.string() + ": " + what + "; accepted: what was sealed");
 }
 
+/// Made when the labels are opened: no prediction is accepted any more.
+fs::path true_fits(const ScoreCommand& command) { return command.folder / "true_fits"; }
+
 // ---- phase 1: nothing below reads what is sealed
 
 class Predictions {
@@ -49,8 +52,8 @@ class Predictions {
       check();
       return true;
     }
-    if (fs::exists(command_.folder / "score.md")) refuse(sums_, "is missing, though labels were opened");
-    fs::create_directories(command_.folder / "predictions");
+    if (fs::exists(true_fits(command_))) refuse(sums_, "is missing, though labels were opened");
+    io::make_folder(command_.folder / "predictions");
     std::vector<const PublicCase*> open;
     for (const PublicCase& c : manifest_.cases)
       if (!fs::exists(file_of(c.number))) open.push_back(&c);
@@ -72,7 +75,7 @@ class Predictions {
   Json read(std::size_t number) const { return read_json(file_of(number)); }
 
   Question question(const PublicCase& c, const std::vector<std::string>& withheld) const {
-    return {c.flights(command_.folder), vehicle_, command_.priors, withheld, true};
+    return {c.flights(command_.folder), vehicle_, command_.priors, withheld, true, command_.experiments};
   }
 
  private:
@@ -97,11 +100,8 @@ class Predictions {
 /// With the true effects alone in the catalogue: where a diagnosis did not fit them, its closure has no measure.
 bool fit_truths(const ScoreCommand& command, const Manifest& manifest, const Predictions& predictions,
                 const std::map<std::size_t, Label>& labels, std::vector<ScoredCase>& cases) {
-  fs::create_directories(command.folder / "true_fits");
   std::vector<std::size_t> open;
-  const auto file_of = [&](std::size_t number) {
-    return command.folder / "true_fits" / (number_text(number) + ".json");
-  };
+  const auto file_of = [&](std::size_t number) { return true_fits(command) / (number_text(number) + ".json"); };
   for (std::size_t i = 0; i < cases.size(); ++i)
     if (needs_true_fit(cases[i]) && !fs::exists(file_of(manifest.cases[i].number))) open.push_back(i);
   const bool all = work_through("fitting true effects", open.size(), command.threads, [&](std::size_t k) {
@@ -112,6 +112,7 @@ bool fit_truths(const ScoreCommand& command, const Manifest& manifest, const Pre
         others.emplace_back(e.info.id);
     Question q = predictions.question(c, others);
     q.baselines = false;
+    q.experiments.clear();
     io::write_atomically(file_of(c.number), to_json(command.predictor(q)).dump(1) + "\n");
   });
   if (!all) return false;
@@ -202,6 +203,7 @@ Json blind_score(const ScoreCommand& command) {
 
   const fs::path sealed = command.folder / "sealed" / "labels.json";
   if (io::sha256(io::read_text(sealed)) != manifest.labels_sha256) refuse(sealed, "has changed");
+  io::make_folder(true_fits(command));
   const Json truths = read_json(sealed);
   std::map<std::size_t, Label> labels;
   for (const Json& json : truths.at("cases")) {

@@ -1,7 +1,7 @@
 #include "diagnose.hpp"
 
+#include <cmath>
 #include <cstdio>
-#include <limits>
 
 #include "diagnosis_files.hpp"
 #include "flappy/vehicle_file.hpp"
@@ -36,11 +36,11 @@ Logs read_logs(const DiagnoseCommand& command) {
 }
 
 Diagnosis diagnose_visibly(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
-                           const DiagnoseCommand& command) {
+                           const std::vector<std::string>& withheld, int threads) {
   DiagnoseOptions options;
-  options.threads = command.threads;
-  options.withheld = command.withheld;
-  io::ProgressLine line("diagnosing", std::numeric_limits<double>::infinity());
+  options.threads = threads;
+  options.withheld = withheld;
+  io::ProgressLine line("diagnosing");
   options.progress = [&](double share, const std::string& what) {
     line.show(share, what);
     return !io::interrupted();
@@ -71,74 +71,114 @@ model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Diagnosis&
   return corrected;
 }
 
-std::vector<ClosedLoop> fly_both(const DiagnoseCommand& command, const std::vector<CarriedFlight>& flights,
-                                 const model::Vehicle& nominal, const model::Vehicle& corrected) {
-  const std::string pilot = command.manoeuvre.empty() ? FLAPPY_CONFIGS "/fly/hover.toml" : command.manoeuvre;
-  ClosedLoopOptions options;
-  options.own_path = !command.manoeuvre.empty();
-  options.threads = command.threads;
-  return predict_closed_loop(flights, nominal, corrected, flight::read_fly_config(pilot, {}), options);
+/// The files of a diagnosis.
+constexpr const char *kJson = "diagnosis.json", *kVehicle = "vehicle_corrected.toml";
+constexpr const char* kFiles[] = {
+    kJson, kVehicle, "residuals.csv", "candidates.csv", "unexplained.csv", "residuals.svg", "probabilities.svg"};
+
+/// All but diagnosis.json, which is that too until what lies ahead is known; the names of the others.
+std::string write_all(const std::filesystem::path& out, const Report& report, const model::Vehicle& corrected) {
+  io::write_atomically(out / kJson, diagnosis_json(report).dump(2) + "\n");
+  io::write_atomically(out / kVehicle, "# Corrected by flappy-gap diagnose.\n" + model::vehicle_text(corrected));
+  write_tables(out, report);
+  std::string names;
+  try {
+    write_figures(out, report);
+  } catch (const io::InputError& e) {
+    std::fprintf(stderr, "warning: %s\n", e.what());
+  }
+  for (const char* name : kFiles)
+    if (name != kJson && std::filesystem::exists(out / name)) names += std::string(", ") + name;
+  return names;
 }
 
-std::optional<NextExperiment> next_experiment(const Diagnosis& d, const sim::Randomisation& uncertain, int threads) {
-  if (d.answers.size() < 2 || d.answers[1].probability < kLeastRival) return std::nullopt;
-  NextOptions options;
-  options.threads = threads;
-  const auto ranked = rank_experiments(d, uncertain, read_manoeuvres(FLAPPY_CONFIGS "/gap/experiments"), options);
-  if (ranked.empty()) return std::nullopt;
-  return ranked.front();
+/// What is asked beside the diagnosis, read before the work.
+struct Asked {
+  model::Vehicle vehicle;
+  sim::Randomisation uncertain;
+  flight::FlyConfig pilot;
+  std::vector<Manoeuvre> manoeuvres;
+  std::vector<std::string> withheld;
+};
+
+Asked read_asked(const DiagnoseCommand& command) {
+  const model::Vehicle vehicle = model::read_vehicle(command.vehicle);
+  const io::Config file = io::Config::load(command.vehicle);
+  if (!vehicle.effects.empty())
+    file.root().fail("effects", "what is missing is asked of the vehicle as it was believed",
+                     "a vehicle without effects");
+  const double steps = vehicle.driver.hold_s / kStep_s;
+  if (std::abs(steps - std::round(steps)) > 1e-6 || steps < 0.5)
+    file.root().table("driver").fail(
+        "hold_s", "flights are replayed by steps of " + io::shortest_digits(kStep_s) + " s", "a multiple of that");
+  std::vector<std::string> withheld;
+  for (const std::string& id : command.withheld) {
+    if (model::effect_index(id.c_str()) < 0)
+      throw io::InputError("command line: --withhold: no effect \"" + id +
+                           "\"; accepted: identifiers of docs/effects.md");
+    for (std::string& member : model::whole_group(id)) withheld.push_back(std::move(member));
+  }
+  for (std::size_t i = 0; i < command.flights.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (std::error_code error; std::filesystem::equivalent(command.flights[i], command.flights[k], error))
+        throw io::InputError("command line: --flights: " + command.flights[i] +
+                             " is given twice; accepted: each flight once");
+  return {vehicle, sim::read_randomisation(vehicle, io::Config::load(command.priors).root()),
+          flight::read_fly_config(command.manoeuvre.empty() ? FLAPPY_CONFIGS "/fly/hover.toml" : command.manoeuvre),
+          read_manoeuvres(FLAPPY_CONFIGS "/gap/experiments"), withheld};
+}
+
+/// In closed loop, and what to fly next; each left out after Ctrl-C.
+void look_ahead(const DiagnoseCommand& command, const Asked& asked, const std::vector<CarriedFlight>& flights,
+                const Diagnosis& d, const model::Vehicle& corrected, Report& report) {
+  io::ProgressLine line("looking ahead");
+  if (io::interrupted()) return;
+  line.show(0, "flying in closed loop");
+  ClosedLoopOptions closed;
+  closed.own_path = !command.manoeuvre.empty();
+  closed.threads = command.threads;
+  report.closed_loop = predict_closed_loop(flights, asked.vehicle, corrected, asked.pilot, closed);
+  if (io::interrupted() || d.answers.size() < 2 || d.answers[1].probability < kLeastRival) return;
+  line.show(0.5, "weighing what to fly next");
+  NextOptions next;
+  next.threads = command.threads;
+  const auto ranked = rank_experiments(d, asked.uncertain, asked.manoeuvres, next);
+  if (!ranked.empty()) report.next = ranked.front();
 }
 
 }  // namespace
 
 Json run_diagnose(const DiagnoseCommand& command) {
-  const model::Vehicle vehicle = model::read_vehicle(command.vehicle);
-  const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors, {}).root());
-  for (const std::string& id : command.withheld)
-    if (model::effect_index(id.c_str()) < 0)
-      throw io::InputError("command line: --withhold: no effect \"" + id +
-                           "\"; accepted: identifiers of docs/effects.md");
+  const Asked asked = read_asked(command);
   const std::filesystem::path out = command.out;
   if (!out.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(out, error);
-    if (error) throw io::InputError("--out: " + command.out + ": " + error.message() + "; accepted: a folder");
-    { const io::AtomicFile refused_before_the_work(out / "diagnosis.json"); }
+    io::make_folder(out);
+    { const io::AtomicFile refused_before_the_work(out / kJson); }
   }
   io::stop_on_interrupt();
   Logs read = read_logs(command);
-  if (!read.faults.empty()) {
-    const Report report = report_of(command.flights, std::move(read.faults));
-    for (const std::string& line : summary_of(report, command.out)) std::printf("%s\n", line.c_str());
-    Json json = diagnosis_json(report);
-    if (!out.empty()) io::write_atomically(out / "diagnosis.json", json.dump(2) + "\n");
-    return json;
-  }
+  const bool faulty = !read.faults.empty();
   std::vector<CarriedFlight> flights;
-  for (std::size_t f = 0; f < read.logs.size(); ++f)
-    flights.emplace_back(Recording(command.flights[f], std::move(read.logs[f]), vehicle));
-  const Diagnosis d = diagnose_visibly(flights, uncertain, command);
-  Report report = report_of(command.flights, flights, uncertain, d);
-  const model::Vehicle corrected = corrected_vehicle(vehicle, d, report.conclusion, uncertain);
-  if (d.complete) {
-    report.closed_loop = fly_both(command, flights, vehicle, corrected);
-    report.next = next_experiment(d, uncertain, command.threads);
+  for (std::size_t f = 0; !faulty && f < read.logs.size(); ++f)
+    flights.emplace_back(Recording(command.flights[f], std::move(read.logs[f]), asked.vehicle));
+  const Diagnosis d =
+      faulty ? Diagnosis() : diagnose_visibly(flights, asked.uncertain, asked.withheld, command.threads);
+  // of an earlier diagnosis nothing stays beside this one
+  for (const char* name : kFiles)
+    if (std::error_code error; !out.empty()) std::filesystem::remove(out / name, error);
+  Report report = faulty ? report_of(command.flights, std::move(read.faults))
+                         : report_of(command.flights, flights, asked.uncertain, d);
+  std::string written = kJson;
+  if (!faulty) {
+    const model::Vehicle corrected = corrected_vehicle(asked.vehicle, d, report.conclusion, asked.uncertain);
+    if (!out.empty()) written += write_all(out, report, corrected);
+    if (d.complete) look_ahead(command, asked, flights, d, corrected, report);
   }
   Json json = diagnosis_json(report);
   for (const std::string& line : summary_of(report, command.out)) std::printf("%s\n", line.c_str());
   if (out.empty()) return json;
-  io::write_atomically(out / "diagnosis.json", json.dump(2) + "\n");
-  io::write_atomically(out / "vehicle_corrected.toml",
-                       "# Corrected by flappy-gap diagnose.\n" + model::vehicle_text(corrected));
-  write_tables(out, report);
-  std::string files = "diagnosis.json, vehicle_corrected.toml, residuals.csv, candidates.csv, unexplained.csv";
-  try {
-    write_figures(out, report);
-    files += ", residuals.svg, probabilities.svg";
-  } catch (const io::InputError& e) {
-    std::fprintf(stderr, "warning: %s\n", e.what());
-  }
-  std::printf("written to %s: %s\n", command.out.c_str(), files.c_str());
+  io::write_atomically(out / kJson, json.dump(2) + "\n");
+  std::printf("written to %s: %s\n", command.out.c_str(), written.c_str());
   return json;
 }
 

@@ -123,7 +123,8 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     }
   }
   if (r.conclusion.kind == Conclusion::Kind::unknown && !r.unexplained.empty()) {
-    lines.push_back("what is left depends on:");
+    lines.push_back(r.beside.empty() ? "what is left depends on:"
+                                     : "what is left, with " + listed(r.beside, "and") + " in force, depends on:");
     for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
       lines.push_back(format("  %s on %s, %.0f times what models usually get wrong (%.0f nats)",
                              place_of(r.unexplained[i]).c_str(), r.unexplained[i].function.c_str(),

@@ -57,8 +57,9 @@ struct SideFigures {
 /// How motor, gear, spring and stops of one side act in a step. Torques are about beta and theta.
 template <class T>
 struct Hinges {
-  T source_share;  // of its nominal voltage
-  T voltage_V;     // at the motor
+  T source_share;      // of its nominal voltage
+  T voltage_V;         // at the motor
+  T motor_rate_rad_s;  // behind its gear: the wing's, but for play
   T resistance_ohm, torque_per_V_Nm, damping_Nm_s, stiffening_kg_m2, friction_Nm, rotor_kg_m2;  // as in SideParameters
   T spring_positive_Nm_rad, spring_negative_Nm_rad;
   T rotation_lower_rad, rotation_upper_rad;
@@ -110,6 +111,7 @@ template <class T>
 FLAPPY_INLINE Hinges<T> where(auto m, const Hinges<T>& a, const Hinges<T>& b) {
   return {where(m, a.source_share, b.source_share),
           where(m, a.voltage_V, b.voltage_V),
+          where(m, a.motor_rate_rad_s, b.motor_rate_rad_s),
           where(m, a.resistance_ohm, b.resistance_ohm),
           where(m, a.torque_per_V_Nm, b.torque_per_V_Nm),
           where(m, a.damping_Nm_s, b.damping_Nm_s),

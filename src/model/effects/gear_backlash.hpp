@@ -55,6 +55,7 @@ struct GearBacklash {
     const T k = where(meshes, stiffness, T(0)), K = where(meshes, T(stiffness * s.step_s + damping), T(0));
 
     const T psi_rate = x.stroke_rate_rad_s, phi_rate = psi_rate + slip;
+    h.motor_rate_rad_s = phi_rate;
     const T inertia = T(h.rotor_kg_m2 * s.per_step), pressed = k * T(slack - end);
     const T driven = T(T(inertia - T(0.5) * h.damping_Nm_s) * phi_rate) + T(h.torque_per_V_Nm * h.voltage_V) - pressed;
     const T friction = clamp(T(-(driven + K * psi_rate)), T(-h.friction_Nm), h.friction_Nm);

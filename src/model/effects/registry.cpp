@@ -57,4 +57,17 @@ int effect_index(const char* id) {
   return -1;
 }
 
+std::string group_of(const std::string& id) {
+  const int index = effect_index(id.c_str());
+  const std::string group = index < 0 ? "" : effects()[static_cast<std::size_t>(index)].info.group;
+  return group.empty() ? id : group;
+}
+
+std::vector<std::string> whole_group(const std::string& id) {
+  std::vector<std::string> all;
+  for (const EffectEntry& e : effects())
+    if (group_of(e.info.id) == group_of(id)) all.emplace_back(e.info.id);
+  return all;
+}
+
 }  // namespace flappy::model

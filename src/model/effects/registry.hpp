@@ -98,5 +98,9 @@ struct EffectEntry {
 const std::vector<EffectEntry>& effects();
 /// Index of `id`, or -1.
 int effect_index(const char* id);
+/// What an effect is grouped with (EffectInfo::group): its group's name, or its own where it has none.
+std::string group_of(const std::string& id);
+/// All entries of an effect's group, in the registry's order.
+std::vector<std::string> whole_group(const std::string& id);
 
 }  // namespace flappy::model
