@@ -162,13 +162,13 @@ std::vector<DataFault> wrong_clocks(const FlightLog& log, const CheckReport& rep
 
 }  // namespace
 
-std::vector<DataFault> data_faults(const FlightLog& log, const std::filesystem::path& folder) {
+std::vector<DataFault> data_faults(const FlightLog& log, const CheckReport& report,
+                                   const std::filesystem::path& folder) {
   const std::vector<Stream> streams = streams_of(log);
   // What is not there cannot be judged further.
   std::vector<DataFault> faults = missing(streams);
   if (faults.empty()) faults = too_short(streams, log.header.flapping_Hz);
   if (faults.empty()) {
-    const CheckReport report = check_flight(log);
     faults = wrong_clocks(log, report);
     const bool clocks_off = !faults.empty();  // so currents go with other voltages
     for (const Finding& f : report.findings) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "flight/flight_log.hpp"
+#include "gap/check.hpp"
 
 namespace flappy::gap {
 
@@ -19,8 +19,12 @@ struct DataFault {
   std::string what;
 };
 
-/// At most one for each file, the one that explains the others; none where the log can be diagnosed. `folder` stands for
-/// the place in `file`. Effects of sensors within the ranges of the catalogue are none.
-std::vector<DataFault> data_faults(const flight::FlightLog& log, const std::filesystem::path& folder);
+/// At most one for each file, the one that explains the others; none where the log can be diagnosed. `report`: of the
+/// log; `folder` stands for the place in `file`. Effects of sensors within the ranges of the catalogue are none.
+std::vector<DataFault> data_faults(const flight::FlightLog& log, const CheckReport& report,
+                                   const std::filesystem::path& folder);
+inline std::vector<DataFault> data_faults(const flight::FlightLog& log, const std::filesystem::path& folder) {
+  return data_faults(log, check_flight(log), folder);
+}
 
 }  // namespace flappy::gap

@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <unsupported/Eigen/FFT>
 
 namespace flappy::gap {
 namespace {
@@ -115,14 +116,13 @@ void add_bands(const std::vector<double>& y, double beats_Hz, const std::vector<
   to.power.resize(ends_Hz.size(), 0);
   to.bins.resize(ends_Hz.size(), 0);
   const double n = static_cast<double>(y.size());
+  std::vector<std::complex<double>> spectrum;
+  Eigen::FFT<double>().fwd(spectrum, y);
   for (std::size_t k = 1; k <= y.size() / 2; ++k) {
     const double hz = beats_Hz * static_cast<double>(k) / n;
     const auto band = static_cast<std::size_t>(std::ranges::lower_bound(ends_Hz, hz) - ends_Hz.begin());
     if (band >= ends_Hz.size()) break;
-    const std::complex<double> turn = std::polar(1.0, -2 * std::numbers::pi * static_cast<double>(k) / n);
-    std::complex<double> sum = 0, at = 1;
-    for (const double v : y) sum += v * at, at *= turn;
-    to.power[band] += (2 * k == y.size() ? 1 : 2) * std::norm(sum) / n;
+    to.power[band] += (2 * k == y.size() ? 1 : 2) * std::norm(spectrum[k]) / n;
     to.bins[band] += 1;
   }
 }

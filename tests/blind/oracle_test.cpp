@@ -167,7 +167,7 @@ TEST(OracleSubject, SensorsDoNotChangeTheFlight) {
 }
 
 // With j = b' C^-1 b of a column b of the background, what is known of a coefficient of b beside one of variance 1 is
-// j/(1 + j): less than the little that every vehicle has says nothing.
+// j/(1 + j), and less beside others: less than the little that every vehicle has says nothing.
 TEST(OracleSubject, LessThanEveryVehicleHasSaysNothing) {
   const Case c = flown({});
   const Subject subject(c, fly_all(c, 2), 2);
@@ -179,9 +179,18 @@ TEST(OracleSubject, LessThanEveryVehicleHasSaysNothing) {
   const MatrixXd alone = subject.information({}, some), beside = subject.information(background, some);
   for (Index i = 0; i < 3; ++i) {
     EXPECT_GT(alone(i, i), beside(i, i));
-    EXPECT_LT(beside(i, i), 1);
+    const std::vector<gap::Smooth> b = {some[static_cast<std::size_t>(i)]};
+    const double j = alone(i, i), known = subject.information(b, b)(0, 0);
+    EXPECT_NEAR(known, j / (1 + j), 1e-9);
+    EXPECT_LT(beside(i, i), known * (1 + 1e-9));
     EXPECT_GT(beside(i, i), 0);
   }
+  // a column is as large as the catalogue's entry at that coordinate
+  const std::string first = model::effects().front().info.id;
+  const auto unknowns = static_cast<Index>(gap::unknowns_of(first).size());
+  const double sd = gap::background_sd(first), reach = 0.4;
+  const gap::Smooth there = subject.catalogue(first, {reach * VectorXd::Unit(unknowns, 0)})[0];
+  EXPECT_LT((background.front() - sd / reach * there).norm(), 1e-12 * there.norm());
 }
 
 // Effects whose size both sides state in the same units: the entry comes out as what was put in. Poses

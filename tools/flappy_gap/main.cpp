@@ -92,7 +92,9 @@ Json check(const std::vector<std::string>& folders) {
   std::vector<Checked> checked;
   for (const std::string& folder : folders) {
     const flight::FlightLog log = flight::read_flight_log(folder);
-    checked.push_back({log.header, check_flight(log), data_faults(log, folder)});
+    CheckReport report = check_flight(log);
+    std::vector<DataFault> faults = data_faults(log, report, folder);
+    checked.push_back({log.header, std::move(report), std::move(faults)});
   }
   Json flights = Json::array();
   std::size_t warnings = 0, not_tested = 0;
