@@ -36,7 +36,7 @@ constexpr double kLarge = 350;
 constexpr double kPriorNone = 0.1, kPriorParameters = 0.15, kPriorEffect = 0.6, kPriorUnknown = 0.15;
 /// Nats that an entry may gain on a robot without any effect, for two makers' models differ by more here and there than their
 /// floors say: so much of its gain tells nothing, and more of what a further entry gains, to which the first one's errors are left.
-constexpr double kByChance = 8, kByChanceBeside = 16;
+constexpr double kByChance = 12, kByChanceBeside = 16;
 /// For every further effect.
 constexpr double kPriorFurther = 0.1;
 

@@ -169,14 +169,17 @@ Smooth Fitter::form_error(const Hypothesis& hypothesis, const Linearised& point)
   return squares.cwiseSqrt();
 }
 
-Posterior Fitter::solve(const Linearised& point) const {
-  const Columns c = columns_of(point);
-  const Posterior p = Evidence::posterior(
-      evidence_.reduce(point.statistics, c.columns, all_flights(), evidence_.floor()), c.chosen, c.mean());
+Reduced Fitter::reduce(const Linearised& point, const Columns& columns) const {
+  return evidence_.reduce(point.statistics, columns.columns, all_flights(), evidence_.floor());
+}
+
+Posterior Fitter::solve(const Linearised& point, const Columns& columns, Reduced reduced, double damping) const {
   std::vector<Index> seen;
   for (std::size_t d = 0; d < point.columns.size(); ++d)
     if (point.columns[d].size() > 0) seen.push_back(static_cast<Index>(d));
   const auto own = static_cast<Index>(seen.size()), k = static_cast<Index>(point.columns.size());
+  reduced.sums.diagonal().head(own).array() += damping;
+  const Posterior p = Evidence::posterior(reduced, columns.chosen, columns.mean());
   Posterior all{p.log_evidence, VectorXd::Zero(k), MatrixXd::Identity(k, k)};
   all.mean(seen) = p.mean.head(own);
   all.covariance(seen, seen) = p.covariance.topLeftCorner(own, own);
@@ -245,7 +248,8 @@ Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters, const st
   l.at.head(hypothesis.shared()) = parameters.point.at;
   l.directions = beside(hypothesis, parameters);
   l.columns.insert(l.columns.end(), own.begin(), own.end());
-  result.posterior = solve(l);
+  const Columns columns = columns_of(l);
+  result.posterior = solve(l, columns, reduce(l, columns));
   return result;
 }
 
@@ -259,18 +263,20 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
   if (fit.point.residual.empty()) return fit;  // comes apart
   for (int n = 1;; ++n) {
     const Linearised& l = fit.point;
-    fit.posterior = solve(l);
+    const Columns columns = columns_of(l);
+    const Reduced reduced = reduce(l, columns);
+    fit.posterior = solve(l, columns, reduced);
     if (n >= iterations) return fit;
     const VectorXd step = l.directions.axes * fit.posterior.mean;
     if (step.cwiseAbs().maxCoeff() < kConverged) return fit;
-    // the longest share of the step that pays, all tried at once
-    constexpr double kShares[] = {1, 0.5, 0.25, 0.1, 0.03};
+    // shares of the step, and steps that go less far where little is known; all tried at once
+    constexpr double kShares[] = {1, 0.5, 0.25, 0.1, 0.03}, kDampings[] = {1, 10, 100};
     std::vector<VectorXd> tries;
+    for (const double share : kShares) tries.push_back(hypothesis.bounded(l.at + share * step));
+    for (const double damping : kDampings)
+      tries.push_back(hypothesis.bounded(l.at + l.directions.axes * solve(l, columns, reduced, damping).mean));
     std::vector<Candidate> candidates;
-    for (const double share : kShares) {
-      tries.push_back(hypothesis.bounded(l.at + share * step));
-      candidates.push_back(hypothesis.candidate(tries.back()));
-    }
+    for (const VectorXd& at : tries) candidates.push_back(hypothesis.candidate(at));
     const std::vector<Signature> left = residuals(flights_, candidates, threads_);
     const double before = cost(evidence_.statistics(l.residual), l.at);
     std::size_t best = tries.size();

@@ -78,7 +78,9 @@ class Fitter {
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
   Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const;
   void average(const Hypothesis& hypothesis, Linearised& l) const;
-  Posterior solve(const Linearised& point) const;
+  Reduced reduce(const Linearised& point, const Columns& columns) const;
+  /// Along all directions. `damping`: of the steps, as so much more precision around the point itself (Levenberg).
+  Posterior solve(const Linearised& point, const Columns& columns, Reduced reduced, double damping = 0) const;
   double cost(const Statistics& residual, const Eigen::VectorXd& at) const;
 
   const std::vector<CarriedFlight>& flights_;

@@ -306,6 +306,10 @@ TEST(BatterySag, SolvesItsCircuit) {
   EXPECT_NEAR(battery_V * drawn_A, value(h.left.voltage_V) * i_l + value(h.right.voltage_V) * i_r, 1e-13);  // power
   EXPECT_NEAR(b.memory[0], 20 + kStep * drawn_A, 1e-14);
   EXPECT_GT(drawn_A, 0.3);
+  // empty, it turns nobody backward
+  b.x.left.stroke_rate_rad_s = b.x.right.stroke_rate_rad_s = One(0);
+  b.memory[0] = 1000;
+  EXPECT_EQ(value(b.hinges<BatterySag>(q, 12, -6).left.voltage_V), 0);
 }
 
 TEST(CoulombFriction, FallsWithSpeed) {

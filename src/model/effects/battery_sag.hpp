@@ -4,7 +4,7 @@
 // power is the same on both sides of it, and what a motor gives back flows back.
 // [1] Chen, Rincon-Mora, Accurate electrical battery model, IEEE Trans. Energy Conversion 21(2), 2006: source voltage of the
 //     charge, less a series resistance times the current; here linear in the charge, without its slow RC pairs.
-// Valid over the flat part of a discharge. A flight starts with a full battery.
+// Valid over the flat part of a discharge; an empty battery gives nothing. A flight starts with a full one.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -25,7 +25,7 @@ struct BatterySag {
     const T emf_l = s.figures.left.back_emf_V_s * s.x.left.stroke_rate_rad_s;
     const T emf_r = s.figures.right.back_emf_V_s * s.x.right.stroke_rate_rad_s;
     const T per_ohm_l = share_l / h.left.resistance_ohm, per_ohm_r = share_r / h.right.resistance_ohm;
-    const T full = q[2] - q[1] * state.get(0);
+    const T full = max(T(q[2] - q[1] * state.get(0)), T(0));
     const T battery_V = T(full + q[0] * T(per_ohm_l * emf_l + per_ohm_r * emf_r)) /
                         T(T(1) + q[0] * T(per_ohm_l * share_l + per_ohm_r * share_r));
     h.left.source_share = h.right.source_share = battery_V / q[2];
