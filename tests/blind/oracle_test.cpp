@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "gap/hypothesis.hpp"
 #include "model/effects/registry.hpp"
 #include "vehicles.hpp"
 
@@ -189,7 +190,8 @@ TEST(OracleSubject, LessThanEveryVehicleHasSaysNothing) {
   const std::string first = model::effects().front().info.id;
   const auto unknowns = static_cast<Index>(gap::unknowns_of(first).size());
   const double sd = gap::background_sd(first), reach = 0.4;
-  const gap::Smooth there = subject.catalogue(first, {reach * VectorXd::Unit(unknowns, 0)})[0];
+  const std::vector<VectorXd> at = {reach * VectorXd::Unit(unknowns, 0)};
+  const gap::Smooth there = subject.catalogue(first, at)[0];
   EXPECT_LT((background.front() - sd / reach * there).norm(), 1e-12 * there.norm());
 }
 
