@@ -95,4 +95,18 @@ expect_refused("flappy-gap: flight is required; see flappy-gap --help" check)
 set(diagnose diagnose --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --priors ${SOURCE}/configs/gap/priors.toml
   --flights ${WORK}/good)
 expect_refused("command line: --withhold: no effect \"gale\"; accepted: identifiers of docs/effects.md" ${diagnose} --withhold gale)
-expect_refused("--out: ${WORK}/good/imu.csv: Not a directory; accepted: a folder" ${diagnose} --out ${WORK}/good/imu.csv)
+expect_refused("${WORK}/good/imu.csv: cannot be written: Not a directory" ${diagnose} --out ${WORK}/good/imu.csv)
+
+# ---- data that forbid a diagnosis are a result; nothing of an earlier one stays beside it
+
+file(WRITE ${WORK}/diagnosis/vehicle_corrected.toml "of another flight")
+run(${diagnose} --out ${WORK}/diagnosis)
+expect_equal("exit code" "${code}" 0)
+expect_line("The data are at fault; nothing was diagnosed")
+expect_line("  ${WORK}/good/command.csv:152: the flight lasts 3 s, at least 6 s (60 beats) are needed")
+file(READ ${WORK}/diagnosis/diagnosis.json json)
+string(JSON kind GET "${json}" verdict kind)
+expect_equal("verdict" "${kind}" data)
+if(EXISTS ${WORK}/diagnosis/vehicle_corrected.toml)
+  message(SEND_ERROR "a corrected vehicle of another diagnosis stays")
+endif()
