@@ -17,7 +17,7 @@ double Robot::place_gain(std::size_t k) const {
                           x_.torso.attitude * (s.shoulder_m + Vector3d(0, s.sign * 0.6 * s.planform.wing_length_m, 0));
   double gain = 1;
   if (const double size = sizes_[Effect::ground_effect]; size > 0) {
-    // Hayden 1976: at constant power thrust grows as (A + B (2R/h)^2)^(2/3); A taken as 1, finite on the ground
+    // Hayden 1976: at constant power thrust grows as (A + B (2R/h)^2)^(2/3), A = 0.99, B = 0.038; here 1, 0.05, finite on the ground
     const double h2 = square(std::max(middle.z() - room_.ground_z_m, 0.0)) + square(0.05);
     gain *= power(1 + 0.05 * size * square(2 * kHalfSpan_m) / h2, 2.0 / 3);
   }

@@ -1,4 +1,4 @@
-// Adaptive robust controller (Yao and Tomizuka 1997; for this vehicle Fei et al. 2019): sliding errors down to the level
+// Adaptive robust controller (Yao and Tomizuka 1997; for this vehicle the code of Fei et al. 2019): sliding errors down to the level
 // where the wing beat acts, feedback that makes them decay, and parameters adapted within known bounds.
 // Levels, in the heading frame (f: forward, l: left), b = R z the direction of thrust, w the body rate:
 //   acceleration a = g b/b_z + d        jerk j = g R (w x z)       snap = g (w_y', -w_x')

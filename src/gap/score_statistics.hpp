@@ -18,7 +18,7 @@ struct Score {
 /// `successes` of `count`, with Wilson's interval (Wilson, J. Am. Stat. Assoc. 22, 1927).
 Score proportion(std::size_t successes, std::size_t count);
 
-/// A statistic of `count` cases, with the percentile interval of 2,000 resamples of cases (Efron 1979), the same ones every
+/// A statistic of `count` cases, with the percentile interval of 2,000 resamples of cases (Efron 1981), the same ones every
 /// time. `statistic` gets the cases' indices; nothing where it has no value.
 Score resampled(std::size_t count,
                 const std::function<std::optional<double>(const std::vector<std::size_t>&)>& statistic);

@@ -1,4 +1,4 @@
-// Wing-beat signal with split cycle (Fei et al. 2019). Within a beat of fraction t in [0, 1):
+// Wing-beat signal with split cycle (Doman, Oppenheimer, Sigthorsson 2010; here as Fei et al. 2019). Within a beat of fraction t in [0, 1):
 //   V = A cos(pi t / s) + V_0              for t < s
 //   V = A cos(pi (t - 1) / (1 - s)) + V_0  after
 //   left:  A = V_amp + V_d, s = 0.5 - d_sigma      right: A = V_amp - V_d, s = 0.5 + d_sigma

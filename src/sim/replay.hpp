@@ -40,7 +40,8 @@ struct ReplayOptions {
   int spin_up_steps = 0;
   int carry_steps = 10;  ///< 0: the torso stays welded as it is when the window starts, which leaves the wings wrong
   /// Of what a stroke is off its record where the record has one (not a number elsewhere), the share that is taken back
-  /// whenever the torso is; its rate is corrected as in an alpha-beta filter (Kalata 1984). Rotations follow by themselves.
+  /// whenever the torso is; its rate is corrected as in an alpha-beta filter, beta = alpha^2 / (2 - alpha) (Benedict and
+  /// Bordner 1962). Rotations follow by themselves.
   double stroke_share = 0;
 };
 

@@ -33,7 +33,10 @@ class Maker {
     if (fs::exists(command_.out / "manifest.json"))
       throw io::InputError(command_.out.string() + ": has a manifest already; accepted: a name for a new folder");
     agree_with_what_is_there();
-    const bool all = work_through("flying", plan_.size(), command_.threads, [&](std::size_t i) { make(plan_[i]); });
+    std::vector<const PlannedCase*> open;
+    for (const PlannedCase& p : plan_)
+      if (!fs::exists(label_file(p))) open.push_back(&p);
+    const bool all = work_through("flying", open.size(), command_.threads, [&](std::size_t i) { make(*open[i]); });
     if (all) seal();
     return all;
   }
@@ -55,7 +58,6 @@ class Maker {
   }
 
   void make(const PlannedCase& p) const {
-    if (fs::exists(label_file(p))) return;
     blind::Case c = declared_;
     c.sizes = blind::Sizes(p.effects);
     c.programme = p.hover ? blind::Programme::hover : blind::Programme::rich;

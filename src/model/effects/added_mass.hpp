@@ -3,8 +3,8 @@
 //   dF = -factor rho pi/4 c^2 v_n' dr     dM = -factor rho pi/128 c^4 Omega_y' dr     v_n = v_x - c/2 Omega_y - s r Omega_z
 // v: of the shoulder in the air, Omega: of the wing, in the wing's frame; ' is the rate of change of these components. So the
 // wing's force and moments are rates of three momenta, linear in u = (v_x, Omega_y, Omega_z) by the planform's c^2 r^n.
-// [1] Sane, Dickinson, J. Exp. Biol. 205, 2002, eq. 11 (after Sedov 1965). [2] Whitney, Wood, J. Fluid Mech. 660, 2010,
-//     sec. 2.3. Like them, without Kirchhoff's terms Omega x momentum: separated flow has no leading-edge suction.
+// [1] Sane, Dickinson, J. Exp. Biol. 205, 2002 (after Sedov 1965). [2] Whitney, Wood, J. Fluid Mech. 660, 2010.
+//     Like them, without Kirchhoff's terms Omega x momentum: separated flow has no leading-edge suction.
 // In time: the momenta's differences from step to step are what the wing, and through the shoulder the body, feels one step
 // later, so none is lost. To the hinges their own part is added as inertia in the same step, and its lagged share given
 // back: added mass may exceed the wing's own. The body's part may lag, being below a tenth of the body's.

@@ -2,7 +2,8 @@
 //   k = 1 + gain exp(-h / length)      h: clearance of the stroke plane to the ceiling
 // [1] Hsiao, Chirarattananon, Ceiling effects for hybrid aerial-surface locomotion of small rotorcraft, IEEE/ASME Trans.
 //     Mechatronics 24(5), 2019: thrust at one power rises as a monotonic function of clearance / rotor radius, about 1.1
-//     at half a radius. The exponential is the form of He, Leang et al. 2019 for the ground, fitted to the same kind of data.
+//     at half a radius. The exponential is the form of He et al. 2019 for the ground. Near contact [1] has power fall to a
+//     third: more than this form can give.
 // The force in the plane of the strokes stays, as for the ground. A level attitude and a flat ceiling are assumed; above the ceiling h counts as 0.
 #pragma once
 

@@ -1,5 +1,6 @@
 // The torso's centre of mass is not where the model has it: shifted by (x, y, z) in B, its inertia about itself unchanged.
-// Under a thrust F the vehicle then turns with (moved lever) x F: 1 mm on a 12 g vehicle is 31 rad/s^2 of roll or pitch.
+// Under a thrust F the vehicle then turns with (moved lever) x F: 1 mm on a 12 g vehicle is 31 rad/s^2 of pitch
+// by the torso's inertia alone; wings that are carried along take a fifth of it.
 // [1] Goldstein, Classical Mechanics, ch. 5: rigid bodies. Exact; only the battery and the boards are assumed to have moved.
 #pragma once
 

@@ -1,7 +1,7 @@
 // The motor's voltage follows the driver's as a first-order lag, from none at the start of a flight:
 //   lag dV/dt = V_driver - V      exact for a voltage that holds over a step; V is taken at the end of the step
-// [1] Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., ch. 4. Stands for filters of the driver and
-//     for the winding's inductance, L/R, which the base model neglects.
+// [1] Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., ch. 4. Stands for filters of the driver.
+// The winding's L/R, which the base model neglects, would lag the back-EMF, too.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,6 +1,7 @@
 // A driver whose output starts at a voltage: V - dead sgn V beyond it, none within.
 // [1] Tao, Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996, ch. 2: dead zone.
-// The form of a half bridge's dead time and of the drop of its switches: what is lost is lost at every voltage.
+// Like a half bridge's dead time and the drop of its switches: what is lost is lost at every voltage. Theirs goes with the
+// sign of the current, which is another where back-EMF exceeds the voltage.
 #pragma once
 
 #include "model/effects/effect.hpp"

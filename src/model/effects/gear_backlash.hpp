@@ -6,8 +6,8 @@
 //   phi'_new = (N + K psi'_new) / D      tau = k (phi - psi -+ gap/2) + K N / D - K (1 - K/D) psi'_new
 // so the teeth meet the wing as a torque and as h K (1 - K/D) of inertia, which tends to J + h b/2 for k -> infinity: the
 // base model's rigid gear, to which gap = 0 is set exactly.
-// [1] Nordin, Gutman, Controlling mechanical systems with backlash, Automatica 38(10), 2002, sec. 2: the physical model, a
-//     dead zone in series with spring and damper.
+// [1] Nordin, Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38(10), 2002: the dead-zone model
+//     with damping. Unlike in their physical model, teeth that part may pull for a moment.
 // k is the motor's stall torque per 0.001 rad, d a damping ratio of 0.1 on J. A flight starts in the middle of the gap.
 #pragma once
 

@@ -1,7 +1,7 @@
 // Thrust gained near the ground, as a factor on the lift of the wings:
 //   k = 1 + gain exp(-h / length)      h: height of the stroke plane over the ground
-// [1] He, Leang et al., In-ground-effect modeling and nonlinear-disturbance observer for multirotor UAV control,
-//     J. Dyn. Syst. Meas. Control 141(7), 071013, 2019: k = 1 + C_a exp(-C_b h / R), fitted to small rotors.
+// [1] He, Kou, Calaf, Leang, In-ground-effect modeling and nonlinear-disturbance observer for multirotor unmanned aerial
+//     vehicle control, J. Dyn. Syst. Meas. Control 141(7), 071013, 2019: k = 1 + C_a exp(-C_b h / R), fitted to small rotors.
 // Finite when standing, unlike 1 / (1 - (R / 4h)^2) (Cheeseman and Bennett 1955), which it meets within 0.4 % for
 // h > R with gain 0.27, length 0.7 R. The plane takes the downwash away: for the same power, that is the same drag of the
 // wings, there is more lift, so the force in the plane of the strokes stays. A level attitude and a flat ground are assumed; below the ground h counts as 0.
@@ -13,7 +13,7 @@ namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
 struct GroundEffect {
-  static constexpr EffectInfo kInfo{"ground_effect", Stage::air, 1, "thrust_loss", "He, Leang et al. 2019"};
+  static constexpr EffectInfo kInfo{"ground_effect", Stage::air, 1, "thrust_loss", "He et al. 2019"};
   static constexpr std::array<EffectParameter, 2> kParameters{
       {{"gain", 0, 1, 0.15, 0, 0.45}, {"length_m", 0.005, 0.5, 0.06, 0.03, 0.09}}};
 

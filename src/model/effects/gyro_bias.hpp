@@ -1,8 +1,8 @@
 // Drift of a gyro's bias beyond the constant one of the sensor model: the part is warmed by its own current,
 //   b(t) = drift (1 - exp(-t / warm_up))      t since the flight's start
-// [1] El-Sheimy, Hou and Niu, Analysis and modeling of inertial sensors using Allan variance, IEEE Trans. Instrum. Meas.
-//     57(1), 140-149, 2008: slow errors of MEMS gyros. First-order warm-up: data sheets of consumer parts give seconds to
-//     minutes. A random walk beside it is left to the filters' own process noise.
+// The first order is ours; data sheets of consumer parts give seconds to minutes. A random walk beside it is left to the
+// filters' own process noise. [1] El-Sheimy, Hou, Niu, Analysis and modeling of inertial sensors using Allan variance, IEEE
+//     Trans. Instrum. Meas. 57(1), 2008: the slow noise of MEMS gyros.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -4,7 +4,7 @@
 // -x on either stroke; the force is towards +x. So it adds to a wing that pitches up and takes from one that pitches down.
 // U = s w_z r - v_x has one sign along the wing, that at r_cp, and its moments are those of the planform: c^2 r^n.
 // [1] Sane, Dickinson, The aerodynamic effects of wing rotation and a revised quasi-steady model of flapping flight,
-//     J. Exp. Biol. 205, 2002, eq. 8 (after Fung 1969, Ellington 1984). C_r measured: 1.55 to 2.1 at x_0 = 0.25 for 1.57.
+//     J. Exp. Biol. 205, 2002 (after Fung 1969, Ellington 1984). C_r measured: 1.55 to 2.1 at x_0 = 0.25 for 1.57.
 // The force is taken to act at mid-chord. Valid for c theta' / U below about 1, so not at rest.
 #pragma once
 

@@ -2,7 +2,7 @@
 //   R = R_0 (1 + 0.00393 dT)     time d(dT)/dt = rise R i^2 - dT     i = (V - K N psi') / R
 // which takes from the torque per volt and from the back-EMF's share of the damping alike. A flight starts cold.
 // [1] Hughes, Drury, Electric Motors and Drives, 4th ed., 2013, ch. 3: losses and a motor's thermal time constant.
-// [2] Dellinger, NBS Bulletin 7(1), 1911: copper, 0.00393 per K at 20 C.
+// [2] Copper Wire Tables, Circular of the Bureau of Standards 31, 3rd ed., 1914: annealed copper, 0.00393 per K at 20 C.
 // One lump for winding and case; magnets that weaken with heat are left out. `rise` is the whole of the thermal resistance.
 #pragma once
 

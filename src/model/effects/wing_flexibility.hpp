@@ -3,8 +3,8 @@
 // felt by the air at the centre of pressure r_cp, where the force of the whole wing is taken: effect on the mean. F_N > 0
 // pushes the trailing edge towards +x, which is to smaller theta on both sides. F_N is that of the untwisted wing: one step
 // of the fixed point, whose next is smaller by twist dF_N/dtheta, 0.05 at the typical size.
-// [1] Zheng, Hedrick, Mittal, A multi-fidelity modelling approach for evaluation and optimization of wing stroke aerodynamics
-//     in flapping flight, J. Fluid Mech. 721, 2013: spanwise twist by load, and what it does to lift and drag.
+// [1] Nakata, Liu, Aerodynamic performance of a hovering hawkmoth with flexible wings: a computational approach, Proc. R. Soc.
+//     B 279, 2012: passive twist, and what it does to force and efficiency. The linear law is ours.
 // Static deflection (the wing's own modes are far above the beat); turned by no more than 0.5 rad.
 #pragma once
 
@@ -14,7 +14,7 @@ namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
 struct WingFlexibility {
-  static constexpr EffectInfo kInfo{"wing_flexibility", Stage::air, 1, "", "Zheng, Hedrick, Mittal 2013"};
+  static constexpr EffectInfo kInfo{"wing_flexibility", Stage::air, 1, "", "Nakata, Liu 2012"};
   static constexpr std::array<EffectParameter, 1> kParameters{{{"twist_rad_N", 0, 10, 0.5, 0, 1.5}}};
 
   template <int side, class T>
