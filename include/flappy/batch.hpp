@@ -70,7 +70,7 @@ class Batch {
   void set_input(std::size_t i, const Input& input);
 
   /// Advances every flapper by `steps` physics steps. Plausibility and contact are looked at once, at the
-  /// end.
+  /// end. std::invalid_argument for a number below 0.
   void step(int steps);
 
   FlapperState state(std::size_t i) const;

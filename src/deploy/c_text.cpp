@@ -37,7 +37,9 @@ template std::string c_row(std::span<const float>);
 template std::string c_row(std::span<const std::int32_t>);
 
 std::string c_comment(const std::string& text) {
-  std::istringstream lines(text);
+  std::string closed = text;  // nothing in it ends the comment
+  for (std::size_t at = 0; (at = closed.find("*/", at)) != std::string::npos;) closed.insert(at + 1, " ");
+  std::istringstream lines(closed);
   std::string comment = "/* ";
   bool first = true;
   for (std::string line; std::getline(lines, line); first = false)
@@ -49,7 +51,7 @@ std::string c_string(const std::string& text) {
   std::string literal = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') literal += '\\';
-    literal += c;
+    literal += c == '\n' ? std::string("\\n") : std::string(1, c);
   }
   return literal + '"';
 }

@@ -32,7 +32,7 @@ class Flight {
   explicit Flight(const flight::FlyConfig& config) : options_(on_board(config)), fleet_(1, config.vehicle, options_) {
     if (options_.task.start.settled)
       fleet_.start(
-          0, 0, flight::settle<float>(options_, 1, config.settle_s, [&](std::uint32_t) { return config.vehicle; })[0]);
+          0, 0, flight::settle<float>(options_, 1, flight::kHover_s, [&](std::uint32_t) { return config.vehicle; })[0]);
     fleet_.set_actor(config.actor);
     fleet_.record(true);
   }

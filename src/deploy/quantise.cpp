@@ -37,7 +37,8 @@ double best_step(const std::vector<float>& values) {
   const double widest = most > 0 ? most / static_cast<double>(kLargest) : 1.0 / static_cast<double>(kLargest);
   double best = widest;
   for (int i = 1; i < 60; ++i)
-    if (const double step = widest * std::pow(3.0, -i / 60.0); loss(values, step) < loss(values, best)) best = step;
+    if (const double step = widest * model::exp(-model::log(3.0) * i / 60); loss(values, step) < loss(values, best))
+      best = step;
   return best;
 }
 
@@ -71,7 +72,7 @@ QuantisedNetwork quantise(const PolicyNetwork& n, const std::vector<float>& obse
       for (std::size_t o = 0; o < out; ++o) {
         float sum = weights[o * (in + 1)];
         for (std::size_t i = 0; i < in; ++i) sum += weights[o * (in + 1) + 1 + i] * values[row * in + i];
-        next[row * out + o] = last ? sum : n.relu ? std::max(sum, 0.0F) : std::tanh(sum);
+        next[row * out + o] = last ? sum : n.relu ? std::max(sum, 0.0F) : lane_tanh(sum);
       }
     const double next_step = last ? 1 : n.relu ? best_step(next) : 1 / static_cast<double>(kLargest);
     for (std::size_t o = 0; o < out; ++o) {

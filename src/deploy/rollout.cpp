@@ -69,7 +69,7 @@ PolicyVectors roll_out(const flight::FlyConfig& config, std::size_t first, std::
   const auto vehicle = [&](std::uint32_t flapper) { return config.vehicle_of(flapper); };
   Fleet<float> fleet(flights, config.vehicle, o);
   std::vector<flight::Snapshot<float>> hover;
-  if (o.task.start.settled) hover = flight::settle<float>(o, flights, config.settle_s, vehicle);
+  if (o.task.start.settled) hover = flight::settle<float>(o, flights, flight::kHover_s, vehicle);
   for (std::size_t i = 0; i < flights; ++i) {
     if (hover.empty()) {
       fleet.set_vehicle(i, vehicle(o.first_flapper + static_cast<std::uint32_t>(i)));

@@ -28,6 +28,10 @@ class TorchScript : public Policy {
 
   void act(std::size_t count, const float* observation, float* action) const override {
     const torch::Tensor out = forward(count, observation);
+    if (out.numel() != static_cast<std::int64_t>(count) * actions())
+      throw io::InputError("a TorchScript that makes " + std::to_string(out.numel()) + " numbers of " +
+                           std::to_string(count) + " observations; accepted: " + std::to_string(actions()) +
+                           " of each");
     std::copy_n(out.data_ptr<float>(), count * static_cast<std::size_t>(actions()), action);
   }
 

@@ -50,6 +50,7 @@ std::vector<int> harmonics(const io::Table& table, const Wave& w, int count, int
 
 Script read_script(const io::Table& table) {
   const io::CsvTable csv = io::read_csv(table.file("file"));
+  if (csv.column("t_s").empty()) throw io::InputError(csv.name + ": has no rows; accepted: at least one");
   Script s{csv.column("t_s"), std::vector<sim::Input>(csv.column("t_s").size())};
   for (std::size_t k = 0; k < kInputs.size(); ++k) {
     const std::vector<double>& column = csv.column(kNames[k]);
@@ -101,6 +102,10 @@ sim::Input Excitation::at(double t_s) const {
     for (const auto input : kInputs) sum.*input += s.input[static_cast<std::size_t>(after - 1)].*input;
   }
   return sum;
+}
+
+bool Excitation::acts() const {
+  return changes() || std::ranges::any_of(kInputs, [&](auto input) { return constant.*input != 0; });
 }
 
 Excitation read_excitation(const io::Table& root, double flight_s) {

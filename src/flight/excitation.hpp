@@ -41,6 +41,7 @@ class Excitation {
   /// At `t_s` since the start of the flight. The same bits on every processor.
   sim::Input at(double t_s) const;
   bool changes() const { return !waves.empty() || !scripts.empty(); }
+  bool acts() const;
 };
 
 /// Reads [constant_input] and [[excitation]]. `flight_s`: how long a multisine lasts that does not say.

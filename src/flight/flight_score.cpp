@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "model/math.hpp"
+
 namespace flappy::flight {
 
 const char* name_of(Failure failure) {
@@ -18,9 +20,9 @@ Errors errors_of(const Motion& truth, const Target& target) {
   const double r20 = 2 * (x * z - w * y), r21 = 2 * (y * z + w * x), r22 = 1 - 2 * (x * x + y * y);
   const double aside = target.heading_cos * r10 - target.heading_sin * r00;
   const double facing = target.heading_cos * r00 + target.heading_sin * r10;
-  return {std::atan2(r21, r22),
-          -std::asin(std::clamp(r20, -1.0, 1.0)),
-          std::atan2(aside, facing),
+  return {model::atan2(r21, r22),
+          -model::asin(std::clamp(r20, -1.0, 1.0)),
+          model::atan2(aside, facing),
           truth.position_m[0] - target.position_m[0],
           truth.position_m[1] - target.position_m[1],
           truth.position_m[2] - target.position_m[2]};
@@ -35,7 +37,7 @@ void FlightScore::add(const Motion& truth, const Target& target, std::uint32_t s
   ++ticks;
   settled_ticks += is_settled;
 
-  static const double kTippedCos = std::cos(kTippedOver_rad);
+  static const double kTippedCos = model::sin_cos_wide(kTippedOver_rad).cos;
   const double upright = 1 - 2 * (truth.attitude[1] * truth.attitude[1] + truth.attitude[2] * truth.attitude[2]);
   const bool far = e[3] * e[3] + e[4] * e[4] + e[5] * e[5] > kFarAway_m * kFarAway_m;
   const auto& v = truth.velocity_m_s;

@@ -38,8 +38,7 @@ void prepare_log_folder(const fs::path& folder, std::size_t count, const std::st
                          "; accepted: a new folder, an empty one, or logs of as many flights to replace");
   };
   if (fs::exists(folder, error) && !fs::is_directory(folder, error)) refuse("is no folder");
-  fs::create_directories(folder, error);
-  if (error) throw io::InputError(folder.string() + ": cannot be written: " + error.message());
+  io::make_folder(folder);
   const bool is_log = fs::exists(folder / log_file::kHeader, error);
   std::set<std::string> foreign;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
@@ -51,6 +50,10 @@ void prepare_log_folder(const fs::path& folder, std::size_t count, const std::st
   }
   if (error) throw io::InputError(folder.string() + ": cannot be read: " + error.message());
   if (!foreign.empty()) refuse("holds " + *foreign.begin());
+}
+
+int processors(const FlyConfig& config) {
+  return config.fleet.batch.threads > 0 ? config.fleet.batch.threads : omp_get_num_procs();
 }
 
 /// Flights that are flown together.
@@ -114,7 +117,7 @@ class Part {
     std::size_t written = 0;
     std::exception_ptr fault;
     const auto n = static_cast<std::ptrdiff_t>(recorders_.size());
-#pragma omp parallel for schedule(dynamic) reduction(+ : written)
+#pragma omp parallel for schedule(dynamic) reduction(+ : written) num_threads(processors(config_))
     for (std::ptrdiff_t k = 0; k < n; ++k) {
       const auto i = static_cast<std::size_t>(k);
       try {
@@ -151,8 +154,8 @@ class Part {
     if (!config.actor) o.task.forbid_actions();
     o.first_flapper += static_cast<std::uint32_t>(first);
     // threads that share a few blocks wait for each other more than they fly
-    const int procs = o.batch.threads > 0 ? o.batch.threads : omp_get_num_procs();
-    o.batch.threads = static_cast<int>(std::clamp<std::size_t>(count / 64, 1, static_cast<std::size_t>(procs)));
+    const auto most = static_cast<std::size_t>(processors(config));
+    o.batch.threads = static_cast<int>(std::clamp<std::size_t>(count / 64, 1, most));
     return Fleet<T>(count, config.vehicle, o);
   }
 

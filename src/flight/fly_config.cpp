@@ -51,7 +51,7 @@ sim::World read_world(const io::Table& root) {
     table->fail("ceiling_z_m", "is not above the ground", "a ceiling above ground_z_m");
   if (!table->has("walls")) return w;
   for (const auto& row : table->rows("walls", 4, kPlace)) {
-    const double length = std::hypot(row[2], row[3]);
+    const double length = std::sqrt(row[2] * row[2] + row[3] * row[3]);
     if (std::abs(length - 1) > 1e-3)
       table->fail("walls",
                   "normal of wall " + std::to_string(w.walls.size()) + " has length " + io::shortest_digits(length),
@@ -92,7 +92,7 @@ std::shared_ptr<const Actor> fitting_actor(const io::Table& root, const Task& ta
 class Reader {
  public:
   Reader(const std::filesystem::path& path, const Overrides& overrides)
-      : to_(routed(overrides)), name_(path.string()), main_(io::Config::load(path, to_[""])), root_(main_.root()) {}
+      : to_(routed(overrides)), main_(io::Config::load(path, to_[""])), root_(main_.root()) {}
 
   FlyConfig read() {
     root_.integer("schema", 1, 1);
@@ -104,6 +104,9 @@ class Reader {
     read_files();
     if (root_.has("actor")) c_.actor = fitting_actor(root_, c_.fleet.task);
     root_.finish();
+    if (c_.welded && c_.fleet.task.start.settled)
+      root_.fail("flight.support",
+                 "is \"welded\", but task " + io::toml_string(c_.fleet.task.name) + " starts from hover", "\"task\"");
     check_times();
     keep_texts();
     return std::move(c_);
@@ -202,7 +205,6 @@ class Reader {
   }
 
   std::map<std::string, Overrides> to_;
-  std::string name_;
   io::Config main_;
   io::Table root_;
   std::map<std::string, io::Config> files_;

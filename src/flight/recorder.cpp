@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "model/math.hpp"
 #include "model/wing_beat.hpp"
 #include "sim/lanes.hpp"
 #include "sim/storage.hpp"
@@ -79,7 +80,8 @@ ImuHeader imu_header(const ImuSensor& imu) {
   const double interval_s = 1 / imu.rate_hz, share = low_pass_share(imu.low_pass_hz, interval_s), past = 1 - share;
   const auto passes = [&](double hz) {
     const double x = kPi * hz * interval_s;
-    return std::sin(x) / x * share / std::sqrt(1 - 2 * past * std::cos(2 * x) + past * past);
+    return model::sin_cos_wide(x).sin / x * share /
+           std::sqrt(1 - 2 * past * model::sin_cos_wide(2 * x).cos + past * past);
   };
   double low = 0, high = imu.rate_hz;  // nothing passes at the rate itself
   for (int i = 0; i < 100; ++i) {

@@ -62,7 +62,6 @@ class Schedule {
   /// From the horizon, and from the last replayed increment, to the end of the last period.
   double horizon_age_s() const { return now_s() - horizon_s_; }
   double present_age_s() const { return now_s() - present_s_; }
-  double last_imu_age_s() const { return now_s() - last_imu_s_; }
 
  private:
   struct Entry {

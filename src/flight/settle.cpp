@@ -1,5 +1,6 @@
 #include "flight/settle.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace flappy::flight {
@@ -25,21 +26,20 @@ std::vector<Snapshot<T>> settle(const FleetOptions& options, std::size_t count, 
   FleetOptions o = options;
   o.task = staying();
   Fleet<T> fleet(count, vehicle(o.first_flapper), o);
-  double beat_s = 0;
+  const long settled = std::lround(seconds / fleet.period_s());
+  std::vector<long> taken_at(count);  // of control ticks, over one beat
   for (std::size_t i = 0; i < count; ++i) {
     const model::Vehicle v = vehicle(o.first_flapper + static_cast<std::uint32_t>(i));
     fleet.set_vehicle(i, v);
     fleet.start(i, 0);
-    beat_s = 1 / v.driver.flapping_Hz;
+    const auto phases = std::max(1L, static_cast<long>(std::ceil(1 / v.driver.flapping_Hz / fleet.period_s())));
+    taken_at[i] = settled + static_cast<long>((o.first_flapper + i) % static_cast<std::size_t>(phases));
   }
-  const long settled = std::lround(seconds / fleet.period_s());
-  const long phases = std::max(1L, static_cast<long>(std::ceil(beat_s / fleet.period_s())));
-  for (long tick = 0; tick < settled + phases; ++tick) {
+  const long last = std::ranges::max(taken_at);
+  for (long tick = 0; tick <= last; ++tick) {
     fleet.step();
-    if (tick < settled) continue;
     for (std::size_t i = 0; i < count; ++i)
-      if (static_cast<long>((o.first_flapper + i) % static_cast<std::size_t>(phases)) == tick - settled)
-        list[i] = fleet.snapshot(i);
+      if (tick == taken_at[i]) list[i] = fleet.snapshot(i);
   }
   return list;
 }

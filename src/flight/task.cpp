@@ -110,7 +110,8 @@ std::vector<Segment<double>> spline(const std::vector<Knot>& knots, double tick_
 }
 
 std::vector<Segment<double>> read_path(const io::Table& table, double tick_s) {
-  constexpr io::Range kPlace{-1e4, 1e4};
+  constexpr io::Range kPlace{-1e4, 1e4}, kHeading{-100, 100};
+  constexpr double kLongest_s = 1e5;
   std::vector<Knot> knots;
   const auto add = [&](double t_s, double x, double y, double z, double heading, const auto& refuse) {
     const auto tick = static_cast<std::uint32_t>(std::lround(t_s / tick_s));
@@ -120,8 +121,8 @@ std::vector<Segment<double>> read_path(const io::Table& table, double tick_s) {
   const std::string kind = table.choice("path.kind", {"waypoints", "file"});
   if (kind == "waypoints") {
     for (const io::Table& p : table.tables("path.waypoint"))
-      add(p.number("t_s", {0, 1e5}), p.number("x_m", kPlace), p.number("y_m", kPlace), p.number("z_m", kPlace),
-          p.number_or("heading_rad", 0, {-100, 100}),
+      add(p.number("t_s", {0, kLongest_s}), p.number("x_m", kPlace), p.number("y_m", kPlace), p.number("z_m", kPlace),
+          p.number_or("heading_rad", 0, kHeading),
           [&] { p.fail("t_s", "is not after the one before", "times that increase"); });
     if (knots.empty()) table.fail("path", "has no waypoint", "at least one [[path.waypoint]]");
     if (knots[0].tick != 0) table.fail("path", "does not start at t_s = 0", "a first waypoint at 0");
@@ -135,13 +136,19 @@ std::vector<Segment<double>> read_path(const io::Table& table, double tick_s) {
   const io::CsvTable csv = io::read_csv(table.file("path.file"));
   const auto &t = csv.column("t_s"), &x = csv.column("x_m"), &y = csv.column("y_m"), &z = csv.column("z_m"),
              &heading = csv.column("heading_rad");
-  for (std::size_t i = 0; i < t.size(); ++i)
-    add(t[i], x[i], y[i], z[i], heading[i], [&] {
-      throw io::InputError(csv.name + ":" + std::to_string(i + 2) +
-                           ": t_s is not a control period after the one before; times that increase");
-    });
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    const auto refuse = [&](const std::string& what) {
+      throw io::InputError(csv.name + ":" + std::to_string(i + 2) + ": " + what);
+    };
+    if (!(t[i] >= 0 && t[i] <= kLongest_s)) refuse("t_s is out of range; accepted: 0 to 100000");
+    for (const double place : {x[i], y[i], z[i]})
+      if (!(std::abs(place) <= kPlace.high)) refuse("a place is out of range; accepted: -10000 to 10000");
+    if (!(std::abs(heading[i]) <= kHeading.high)) refuse("heading_rad is out of range; accepted: -100 to 100");
+    add(t[i], x[i], y[i], z[i], heading[i],
+        [&] { refuse("t_s is not a control period after the one before; accepted: times that increase"); });
+  }
   if (knots.size() < 2 || knots[0].tick != 0)
-    throw io::InputError(csv.name + ": is no path; at least two rows, the first at t_s = 0");
+    throw io::InputError(csv.name + ": is no path; accepted: at least two rows, the first at t_s = 0");
   return spline(knots, tick_s);
 }
 

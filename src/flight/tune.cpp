@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <numbers>
 #include <pagmo/algorithm.hpp>
 #include <pagmo/algorithms/cmaes.hpp>
@@ -47,6 +49,13 @@ double cost_of(const Score& s) {
   return square(s.farthest_m / kFarAway_m) + s.sum / n + std::min(1.0, s.yaw / n);
 }
 
+/// What a file of gains has of one, so that its cost is that of the file.
+double four_digits(double gain) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", gain);
+  return std::strtod(text, nullptr);
+}
+
 struct Problem {
   const TuneConfig* config = nullptr;
 
@@ -56,7 +65,7 @@ struct Problem {
     const std::vector<ControllerField> all = fields(c);
     for (std::size_t i = 0; i < decision.size(); ++i) {
       const ControllerField& f = *std::ranges::find(all, config->vary[i], &ControllerField::path);
-      *f.value = std::clamp(*f.value * std::exp(decision[i]), f.range.low, f.range.high);
+      *f.value = four_digits(std::clamp(*f.value * std::exp(decision[i]), f.range.low, f.range.high));
     }
     return c;
   }
@@ -70,6 +79,7 @@ struct Problem {
 
 double cost_of_trial(const TuneConfig& config, const Trial& trial, const Controller& controller) {
   FleetOptions o = trial.fly.fleet;
+  o.task.forbid_actions();
   o.controller = controller;
   o.seed = config.seed;
   Fleet<float> fleet(trial.count, trial.fly.vehicle, o);
@@ -102,10 +112,16 @@ TuneConfig read_tune_config(const std::filesystem::path& path, const std::vector
   c.seed = static_cast<std::uint64_t>(root.integer("seed", 0, INT64_MAX));
   c.population = static_cast<unsigned>(root.integer("population", 5, 10000));
   c.generations = static_cast<unsigned>(root.integer("generations", 1, 100000));
-  for (const io::Table& t : root.tables("trial"))
+  for (const io::Table& t : root.tables("trial")) {
     c.trials.push_back({read_fly_config(t.file("fly")), static_cast<std::size_t>(t.integer("count", 1, 100000)),
                         t.number("weight", io::positive(1e6))});
+    const FlyConfig& fly = c.trials.back().fly;
+    if (fly.welded || fly.actor || fly.excitation.acts() || fly.fleet.task.start.settled)
+      t.fail("fly", "is held on a stand, excited, flown by an actor or starts from hover",
+             "flights of a controller alone from where the task starts");
+  }
   if (c.trials.empty()) root.fail("trial", "is missing", "at least one [[trial]]");
+  if (c.vary.empty()) root.fail("vary", "is empty", "paths of the controller's file");
   c.start = c.trials[0].fly.fleet.controller;
   std::vector<std::string> known;
   for (const ControllerField& f : fields(c.start)) known.push_back(f.path);

@@ -8,6 +8,7 @@
 #include <pagmo/population.hpp>
 #include <pagmo/problem.hpp>
 #include <stdexcept>
+#include <utility>
 
 namespace flappy::identify {
 namespace {
@@ -70,9 +71,10 @@ SearchResult search(Search method, const BatchCost& cost, const Point& start, co
   population.push_back(start, exchange.evaluate({start}));
   pagmo::algorithm algorithm = algorithm_of(method, seed);
   SearchResult result;
+  bool noted = false;
   const auto note = [&] {
     const auto best = population.best_idx();
-    if (result.generations == 0 || population.get_f()[best][0] < result.cost)
+    if (!std::exchange(noted, true) || population.get_f()[best][0] < result.cost)
       result.cost = population.get_f()[best][0], result.point = population.get_x()[best];
     result.evaluations = exchange.evaluations;
   };

@@ -72,6 +72,7 @@ std::string CheckpointWriter::commit() {
   list["processor"] = header_.processor;
   list["instruction_set"] = header_.instruction_set;
   list["commit"] = header_.commit;
+  list["wall_s"] = header_.wall_s;
   list["payload_sha256"] = payload_hash(sections_);
   list["sections"] = Json::array();
   for (const auto& s : sections_)
@@ -131,6 +132,7 @@ Checkpoint::Checkpoint(std::filesystem::path path) : path_(std::move(path)), fil
     list.at("processor").get_to(header_.processor);
     list.at("instruction_set").get_to(header_.instruction_set);
     list.at("commit").get_to(header_.commit);
+    header_.wall_s = list.value("wall_s", 0.0);
     list.at("payload_sha256").get_to(payload_sha256_);
     for (const Json& s : list.at("sections")) sections_.push_back({s.at("name"), s.at("sha256"), 0, s.at("size")});
   } catch (const Json::exception& e) {

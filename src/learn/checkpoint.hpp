@@ -24,13 +24,14 @@
 
 namespace flappy::learn {
 
-/// What a checkpoint is of. A resumed run compares it with itself.
+/// What a checkpoint is of. A resumed run wants its own configuration; the rest is for people.
 struct CheckpointHeader {
   std::uint64_t update = 0;
   std::string config_sha256;    ///< of the resolved configuration
   std::string processor;        ///< the type, as /proc/cpuinfo names it
   std::string instruction_set;  ///< of the kernels
   std::string commit;           ///< of the program
+  double wall_s = 0;            ///< of training until then
 };
 
 /// Bytes that are all value: a struct with padding would give other bytes in every run. A padding-free struct of

@@ -240,6 +240,9 @@ Evaluator::Evaluator(FlyConfig config, const EvaluationOptions& options)
   const auto refuse = [&](const std::string& what, const std::string& accepted) {
     throw io::InputError("task " + io::toml_string(task.name) + " " + what + "; accepted: " + accepted);
   };
+  if (c.welded) refuse("would be flown on a stand", "flight.support = \"task\"");
+  if (c.excitation.acts())
+    refuse("would be flown without its excitation, which flappy-fly alone adds", "a configuration without");
   if (!(k.by_s > 0)) refuse("does not say what a success is", "a task with [success.capture] and [success.keep]");
   const double needs_s = std::max(k.by_s, k.keep_until_s);
   if (c.duration_s < needs_s - 1e-9)

@@ -43,7 +43,7 @@ FinishedRun read_finished_run(const fs::path& folder) {
     run.info.commit = json.at("commit").get<std::string>();
     // both are written into C
     if (!std::ranges::all_of(run.info.config_sha256 + run.info.commit,
-                             [](char c) { return std::isalnum(c) || c == '-'; }))
+                             [](unsigned char c) { return std::isalnum(c) || c == '-'; }))
       refuse(start, "has letters in its hashes that no hash has", "the file as flappy-train left it");
   });
   constexpr std::string_view kDirty = "-dirty";

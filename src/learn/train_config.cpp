@@ -83,7 +83,8 @@ class Reader {
       if (scales && scales->has(part)) given = scales->numbers(part, signals.size(), io::positive(1e6));
       for (std::size_t i = 0; i < signals.size(); ++i) {
         l.actor_input.mean.push_back((signals[i].low + signals[i].high) / 2);
-        l.actor_input.scale.push_back(given.empty() ? 2 / (signals[i].high - signals[i].low) : given[i]);
+        const double range = signals[i].high - signals[i].low;  // 0 of an action that may not change
+        l.actor_input.scale.push_back(!given.empty() ? given[i] : range > 0 ? 2 / range : 1);
       }
     }
     l.shape = {static_cast<int>(l.actor_input.mean.size()), 0, flight::kActions};
@@ -96,6 +97,8 @@ class Reader {
     c_.steps_before = static_cast<std::size_t>(t.integer_or("steps_before", 20, 1, 1'000'000));
     c_.exploration = {t.number("noise_low", {0, 10}), t.number("noise_high", {0, 10}),
                       t.number("noise_kept", {0, 0.999})};
+    if (c_.exploration.high < c_.exploration.low)
+      t.fail("noise_high", "is below noise_low", "at least " + io::shortest_digits(c_.exploration.low));
     const io::Table r = root_.table("reward");
     c_.reward_scale = r.number("scale", io::positive(1e6));
     c_.discount = r.number("discount", {0, 1});
@@ -127,6 +130,8 @@ class Reader {
     const std::size_t most = c_.flappers * c_.return_steps;  // that a step may add
     if (c_.replay < most)
       t.fail("replay", "is less than one step adds", "at least " + std::to_string(most) + " transitions");
+    if (c_.replay < l.batch)
+      t.fail("replay", "is less than a batch", "at least " + std::to_string(l.batch) + " transitions");
     const io::Table e = root_.table("evaluate");
     c_.evaluate_every = whole_steps(e, "every");
     c_.evaluate_vehicles = static_cast<std::size_t>(e.integer("vehicles", 1, 1'000'000));

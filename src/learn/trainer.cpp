@@ -55,7 +55,6 @@ class Trainer {
     Metrics metrics(folder, kColumns, records_);
     metrics_ = &metrics;
     publish();
-    if (options_.from && records_ > 0) wall_before_s_ = read_metrics(folder / "timing.jsonl").column("wall_s").back();
     if (!options_.from) save();  // from now on it can be resumed, whenever it is killed
     if (!fs::exists(folder / "run.json")) write_start();
     start_ = last_ = mark();
@@ -233,8 +232,9 @@ class Trainer {
 
   void save() {
     records_ = metrics_->sync();
-    CheckpointWriter to(options_.folder / checkpoint_name(updates()),
-                        {updates(), config_.sha256, processor(), sim::best_instruction_set(), options_.commit});
+    CheckpointWriter to(
+        options_.folder / checkpoint_name(updates()),
+        {updates(), config_.sha256, processor(), sim::best_instruction_set(), options_.commit, wall_s()});
     to.put("numbers", learner_.numbers());
     to.put_bytes("counters", std::as_bytes(std::span(&learner_.counters(), 1)));
     to.put("replay_size", static_cast<std::uint64_t>(replay_.size()));
@@ -258,6 +258,7 @@ class Trainer {
     if (from.header().config_sha256 != config_.sha256)
       throw io::InputError(from.path().string() + ": is of another configuration than " +
                            (options_.folder / "config").string() + "; accepted: a checkpoint of this run");
+    wall_before_s_ = from.header().wall_s;
     from.get("numbers", learner_.numbers());
     from.get_bytes("counters", std::as_writable_bytes(std::span(&learner_.counters(), 1)));
     std::uint64_t size = 0, cursor = 0;
@@ -370,18 +371,18 @@ nlohmann::ordered_json json_of(const TrainSummary& s) {
           {"policy_sha256", s.policy_sha256}};
 }
 
-TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
+void refuse_run_in(const fs::path& folder) {
   std::error_code error;
+  if (!fs::exists(folder, error)) return;
+  const auto left = checkpoints_in(folder);
+  if (fs::exists(folder / "run.json", error) || (!left.empty() && left.front().filename() != checkpoint_name(0)))
+    throw io::InputError(folder.string() + ": holds a run; accepted: a new folder, or --resume " + folder.string());
+}
+
+TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
   io::make_folder(options.folder);
   const io::FolderLock lock(options.folder);
-  const auto has_run = [&] {
-    const auto left = checkpoints_in(options.folder);
-    return fs::exists(options.folder / "run.json", error) ||
-           (!left.empty() && left.front().filename() != checkpoint_name(0));
-  };
-  if (!options.from && has_run())
-    throw io::InputError(options.folder.string() + ": holds a run; accepted: a new folder, or --resume " +
-                         options.folder.string());
+  if (!options.from) refuse_run_in(options.folder);
   Trainer trainer(config, options);
   TrainSummary summary = trainer.run();
   summary.policy_sha256 = io::sha256(io::read_text(options.folder / "best.json"));

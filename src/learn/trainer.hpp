@@ -60,6 +60,8 @@ struct TrainCosts {
   std::size_t memory_bytes = 0, disk_bytes = 0;
 };
 
+/// io::InputError where a folder holds a run already.
+void refuse_run_in(const std::filesystem::path& folder);
 /// io::InputError where the run folder is taken, a checkpoint does not fit, the disk is full, or learning diverged.
 TrainSummary train(const TrainConfig& config, const TrainOptions& options);
 TrainCosts costs_of(const TrainConfig& config);

@@ -232,6 +232,8 @@ void Batch<T>::set_input(std::size_t i, const Input& input) {
 
 template <class T>
 void Batch<T>::step(int steps) {
+  if (steps < 0) throw std::invalid_argument("a number of steps below 0");
+  if (steps == 0) return;
   Storage& s = *storage_;
   const StepPlan plan = s.plan();
   const auto blocks = static_cast<std::ptrdiff_t>(s.blocks.size());

@@ -95,6 +95,10 @@ TEST(FlyConfig, RefusesInOneLine) {
       "shorter step, or a slower sensor");
   EXPECT_EQ(refusal({"flight.support=glued"}),
             "--set flight.support=glued: flight.support: \"glued\" is not known; accepted: \"task\", \"welded\"");
+  EXPECT_EQ(
+      message([] { read_fly_config(source_path("configs/fly/escape.toml"), {"flight.support=welded"}); }),
+      "--set flight.support=welded: flight.support: is \"welded\", but task \"escape\" starts from hover; accepted: "
+      "\"task\"");
   EXPECT_EQ(refusal({"world.walls=[[0, 0, 1, 1]]"}),
             "--set world.walls=[[0, 0, 1, 1]]: world.walls: normal of wall 0 has length 1.4142135623730951; accepted: "
             "[x_m, y_m, normal_x, normal_y], the normal of length 1");

@@ -182,6 +182,10 @@ TEST(Spline, RefusesWhatIsNoPath) {
   EXPECT_THROW(task(spline_task(head + "0.5,0,0,0,0\n1,0,0,0,0\n")), io::InputError);
   EXPECT_THROW(task(spline_task(head + "-1,0,0,0,0\n1,0,0,0,0\n")), io::InputError);
   EXPECT_THROW(task(spline_task(head + "0,0,0,0,0\n0.0005,0,0,0,0\n")), io::InputError);
+  EXPECT_THROW(task(spline_task(head + "0,0,0,0,0\n-2,0,0,0,0\n1,0,0,0,0\n")), io::InputError);
+  EXPECT_THROW(task(spline_task(head + "0,0,0,0,0\n1e6,0,0,0,0\n")), io::InputError);
+  EXPECT_THROW(task(spline_task(head + "0,0,0,0,0\n1,2e4,0,0,0\n")), io::InputError);
+  EXPECT_THROW(task(spline_task(head + "0,0,0,0,0\n1,0,0,0,200\n")), io::InputError);
   EXPECT_NO_THROW(task(spline_task(head + "0,0,0,0,0\n0.002,0,0,0,0\n")));
   EXPECT_THROW(task(along(waypoint(0.5, 0, 0, 0))), io::InputError);
   EXPECT_THROW(task(along(waypoint(0, 0, 0, 0) + waypoint(0.0005, 1, 0, 0))), io::InputError);

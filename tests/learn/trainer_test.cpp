@@ -232,12 +232,14 @@ TEST(TrainConfig, SaysWhatIsWrong) {
   refused({"networks.actor=[32, 500]"}, "networks.actor");
   refused({"networks.actor=[]"}, "networks.actor: is no list of hidden layers");
   refused({"learn.replay=1024", "collect.flappers=2000"}, "learn.replay: is less than one step adds");
+  refused({"learn.replay=2048", "learn.batch=4096"}, "learn.replay: is less than a batch");
+  refused({"collect.noise_low=0.4", "collect.noise_high=0"}, "collect.noise_high: is below noise_low");
   refused({"observation.time=[1, 2]"}, "observation.time");
   refused({"observation.colour=[1]"}, "observation.colour: unknown key");
   refused({"learn.speed=3"}, "learn.speed: unknown key");
   refused({"task.reward.gaol=3"}, "--set task.reward.gaol=3: reward.gaol: unknown key");
   refused({"precision=double"}, "flies in double");
-  refused({"flight.support=welded"}, "holds its vehicle on a stand");
+  refused({"flight.support=welded", "task.start.kind=flying"}, "holds its vehicle on a stand");
   try {
     read_train_config(test::source_path("configs/train/escape.toml"), {"task=../tasks/hover.toml"});
     ADD_FAILURE() << "no success to train for";
@@ -261,6 +263,8 @@ TEST(TrainConfig, ScalesObservationsByTheirRangeUnlessTold) {
     if (signals[k].name == "x_error") EXPECT_EQ(c.learner.actor_input.scale[k], 5);
     if (signals[k].name == "added_bias") EXPECT_EQ(c.learner.actor_input.scale[k], 1 / 3.5);
   }
+  for (const double scale : small_training({"task.action.split_cycle=[0, 0]"}).learner.actor_input.scale)
+    EXPECT_LT(scale, 100);  // of an action that may not change, too
 }
 
 }  // namespace

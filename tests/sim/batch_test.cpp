@@ -159,14 +159,24 @@ TEST(Freeze, KeepsTheLastPlausibleState) {
   EXPECT_EQ(b.state(0).position_m[0], 0.25);
 }
 
+TEST(Batch, StepsByNothingLeaveItAsItIs) {
+  Batch<float> b(40, test::nominal(), one_thread());
+  b.step(20);
+  const auto before = b.hash(0, 40);
+  b.step(0);
+  EXPECT_EQ(b.hash(0, 40), before);
+  EXPECT_THROW(b.step(-1), std::invalid_argument);
+}
+
 TEST(WingBeat, FollowsItsInputsAndLimits) {
-  // held by huge friction, the wings stay; the current voltage shows in nothing but itself, so compare two
-  // vehicles: an input beyond its limit is the limit
+  // an input beyond its limit is the limit
   Batch<double> b(2, test::nominal(), one_thread());
+  for (const std::size_t i : {0UL, 1UL}) b.reset(i, {}, Start::welded);
   b.set_input(0, {25, 9, -9, 0.4});
   b.set_input(1, {18, 3, -3.5, 0.15});
   b.step(3000);
-  EXPECT_EQ(b.state(0).position_m[2], b.state(1).position_m[2]);
+  EXPECT_EQ(b.status(0) | b.status(1), 0u);
+  EXPECT_NE(b.state(0).stroke_rad[1], 0);
   EXPECT_EQ(b.state(0).stroke_rad[1], b.state(1).stroke_rad[1]);
 }
 

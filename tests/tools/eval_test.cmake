@@ -136,6 +136,8 @@ expect_equal("exit code of an actor for another task" "${code}" 2)
 expect_match("stderr" "${err}" "actor: observes something else than task \"escape\"")
 expect_refused("task \"hover\" does not say what a success is; accepted: a task with [success.capture] and [success.keep]"
   ${WORK}/policy.h --config ${SOURCE}/configs/fly/hover.toml --set "task.observation=[\"goal_rotation\", \"position_error\", \"velocity\", \"body_rate\", \"beat_phase\"]")
+expect_refused("task \"escape\" would be flown without its excitation, which flappy-fly alone adds; accepted: a configuration without"
+  ${WORK}/best.json --task ${WORK}/task.toml --set constant_input.bias_V=1)
 expect_refused("flappy-eval: --episodes: Value 0 not in range 1 to 100000; see flappy-eval --help" ${WORK}/best.json --episodes 0)
 expect_refused("flappy-eval: --stream: training not in {test,validation}; see flappy-eval --help" ${WORK}/best.json --stream training)
 expect_refused("flappy-eval: policy is required; see flappy-eval --help")

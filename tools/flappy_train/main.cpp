@@ -150,10 +150,12 @@ int main(int argc, char** argv) {
     }
     std::vector<learn::SeedCurve> curves;
     train::Json all = train::Json::array();
+    const auto folder_of = [&](std::uint64_t seed) { return folder / ("seed_" + std::to_string(seed)); };
+    for (const std::uint64_t seed : train::seeds_of(seeds)) learn::refuse_run_in(folder_of(seed));
     for (const std::uint64_t seed : train::seeds_of(seeds)) {
       std::vector<std::string> list = with_threads(overrides);
       list.push_back("seed=" + std::to_string(seed));
-      options.folder = folder / ("seed_" + std::to_string(seed));
+      options.folder = folder_of(seed);
       options.started = curves.empty() ? train::started : std::chrono::steady_clock::now();
       const learn::TrainSummary s = train::train_one(learn::read_train_config(config_name, list), options);
       all.push_back(learn::json_of(s));

@@ -13,9 +13,8 @@ std::string controller_text(flappy::flight::Controller c, const std::string& ori
   std::string text = "# " + origin + "\nschema = 1\nkind = \"" +
                      std::string(c.kind == flappy::flight::Controller::Kind::pid ? "pid" : "arc") + "\"\n";
   for (const auto& f : flappy::flight::fields(c)) {
-    char number[32];
-    std::snprintf(number, sizeof number, "%.4g", *f.value);
-    text += f.path + " = " + number + (std::string(number).find_first_of(".en") == std::string::npos ? ".0\n" : "\n");
+    const std::string number = flappy::io::shortest_digits(*f.value);
+    text += f.path + " = " + number + (number.find_first_of(".en") == std::string::npos ? ".0\n" : "\n");
   }
   return text;
 }

@@ -62,7 +62,7 @@
 #ifndef ONBOARD_ACTING_US
 #define ONBOARD_ACTING_US 1000000U
 #endif
-/* So long at its place: the integrators have settled, as in the flights that the policy was trained from. */
+/* So long at its place: the integrators have settled. */
 #ifndef ONBOARD_HOVER_US
 #define ONBOARD_HOVER_US 1000000U
 #endif
