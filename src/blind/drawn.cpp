@@ -1,7 +1,5 @@
 #include "blind/drawn.hpp"
 
-#include <cmath>
-
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
 #include "io/sha256.hpp"
@@ -10,14 +8,11 @@ namespace flappy::blind {
 
 Case declared_case(const std::filesystem::path& vehicle_file) {
   Case c;
-  c.vehicle = model::read_vehicle(vehicle_file);
-  const io::Config config = io::Config::load(vehicle_file);
+  c.vehicle = model::read_vehicle_for_steps(vehicle_file, kStep_s);
   if (!c.vehicle.effects.empty())
-    config.root().fail("effects", "the blind robot has effects of its own", "a vehicle without");
-  const double steps = c.vehicle.driver.hold_s / kStep_s;
-  if (std::abs(steps - std::round(steps)) > 1e-6 || steps < 0.5)
-    config.root().table("driver").fail("hold_s", "the blind robot steps by " + io::shortest_digits(kStep_s) + " s",
-                                       "a multiple of that");
+    io::Config::load(vehicle_file)
+        .root()
+        .fail("effects", "the blind robot has effects of its own", "a vehicle without");
   c.declared_density_kg_m3 = c.vehicle.air_density_kg_m3;
   c.vehicle_file = vehicle_file.filename().string();
   c.vehicle_sha256 = io::sha256(io::read_text(vehicle_file));

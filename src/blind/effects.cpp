@@ -1,52 +1,23 @@
 #include "blind/effects.hpp"
 
 #include <algorithm>
+#include <sstream>
 
 #include "io/files.hpp"
 
 namespace flappy::blind {
 
 const std::array<std::string, kEffects>& effect_names() {
-  static const std::array<std::string, kEffects> kNames = {"ground_effect",
-                                                           "ceiling_effect",
-                                                           "wall_effect",
-                                                           "body_drag",
-                                                           "added_mass",
-                                                           "rotational_lift",
-                                                           "wake_capture",
-                                                           "clap_and_fling",
-                                                           "wing_flexibility",
-                                                           "wing_damage",
-                                                           "wind",
-                                                           "spring_hardening",
-                                                           "gear_backlash",
-                                                           "coulomb_friction",
-                                                           "winding_heating",
-                                                           "battery_sag",
-                                                           "driver_dead_zone",
-                                                           "driver_bandwidth",
-                                                           "command_delay",
-                                                           "stop_compliance",
-                                                           "com_offset",
-                                                           "inertia_products",
-                                                           "wing_inertia",
-                                                           "tether",
-                                                           "gyro_bias",
-                                                           "accelerometer_misalignment",
-                                                           "vibration_rectification",
-                                                           "mocap_tilt",
-                                                           "marker_offset",
-                                                           "mocap_delay",
-                                                           "outside_magnetic_torque",
-                                                           "outside_vortex_shedding",
-                                                           "outside_slosh",
-                                                           "outside_yaw_thrust_loss",
-                                                           "outside_wing_interference",
-                                                           "outside_brush_contact",
-                                                           "outside_amplitude_hysteresis",
-                                                           "outside_vortex_ring",
-                                                           "outside_humidity_front",
-                                                           "outside_mocap_lens"};
+#define FLAPPY_TEXT(...) #__VA_ARGS__
+#define FLAPPY_TEXT_OF(list) FLAPPY_TEXT(list)
+  static const std::array<std::string, kEffects> kNames = [] {
+    std::array<std::string, kEffects> names;
+    std::istringstream list(FLAPPY_TEXT_OF(FLAPPY_BLIND_EFFECTS));
+    for (std::string& name : names) std::getline(list >> std::ws, name, ',');
+    return names;
+  }();
+#undef FLAPPY_TEXT_OF
+#undef FLAPPY_TEXT
   return kNames;
 }
 

@@ -9,49 +9,16 @@
 
 namespace flappy::blind {
 
-enum class Effect : std::size_t {
-  ground_effect,
-  ceiling_effect,
-  wall_effect,
-  body_drag,
-  added_mass,
-  rotational_lift,
-  wake_capture,
-  clap_and_fling,
-  wing_flexibility,
-  wing_damage,
-  wind,
-  spring_hardening,
-  gear_backlash,
-  coulomb_friction,
-  winding_heating,
-  battery_sag,
-  driver_dead_zone,
-  driver_bandwidth,
-  command_delay,
-  stop_compliance,
-  com_offset,
-  inertia_products,
-  wing_inertia,
-  tether,
-  gyro_bias,
-  accelerometer_misalignment,
-  vibration_rectification,
-  mocap_tilt,
-  marker_offset,
-  mocap_delay,
-  outside_magnetic_torque,
-  outside_vortex_shedding,
-  outside_slosh,
-  outside_yaw_thrust_loss,
-  outside_wing_interference,
-  outside_brush_contact,
-  outside_amplitude_hysteresis,
-  outside_vortex_ring,
-  outside_humidity_front,
-  outside_mocap_lens,
-  count
-};
+/// Their identifiers; effect_names() has them as text.
+#define FLAPPY_BLIND_EFFECTS                                                                                           \
+  ground_effect, ceiling_effect, wall_effect, body_drag, added_mass, rotational_lift, wake_capture, clap_and_fling,    \
+      wing_flexibility, wing_damage, wind, spring_hardening, gear_backlash, coulomb_friction, winding_heating,         \
+      battery_sag, driver_dead_zone, driver_bandwidth, command_delay, stop_compliance, com_offset, inertia_products,   \
+      wing_inertia, tether, gyro_bias, accelerometer_misalignment, vibration_rectification, mocap_tilt, marker_offset, \
+      mocap_delay, outside_magnetic_torque, outside_vortex_shedding, outside_slosh, outside_yaw_thrust_loss,           \
+      outside_wing_interference, outside_brush_contact, outside_amplitude_hysteresis, outside_vortex_ring,             \
+      outside_humidity_front, outside_mocap_lens
+enum class Effect : std::size_t { FLAPPY_BLIND_EFFECTS, count };
 inline constexpr std::size_t kEffects = static_cast<std::size_t>(Effect::count);
 
 /// Identifiers in the order of Effect.

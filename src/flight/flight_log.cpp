@@ -193,8 +193,7 @@ class StreamReader {
       : table_(io::parse_csv(text, path.string())) {
     std::vector<std::string> known = required;
     known.insert(known.end(), optional.begin(), optional.end());
-    std::string list;
-    for (const auto& each : known) list += (list.empty() ? "" : ", ") + each;
+    const std::string list = io::joined(known);
     const std::string header = table_.name + ":1";
     for (const auto& name : table_.names) {
       if (std::ranges::find(known, name) != known.end()) continue;

@@ -169,6 +169,9 @@ FlightLog read_flight_log(const std::filesystem::path& folder);
 /// The same from texts; `folder` stands for the place in messages.
 FlightLog parse_flight_log(const LogFiles& files, const std::filesystem::path& folder);
 
+/// InputError where one of these folders is given twice, under whatever name.
+void check_each_once(const std::vector<std::string>& folders);
+
 /// The texts that parse_flight_log reads back exactly, quaternions to the last digit where their length is 1.
 LogFiles flight_log_files(const FlightLog& log);
 

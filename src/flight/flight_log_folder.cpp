@@ -70,6 +70,13 @@ struct TemporaryFolder {
 
 }  // namespace
 
+void check_each_once(const std::vector<std::string>& folders) {
+  for (std::size_t i = 0; i < folders.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (std::error_code none; fs::equivalent(folders[i], folders[k], none))
+        throw io::InputError(folders[i] + ": is given twice; accepted: each flight once");
+}
+
 FlightLog read_flight_log(const fs::path& folder) {
   std::error_code error;
   LogFiles files;

@@ -6,6 +6,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "io/sha256.hpp"
 #include "io/toml_writer.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::flight {
 namespace {
@@ -184,6 +185,17 @@ class Reader {
         root_.fail("flight.step_s",
                    "is longer than the " + io::shortest_digits(1 / rate) + " s between samples of a sensor",
                    "a shorter step, or a slower sensor");
+    const char* const delay = model::CommandDelay::kInfo.id;
+    if (const auto found = c_.vehicle.effects.find(delay); found != c_.vehicle.effects.end()) {
+      constexpr int kKept = model::CommandDelay::kSlots - 2;
+      const auto e = static_cast<std::size_t>(model::effect_index(delay));
+      const double late_s = model::effects()[e].values(found->second)[0];
+      if (late_s > kKept * step)
+        root_.fail("flight.step_s",
+                   "is too short for a command_delay of " + io::shortest_digits(late_s) + " s, of which " +
+                       std::to_string(kKept) + " steps are kept",
+                   "a longer step, or a shorter delay");
+    }
   }
 
   void keep_texts() {

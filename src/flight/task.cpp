@@ -316,10 +316,8 @@ Task read_task(const io::Table& table, double tick_s) {
   for (const PartInfo& info : part_infos()) names.emplace_back(info.name);
   for (const std::string& name : table.strings("observation")) {
     const auto found = std::ranges::find(names, name);
-    std::string known;
-    for (const std::string& n : names) known += (known.empty() ? "" : ", ") + n;
     if (found == names.end())
-      table.fail("observation", "no part \"" + name + "\"", known + io::did_you_mean(name, names));
+      table.fail("observation", "no part \"" + name + "\"", io::joined(names) + io::did_you_mean(name, names));
     const auto bit = std::uint32_t{1} << (found - names.begin());
     if (task.parts & bit) table.fail("observation", name + " is given twice", "each part once");
     task.parts |= bit;

@@ -161,8 +161,7 @@ void check_inputs(const MeasuredMap& measured, std::size_t parameters) {
 void check_simulated(const MeasuredMap& measured, const std::vector<Wrench>& simulated) {
   for (std::size_t i = 0; i < simulated.size(); ++i)
     if (!std::ranges::all_of(simulated[i], [](double x) { return std::isfinite(x); }))
-      throw io::InputError(measured.name + ":" + std::to_string(measured.line(i)) + ": the vehicle comes apart at (" +
-                           text_of(measured.inputs[i]) + "); accepted: a vehicle that flaps at every input");
+      refuse_apart(measured.name + ":" + std::to_string(measured.line(i)), measured.inputs[i]);
 }
 
 }  // namespace

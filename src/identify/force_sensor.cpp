@@ -20,7 +20,7 @@ std::vector<sim::Input> default_inputs() {
 
 MeasuredMap simulate_forces(const model::Vehicle& vehicle, const std::vector<sim::Input>& inputs,
                             const ForceSensor& sensor, std::uint64_t seed, const MapOptions& options) {
-  if (!(sensor.noise_steps > 0)) return {"", inputs, force_map<double>(std::span(&vehicle, 1), inputs, options), {}};
+  if (!(sensor.noise_steps > 0)) return {"", inputs, whole_map(vehicle, inputs, options), {}};
   const int each = static_cast<int>(std::lround(1 / (sensor.rate_hz * kStep_s)));
   const int samples = whole_beats(vehicle.driver).steps / each;
   MapOptions alone = options;  // threads that meet after every sample would wait more than work
@@ -46,6 +46,8 @@ MeasuredMap simulate_forces(const model::Vehicle& vehicle, const std::vector<sim
       }
     }
   }
+  for (std::size_t i = 0; i < inputs.size(); ++i)
+    if (batch.status(i) & sim::kFrozen) refuse_apart(vehicle.name, inputs[i]);
   // rounding to steps adds the variance of a uniform error, 1/12
   const double sd = std::sqrt((sensor.noise_steps * sensor.noise_steps + 1.0 / 12) / samples);
   for (Wrench& each_sd : map.sd)

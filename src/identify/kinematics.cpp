@@ -77,6 +77,7 @@ Beat simulated_beat(const model::Vehicle& vehicle, const sim::Input& input, cons
     const std::array<double, 4> now = {s.stroke_rad[0], s.rotation_rad[0], s.stroke_rad[1], s.rotation_rad[1]};
     for (std::size_t a = 0; a < 4; ++a) angles[a].push_back(now[a]);
   }
+  if (batch.status(0) & sim::kFrozen) refuse_apart(vehicle.name, input);
   return *beat_of(phases, angles);
 }
 

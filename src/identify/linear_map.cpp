@@ -19,7 +19,7 @@ LinearMap read_published_map(const std::filesystem::path& path) {
 
 LinearMap linear_map(const model::Vehicle& vehicle, const MapOptions& options) {
   const std::vector<sim::Input> inputs = default_inputs();
-  const std::vector<Wrench> wrenches = force_map<double>(std::span(&vehicle, 1), inputs, options);
+  const std::vector<Wrench> wrenches = whole_map(vehicle, inputs, options);
   LinearMap map;
   for (std::size_t line = 0; line < map.size(); ++line) {
     double n = 0, x = 0, y = 0, xx = 0, xy = 0;

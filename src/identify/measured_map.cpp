@@ -1,6 +1,7 @@
 #include "identify/measured_map.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <set>
 
@@ -8,12 +9,6 @@ namespace flappy::identify {
 namespace {
 
 using Names = std::vector<std::string>;
-
-std::string joined(const Names& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
 
 std::string unit_of(const std::string& name) { return name.substr(name.rfind('_') + 1); }
 
@@ -79,13 +74,13 @@ void check_columns(const io::CsvTable& table, const Names& required, const Names
     const std::string meant = but_for_its_unit(name, known);
     throw io::InputError(
         table.name + ":1: " + name + ": " +
-        (meant.empty() ? "unknown column; accepted: " + joined(known) + io::did_you_mean(name, known)
+        (meant.empty() ? "unknown column; accepted: " + io::joined(known) + io::did_you_mean(name, known)
                        : "wrong unit " + unit_of(name) + ", expected " + unit_of(meant) + "; accepted: " + meant));
   }
   for (const std::string& name : required)
     if (std::ranges::count(table.names, name) == 0)
-      throw io::InputError(table.name + ":1: " + name + ": column is missing; accepted: " + joined(required) +
-                           (optional.empty() ? "" : ", optional " + joined(optional)));
+      throw io::InputError(table.name + ":1: " + name + ": column is missing; accepted: " + io::joined(required) +
+                           (optional.empty() ? "" : ", optional " + io::joined(optional)));
 }
 
 void check_limits(const sim::Input& input, const model::Driver& driver, const std::string& where) {
@@ -151,6 +146,19 @@ std::string text_of(const sim::Input& input) {
   std::snprintf(text, sizeof text, "%g V, %g V, %g V, %g", input.amplitude_V, input.difference_V, input.bias_V,
                 input.split_cycle);
   return text;
+}
+
+void refuse_apart(const std::string& where, const sim::Input& input) {
+  throw io::InputError(where + ": the vehicle comes apart at (" + text_of(input) +
+                       "); accepted: a vehicle that flaps at every input");
+}
+
+std::vector<Wrench> whole_map(const model::Vehicle& vehicle, const std::vector<sim::Input>& inputs,
+                              const MapOptions& options) {
+  std::vector<Wrench> map = force_map<double>(std::span(&vehicle, 1), inputs, options);
+  for (std::size_t i = 0; i < map.size(); ++i)
+    if (std::isnan(map[i][0])) refuse_apart(vehicle.name, inputs[i]);
+  return map;
 }
 
 std::size_t distinct_inputs(const std::vector<sim::Input>& inputs) {

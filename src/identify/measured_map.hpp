@@ -29,6 +29,11 @@ struct MeasuredMap {
 std::array<double, 4> numbers_of(const sim::Input& input);
 /// "10 V, 0 V, 0 V, 0.03"
 std::string text_of(const sim::Input& input);
+/// Of a vehicle whose wings leave the plausible at an input: InputError "where: the vehicle comes apart at (...); ...".
+[[noreturn]] void refuse_apart(const std::string& where, const sim::Input& input);
+/// The map of one vehicle; refuse_apart() with its name where a wrench is NaN.
+std::vector<Wrench> whole_map(const model::Vehicle& vehicle, const std::vector<sim::Input>& inputs,
+                              const MapOptions& options);
 /// The columns of an input.
 inline const std::array<std::string, 4> kInputNames = {"amplitude_V", "difference_V", "bias_V", "split_cycle"};
 /// InputError "file:1: column: what is wrong; what is accepted" for a column that is missing, unknown or in another unit.

@@ -105,10 +105,7 @@ std::string kind(const toml::node& node) {
   const std::vector<std::string> names(section.asked.begin(), section.asked.end());
   const std::string same = in_another_unit(key.str(), names);
   if (!same.empty()) refuse(where, path, "unknown key; accepted here with another unit: " + toml_string(same), "");
-  std::string accepted;
-  for (const auto& name : names) accepted += (accepted.empty() ? "" : ", ") + name;
-  if (accepted.empty()) accepted = "no key here";
-  refuse(where, path, "unknown key", accepted + did_you_mean(key.str(), names));
+  refuse(where, path, "unknown key", (names.empty() ? "no key here" : joined(names)) + did_you_mean(key.str(), names));
 }
 
 [[noreturn]] void refuse_missing(const Entry& entry, std::string_view accepted) {

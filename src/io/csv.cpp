@@ -107,9 +107,7 @@ const std::vector<double>& CsvTable::column(std::string_view column_name) const 
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i] == column_name) return columns[i];
   }
-  std::string accepted;
-  for (const auto& each : names) accepted += (accepted.empty() ? "" : ", ") + each;
-  throw InputError(name + ": " + std::string(column_name) + ": column is missing; columns here: " + accepted +
+  throw InputError(name + ": " + std::string(column_name) + ": column is missing; columns here: " + joined(names) +
                    did_you_mean(column_name, names));
 }
 

@@ -124,6 +124,12 @@ std::string did_you_mean(std::string_view wrong, const std::vector<std::string>&
   return name.empty() ? "" : "; did you mean \"" + name + "\"?";
 }
 
+std::string joined(const std::vector<std::string>& words, std::string_view between) {
+  std::string text;
+  for (const std::string& word : words) text.append(text.empty() ? "" : between).append(word);
+  return text;
+}
+
 std::string shortest_digits(double value) {
   std::array<char, 32> digits;
   return {digits.data(), std::to_chars(digits.begin(), digits.end(), value).ptr};
@@ -183,6 +189,13 @@ void sync_folder(const std::filesystem::path& folder) {
   if (descriptor < 0) refuse_file(folder, "cannot be read", errno);
   fsync(descriptor);  // some file systems refuse this of a folder: then they have done what they can
   close(descriptor);
+}
+
+void check_output(const std::filesystem::path& path, const std::vector<std::filesystem::path>& inputs) {
+  for (const std::filesystem::path& input : inputs)
+    if (std::error_code none; std::filesystem::equivalent(path, input, none))
+      throw InputError(path.string() + ": is read by the same command; accepted: another file");
+  const AtomicFile opened(path);
 }
 
 void write_atomically(const std::filesystem::path& path, std::string_view text) {

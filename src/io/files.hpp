@@ -27,6 +27,9 @@ std::string in_another_unit(std::string_view wrong, const std::vector<std::strin
 /// `; did you mean "x"?` with the nearest name, or nothing.
 std::string did_you_mean(std::string_view wrong, const std::vector<std::string>& names);
 
+/// "a, b, c".
+std::string joined(const std::vector<std::string>& words, std::string_view between = ", ");
+
 /// A number in the shortest digits that read back to the same double.
 std::string shortest_digits(double value);
 
@@ -61,6 +64,10 @@ void make_folder(const std::filesystem::path& folder);
 
 /// Brings the names of a folder's files onto the disk.
 void sync_folder(const std::filesystem::path& folder);
+
+/// Refuses before the work what could not be written after it: InputError where `path` cannot be written, or is one of
+/// `inputs` under whatever name.
+void check_output(const std::filesystem::path& path, const std::vector<std::filesystem::path>& inputs = {});
 
 /// Writes a whole file through AtomicFile.
 void write_atomically(const std::filesystem::path& path, std::string_view text);

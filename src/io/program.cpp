@@ -40,7 +40,7 @@ int Program::run(int argc, char** argv, const std::function<void()>& job) {
   try {
     app_.parse(argc, argv);
     spin_briefly(argv);
-    if (!json_path_.empty()) AtomicFile refused_before_the_work(json_path_);
+    if (!json_path_.empty()) check_output(json_path_);
     job();
     return 0;
   } catch (const CLI::ParseError& e) {

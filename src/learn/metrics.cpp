@@ -124,9 +124,7 @@ std::uint64_t Metrics::sync() {
 const std::vector<double>& MetricsTable::column(const std::string& name) const {
   for (std::size_t i = 0; i < names.size(); ++i)
     if (names[i] == name) return columns[i];
-  std::string here;
-  for (const auto& each : names) here += (here.empty() ? "" : ", ") + each;
-  throw io::InputError(file + ": " + name + ": column is missing; columns here: " + here +
+  throw io::InputError(file + ": " + name + ": column is missing; columns here: " + io::joined(names) +
                        io::did_you_mean(name, names));
 }
 

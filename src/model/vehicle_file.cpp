@@ -1,5 +1,7 @@
 #include "flappy/vehicle_file.hpp"
 
+#include <cmath>
+
 #include "io/config.hpp"
 #include "io/toml_writer.hpp"
 #include "model/effects/registry.hpp"
@@ -10,13 +12,9 @@ namespace {
 
 /// Every effect there is, for one that there is not.
 std::string known_effects(const std::string& wrong) {
-  std::string list;
   std::vector<std::string> names;
-  for (const EffectEntry& e : effects()) {
-    names.push_back(e.info.id);
-    list += (list.empty() ? "" : ", ") + names.back();
-  }
-  return list + io::did_you_mean(wrong, names);
+  for (const EffectEntry& e : effects()) names.push_back(e.info.id);
+  return io::joined(names) + io::did_you_mean(wrong, names);
 }
 
 void read_effects(const io::Table& table, Vehicle& vehicle) {
@@ -42,6 +40,15 @@ Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::s
   root.finish();
   if (const std::optional<PhysicalFault> fault = physical_fault(vehicle))
     root.fail(fault->path, fault->what, fault->accepted);
+  return vehicle;
+}
+
+Vehicle read_vehicle_for_steps(const std::filesystem::path& path, double step_s) {
+  const Vehicle vehicle = read_vehicle(path);
+  const double steps = vehicle.driver.hold_s / step_s;
+  if (std::abs(steps - std::round(steps)) > 1e-6 || steps < 0.5)
+    io::Config::load(path).root().table("driver").fail(
+        "hold_s", "physics goes by steps of " + io::shortest_digits(step_s) + " s here", "a multiple of that");
   return vehicle;
 }
 

@@ -89,6 +89,9 @@ TEST(FlyConfig, RefusesInOneLine) {
   EXPECT_EQ(
       refusal({"flight.step_s=4e-4"}),
       "--set flight.step_s=4e-4: flight.step_s: does not divide the driver's hold of 0.001 s; accepted: hold_s / n");
+  EXPECT_EQ(refusal({"flight.step_s=5e-5", "vehicle.effects.command_delay.delay_s=0.02"}),
+            "--set flight.step_s=5e-5: flight.step_s: is too short for a command_delay of 0.02 s, of which 254 steps "
+            "are kept; accepted: a longer step, or a shorter delay");
   EXPECT_EQ(
       refusal({"flight.step_s=5e-4", "sensors.imu.rate_hz=4000"}),
       "--set flight.step_s=5e-4: flight.step_s: is longer than the 0.00025 s between samples of a sensor; accepted: a "

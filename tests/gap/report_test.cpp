@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -13,6 +14,7 @@
 #include "flight/fly.hpp"
 #include "flight/fly_fixture.hpp"
 #include "io/config.hpp"
+#include "io/progress.hpp"
 #include "model/effects/registry.hpp"
 #include "refusal.hpp"
 #include "vehicles.hpp"
@@ -146,6 +148,11 @@ TEST(Verdict, WidensSizesAndShapes) {
   EXPECT_NEAR(fit.covariance()(shape, shape), 1.96 * 0.04, 1e-12);
   EXPECT_NEAR(fit.covariance()(size, shape), 1.96 * 0.01, 1e-12);
   EXPECT_NEAR(fit.covariance()(0, 0), 0.04, 1e-12) << "parameters stay";
+  Answer a = answer(1, {"ground_effect"});
+  a.fit = fit;
+  const Size gain = sizes_of(a, uncertain)[0];  // 90 % of the prior up to 0.45
+  EXPECT_NEAR(gain.value, 2 * 0.45 / 1.645, 1e-12);
+  EXPECT_NEAR(gain.high - gain.low, 2 * 0.45 * std::sqrt(0.1184), 1e-12);
 }
 
 // ---- what is written
@@ -188,6 +195,10 @@ TEST(Report, SaysWhatToDoInThirtyLines) {
     r.places.push_back({"refit", i % 2 == 0 ? "regime" : "phase", i % kChannels, "somewhere", 2, 1, 1e-3, true});
     r.moved.push_back({"torso.mass_kg", 1.5});
   }
+  r.places.push_back({"refit", "frequency", 0, "0 to 0.5 Hz", 2, 1, 1e-3, true});
+  r.closed_loop = {{"flight", "mean_bias_V", 1, 0, 0.9}};
+  r.next = NextExperiment{"dash", {"wind", "tether"}, 3};
+  r.closure = Closure{0.9, 0.8, 0.95};
   const auto all = [&] {
     std::string text;
     const std::vector<std::string> lines = summary_of(r, "/out");
@@ -205,6 +216,18 @@ TEST(Report, SaysWhatToDoInThirtyLines) {
   r.conclusion = {Conclusion::Kind::effect, {"wind"}, 0.3, 0};
   EXPECT_NE(all().find("(probability 0.30, no more than a guess)"), std::string::npos);
   EXPECT_NE(all().find("--set vehicle=/out/vehicle_corrected.toml"), std::string::npos);
+  EXPECT_NE(all().find("wind and tether differ most in configs/gap/experiments/dash.toml"), std::string::npos);
+  EXPECT_NE(all().find("mean_bias_V recorded 1, by the vehicle's file 0, by the corrected one 0.9"), std::string::npos);
+  for (const auto& [kind, begin] : {std::pair{Conclusion::Kind::none, "No gap beyond noise"},
+                                    {Conclusion::Kind::parameters, "Nothing is missing"},
+                                    {Conclusion::Kind::unknown, "Something is missing in the model that no entry"}}) {
+    r.conclusion = {kind, {}, 0.9, 0};
+    EXPECT_TRUE(all().starts_with(begin)) << all();
+  }
+  r.complete = false;
+  EXPECT_TRUE(all().starts_with("Stopped before every effect was weighed")) << all();
+  EXPECT_EQ(all().find("vehicle_corrected.toml"), std::string::npos);
+  r.complete = true;
   r.conclusion.kind = Conclusion::Kind::data;
   r.faults = std::vector<DataFault>(40, {"imu.csv", 7, "degrees"});
   EXPECT_NE(all().find("imu.csv:7: degrees"), std::string::npos);
@@ -288,6 +311,11 @@ TEST(RunDiagnose, ReadsNoTruth) {
     return bytes;
   };
   const std::string with_truth = result();
+  // the identified one flew: believed 0, flew 0.04 rad, and by so little off is the middle of the stroke seen
+  const model::Vehicle fixed = model::read_vehicle(folder / "out/vehicle_corrected.toml"), flew = test::identified();
+  EXPECT_NEAR(fixed.left.spring.rest_angle_rad, flew.left.spring.rest_angle_rad, 0.02);
+  EXPECT_NEAR(fixed.right.spring.rest_angle_rad, flew.right.spring.rest_angle_rad, 0.02);
+  EXPECT_TRUE(fixed.posterior);
   expect_schema(nlohmann::ordered_json::parse(contents(folder / "out/diagnosis.json")));
   std::filesystem::remove(truth);
   EXPECT_EQ(result(), with_truth) << "without truth";
@@ -306,9 +334,15 @@ TEST(RunDiagnose, ReadsNoTruth) {
   testing::internal::CaptureStderr();
   EXPECT_EQ(result(), with_truth) << "beside a lie";
   setenv("PATH", path.c_str(), 1);
-  EXPECT_EQ(testing::internal::GetCapturedStderr(),
-            "warning: " + (folder / "out/residuals.svg").string() + ": is not written: gnuplot is not installed\n");
+  const std::string warning =
+      "warning: " + (folder / "out/residuals.svg").string() + ": is not written: gnuplot is not installed\n";
+  EXPECT_NE(testing::internal::GetCapturedStderr().find(warning), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder / "out/residuals.svg"));
+  // after Ctrl-C, which nothing takes back, so last
+  io::stop_on_interrupt();
+  std::raise(SIGINT);
+  EXPECT_EQ(run_diagnose(command)["complete"], false);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/vehicle_corrected.toml")) << "of a diagnosis that was stopped";
 }
 
 // Where `run_diagnose` complains before it reads a flight; of the vehicle with the place in its file.
@@ -319,8 +353,7 @@ TEST(RunDiagnose, RefusesWhatItCannotAnswer) {
   command.priors = kConfigs + "gap/priors.toml";
   command.flights = {(folder / "").string(), (folder / ".").string()};
   const auto refusal = [&] { return test::refusal([&] { run_diagnose(command); }); };
-  EXPECT_EQ(refusal(),
-            "command line: --flights: " + command.flights[1] + " is given twice; accepted: each flight once");
+  EXPECT_EQ(refusal(), command.flights[1] + ": is given twice; accepted: each flight once");
   command.flights.pop_back();
   const std::string nominal = contents(command.vehicle);
   command.vehicle = (folder / "v.toml").string();
@@ -333,7 +366,7 @@ TEST(RunDiagnose, RefusesWhatItCannotAnswer) {
   std::string fast = nominal;
   with(fast.replace(fast.find("hold_s = 1e-3"), 13, "hold_s = 5e-5"));
   EXPECT_TRUE(
-      refusal().ends_with(": driver.hold_s: flights are replayed by steps of 1e-04 s; accepted: a multiple of that"))
+      refusal().ends_with(": driver.hold_s: physics goes by steps of 1e-04 s here; accepted: a multiple of that"))
       << refusal();
 }
 

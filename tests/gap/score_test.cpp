@@ -194,6 +194,21 @@ TEST(Score, IntervalsCountWhereTheVerdictNamesTheTruth) {
   EXPECT_FALSE(main_score({c}, "interval_coverage").value);
 }
 
+TEST(Score, BarsHaveTheirSides) {
+  ScoredCase c = judged("singles", {"wind"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9)});
+  EXPECT_TRUE(*line_of(score({c}).main, "group_top1").meets_must);
+  EXPECT_TRUE(*line_of(score({judged("none", {}, "none", {}, 0.9)}).main, "false_alarm").meets_must);
+  // of ten intervals nine hold the truth, then all: 0.80 to 0.97 is asked
+  for (int i = 0; i < 10; ++i) {
+    const std::string name = "wind." + std::to_string(i);
+    c.prediction.sets[0].values[name] = {0.3, 0.2, 0.4};
+    c.truth.true_values[name] = i == 0 ? 0.5 : 0.35;
+  }
+  EXPECT_TRUE(*line_of(score({c}).main, "interval_coverage").meets_must);
+  c.truth.true_values["wind.0"] = 0.35;
+  EXPECT_FALSE(*line_of(score({c}).main, "interval_coverage").meets_must);
+}
+
 TEST(Score, PairsAreScoredByTheirNames) {
   const std::vector<ScoredCase> cases = {
       judged("pairs", {"wind", "com_offset"}, "effect", {"com_offset", "wind"}, 0.9),

@@ -68,7 +68,7 @@ TEST(Significance, BlocksKeepTheirFalseAlarmsOnNoiseThatRemembers) {
       naive += std::abs(sum) / std::sqrt(static_cast<double>(y.size())) > 1.96;
     }
     // binomial: 5 % +- 0.7 %. What two blocks apart still share, and variances of some sixty blocks that are spread unevenly,
-    // may add as much again; counting beats as independent raises a third and more of false alarms at 0.5
+    // may add as much again; counting beats as independent raises a quarter of false alarms at 0.5
     EXPECT_LT(mean, 0.085 * kTrials) << past;
     EXPECT_GT(mean, 0.015 * kTrials) << past;
     EXPECT_LT(slope, 0.085 * kTrials) << past;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "identify/force_sensor.hpp"
+#include "identify/linear_map.hpp"
 #include "refusal.hpp"
 #include "vehicles.hpp"
 
@@ -289,6 +290,10 @@ TEST(ForceFit, RefusesWhatCannotBeFitted) {
   apart.left.spring.stiffness_positive_Nm_rad = apart.left.spring.stiffness_negative_Nm_rad = 1e5;
   EXPECT_EQ(test::refusal([&] { fit_forces(apart, m, c); }),
             "m.csv:2: the vehicle comes apart at (10 V, 0 V, 0 V, 0); accepted: a vehicle that flaps at every input");
+  const std::string said = apart.name + ": the vehicle comes apart at (";
+  for (const double noise : {0.0, 1.0})
+    EXPECT_TRUE(test::refusal([&] { simulate_forces(apart, m.inputs, {.noise_steps = noise}, 1); }).starts_with(said));
+  EXPECT_TRUE(test::refusal([&] { linear_map(apart, {}); }).starts_with(said));
   MeasuredMap zero = m;
   for (Wrench& w : zero.wrenches) w[3] = w[4] = w[5] = 0;
   EXPECT_EQ(test::refusal([&] { fit_forces(test::nominal(), zero, c); }),

@@ -71,6 +71,11 @@ TEST(Kinematics, Refuses) {
     }
   EXPECT_EQ(refused(gap),
             "wings: leaves parts of the beat without samples; accepted: at least 12 samples all over the beat");
+  model::Vehicle apart = test::identified();
+  apart.left.spring.stiffness_positive_Nm_rad = apart.left.spring.stiffness_negative_Nm_rad = 1e5;
+  EXPECT_TRUE(test::refusal([&] {
+                compare_wings(apart, kInput, half);
+              }).starts_with(apart.name + ": the vehicle comes apart at ("));
 }
 
 }  // namespace

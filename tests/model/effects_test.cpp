@@ -280,7 +280,7 @@ TEST(WindingHeating, WarmsExponentiallyAndTakesTorqueAndDamping) {
 }
 
 TEST(WindingHeating, IsNotLostInSinglePrecision) {
-  // 1e5 steps that each add 2e-7 of what there is: a plain sum in float would stand still
+  // 1e5 steps that each add 2e-8 of what there is: a plain sum in float would stand still
   float memory[2] = {};
   using F = Lanes<float, 1>;
   const StateRows<F> state{memory, 1, F(0) < F(1)};
@@ -661,6 +661,11 @@ TEST(AddedMass, ResistsAccelerationNormalToTheWing) {
   const auto w = rate(1.01, 1);
   EXPECT_NEAR(normal(w), turned, 1e-11 * turned);
   EXPECT_NEAR(value(w.moment_Nm.z), -strip * std::pow(f.wing_length_m, 3) * f.z_cp2 * 1e4, 1e-11 * turned);
+  // 1e4 rad/s^2 in pitch about the leading edge: rho pi/4 c^2 at c/2, and rho pi/128 c^4 about mid-chord
+  b.x.left.rotation_rate_rad_s = One(1);
+  const double pitch = 2 * b.vehicle.air_density_kg_m3 * std::numbers::pi * (1 / 16. + 1 / 128.) *
+                       std::pow(f.mean_chord_m, 4) * f.wing_length_m * f.z_rd * 1e4;
+  EXPECT_NEAR(value(rate(1.01, 1).moment_Nm.y), -pitch, 1e-11 * pitch);
 }
 
 TEST(AddedMass, GivesTheHingesTheirOwnPartOnceOnly) {

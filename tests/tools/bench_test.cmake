@@ -113,7 +113,9 @@ expect_edit_refused("seed = 1" "seed = 1\nthread = 1"
 expect_edit_refused("duration_s = 0.05" "duration_s = \"long\""
   ":6:14: duration_s: is a string; accepted: a number above 0, at most 1000")
 expect_edit_refused("count = 70" "count = -70" ":4:9: count: -70 is out of range; accepted: an integer from 1 to 1000000")
-expect_edit_refused("amplitude_V = 9.8" "amplitude_V = nan" ":10:15: input.amplitude_V: nan is not finite; accepted: a number")
+expect_edit_refused("amplitude_V = 9.8" "amplitude_V = nan" ":10:15: input.amplitude_V: nan is not finite; accepted: a number from 0 to 18")
+expect_edit_refused("amplitude_V = 9.8" "amplitude_V = 98.0"
+  ":10:15: input.amplitude_V: 98 is out of range; accepted: a number from 0 to 18")
 expect_edit_refused("seed = 1" "seed = 1\nseed = 1"
   ":6:8: not valid TOML: Error while parsing key-value pair: cannot redefine existing integer 'seed'")
 expect_edit_refused("amplitude_V = 9.8\n" "amplitude_V = 9.8\nlaw"

@@ -1,5 +1,6 @@
 // The blind benchmark from making to scoring, with a predictor that costs nothing.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <filesystem>
@@ -36,7 +37,7 @@ std::string detectability() {
 /// A folder of its own, with the table of detectability in it.
 class Benchmark : public testing::Test {
  protected:
-  Benchmark() : root_(fs::path(testing::TempDir()) / ("blind_" + name())) {
+  Benchmark() : root_(fs::path(testing::TempDir()) / ("blind_" + name() + "_" + std::to_string(getpid()))) {
     fs::remove_all(root_);
     fs::create_directories(root_);
     io::write_atomically(root_ / "detectable.toml", detectability());
@@ -141,8 +142,20 @@ TEST_F(Benchmark, PredictsSealsAndScores) {
   EXPECT_EQ(refused(), lie.string() + ": is new; accepted: what was sealed");
   fs::remove(lie);
   EXPECT_EQ(refused(), "accepted");
-  EXPECT_EQ(test::refusal([&] { make(2); }),
-            bench.string() + ": has a manifest already; accepted: a name for a new folder");
+  const std::string manifest = io::read_text(bench / "manifest.json");
+  EXPECT_TRUE(make(2)) << "nothing is left to do";
+  EXPECT_EQ(io::read_text(bench / "manifest.json"), manifest);
+  EXPECT_EQ(test::refusal([&] { make(1); }),
+            bench.string() + ": begun with another plan; accepted: the same options, or a name for a new folder");
+}
+
+TEST_F(Benchmark, OpensLabelsOnceAllPredictionsAreSealed) {
+  ASSERT_TRUE(make(2));
+  const fs::path labels = root_ / "bench/sealed/labels.json";
+  fs::remove(labels);
+  EXPECT_TRUE(test::refusal([&] { blind_score(command()); }).starts_with(labels.string()));
+  EXPECT_EQ(asked_, 2);
+  EXPECT_TRUE(fs::exists(root_ / "bench/predictions.sha256"));
 }
 
 TEST_F(Benchmark, GoesOnWhereItWasStopped) {
@@ -200,13 +213,15 @@ TEST_F(Benchmark, PlansEveryPart) {
     EXPECT_GE(c.seed, 10001U);
     EXPECT_LT(c.seed, 700001U);
     for (const blind::BlindEffect& e : c.effects) {
-      if (c.part == "singles") EXPECT_DOUBLE_EQ(e.size, 0.4) << e.id;
+      if (c.part.starts_with("singles") || c.part == "pairs") EXPECT_DOUBLE_EQ(e.size, 0.4) << e.id;
+      if (c.part == "typical") EXPECT_DOUBLE_EQ(e.size, 1) << e.id;
       if (c.part != "hover" && c.part != "typical") EXPECT_NE(e.id, "tether") << "undetectable, in " << c.part;
     }
     if (c.part == "pairs") {
       ASSERT_EQ(c.effects.size(), 2U);
-      EXPECT_NE(c.effects[0].id, c.effects[1].id);
+      EXPECT_NE(model::group_of(c.effects[0].id), model::group_of(c.effects[1].id));
     }
+    EXPECT_EQ(c.effects.empty(), c.part == "none" || c.part == "parameters");
     const std::vector<std::string> rivals(c.effects.size() == 1 && c.effects[0].id == "wind" ? 1 : 0, "tether");
     if (c.part == "singles") EXPECT_EQ(c.inseparable, rivals);
     // nothing that gains too little at typical size is told from anything

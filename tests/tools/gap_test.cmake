@@ -50,14 +50,14 @@ expect_line("  clock              not tested: too little rotation")
 expect_line("  accelerometer      ok: mean specific force (0.00, 0.00, 9.81) m/s^2 in W")
 expect_line("  flapping frequency ok: voltages beat at 10 Hz left, 10 Hz right, 10 Hz declared")
 expect_line("  forbids a diagnosis: ${WORK}/good/command.csv:152: the flight lasts 3 s, at least 6 s (60 beats) are needed")
-expect_line("1 readable, warnings 0, not tested 4")
+expect_line("1 readable, faults 1, warnings 0, not tested 4")
 
 run(check ${WORK}/good ${WORK}/bad --json ${WORK}/out.json)
 expect_equal("exit code" "${code}" 0)
 expect_line("  accelerometer      warning: mean specific force (0.00, 0.00, 0.00) m/s^2 in W, (0, 0, 9.81) +- 3.0 expected: gravity is missing: acceleration instead of specific force")
-expect_line("2 readable, warnings 1, not tested 8")
+expect_line("2 readable, faults 3, warnings 1, not tested 8")
 file(READ ${WORK}/out.json json)
-foreach(pair IN ITEMS "warnings=1" "not_tested=8" "flights 0 warnings=0" "flights 1 warnings=1" "flights 1 folder=${WORK}/bad"
+foreach(pair IN ITEMS "faults=3" "warnings=1" "not_tested=8" "flights 0 warnings=0" "flights 1 warnings=1" "flights 1 folder=${WORK}/bad"
     "flights 0 vehicle=bird.toml" "flights 0 streams 1 name=mocap" "flights 0 streams 1 samples=151" "flights 0 streams 1 declared_hz=50.0"
     "flights 0 streams 1 missing=0" "flights 0 streams 0 declared_hz=" "flights 0 findings 0 verdict=ok" "flights 0 data_faults 0 line=152")
   string(REGEX MATCH "^([^=]*)=(.*)$" matched "${pair}")
@@ -83,6 +83,7 @@ endif()
 expect_refused("${WORK}/none: cannot be read: No such file or directory" check ${WORK}/none)
 expect_refused("${WORK}/none: cannot be read: No such file or directory" check ${WORK}/good ${WORK}/none)
 expect_refused("${WORK}/good/imu.csv: cannot be read: Not a directory" check ${WORK}/good/imu.csv)
+expect_refused("${WORK}/good/.: is given twice; accepted: each flight once" check ${WORK}/good ${WORK}/bad ${WORK}/good/.)
 file(APPEND ${WORK}/bad/imu.csv "4.0,0,0,0,0,0,9.81\n")
 expect_refused("${WORK}/bad/imu.csv:153: t_s: 4 does not come after 4 of the line before; accepted: times that increase"
   check ${WORK}/good ${WORK}/bad)

@@ -93,8 +93,16 @@ expect_equal("points of the beat" "${count}" 201)
 expect_refused("${WORK}/map.csv:2: is line 2 of ${WORK}/map.csv; accepted: measurements that are not fitted"
   forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/out.toml --held-out ${WORK}/map.csv)
 file(CREATE_LINK map.csv ${WORK}/link.csv SYMBOLIC)
-expect_refused("--out: ${WORK}/link.csv is what was measured; accepted: another file"
+expect_refused("${WORK}/link.csv: is read by the same command; accepted: another file"
   forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/link.csv)
+file(READ ${nominal} fast)
+file(WRITE ${WORK}/slow.toml "${fast}")
+expect_refused("${WORK}/slow.toml: is read by the same command; accepted: another file"
+  simulate-forces --vehicle ${WORK}/slow.toml --out ${WORK}/slow.toml)
+string(REPLACE "hold_s = 1e-3" "hold_s = 2.5e-4" fast "${fast}")
+file(WRITE ${WORK}/fast.toml "${fast}")
+run(simulate-forces --vehicle ${WORK}/fast.toml --out ${WORK}/out.csv)
+expect_match("stderr" "${err}" "fast.toml:[0-9:]+ driver.hold_s: physics goes by steps of 1e-04 s here; accepted: a multiple of that")
 expect_refused("flappy-identify: --seed: Value -1 not in range 0 to 9223372036854775807; see flappy-identify --help"
   simulate-forces --vehicle ${identified} --out ${WORK}/out.csv --seed -1)
 

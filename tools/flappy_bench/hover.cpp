@@ -29,13 +29,16 @@ Job read_job(const std::filesystem::path& path, const std::vector<std::string>& 
   const io::Table root = io::Config::load(path, overrides).root();
   root.integer("schema", 1, 1);
   const model::Vehicle vehicle = model::read_vehicle(root.file("vehicle"));
+  const model::Driver& d = vehicle.driver;
   Job job{vehicle,
           root.choice("precision", {"float", "double"}),
           static_cast<std::size_t>(root.integer("count", 1, 1'000'000)),
           static_cast<std::uint64_t>(root.integer("seed", 0, INT64_MAX)),
           root.number("duration_s", io::positive(1000)),
-          {root.number("input.amplitude_V"), root.number_or("input.difference_V", 0), root.number_or("input.bias_V", 0),
-           root.number_or("input.split_cycle", 0)},
+          {root.number("input.amplitude_V", {0, d.amplitude_limit_V}),
+           root.number_or("input.difference_V", 0, {-d.difference_limit_V, d.difference_limit_V}),
+           root.number_or("input.bias_V", 0, {-d.bias_limit_V, d.bias_limit_V}),
+           root.number_or("input.split_cycle", 0, {-d.split_cycle_limit, d.split_cycle_limit})},
           {},
           sim::Randomisation(vehicle)};
   if (root.has("randomisation"))

@@ -172,7 +172,7 @@ void print(const std::vector<Finding>& findings) {
 
 Json run_oracle(const OracleCommand& o) {
   const Case declared = declared_case(o.vehicle);
-  { const io::AtomicFile refused_before_the_work(o.out); }
+  io::check_output(o.out, {o.vehicle, o.randomise, o.priors});
   const auto draws = [&](const std::string& file) {
     return sim::read_randomisation(declared.vehicle, io::Config::load(file).root());
   };

@@ -8,7 +8,8 @@
 namespace flappy::blind {
 
 struct OracleCommand {
-  std::string vehicle, randomise = "configs/randomisation/published.toml", priors = "configs/gap/priors.toml", out;
+  std::string vehicle, randomise = FLAPPY_CONFIGS "/randomisation/published.toml",
+                       priors = FLAPPY_CONFIGS "/gap/priors.toml", out;
   int vehicles = 8;
   std::uint64_t seed = 2001;  ///< of the first
   int threads = 0;            ///< 0: one for each processor

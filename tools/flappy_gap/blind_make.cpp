@@ -30,9 +30,11 @@ class Maker {
     io::make_folder(sealed_);
     io::make_folder(command_.out / "cases");
     const io::FolderLock lock(command_.out);
-    if (fs::exists(command_.out / "manifest.json"))
-      throw io::InputError(command_.out.string() + ": has a manifest already; accepted: a name for a new folder");
     agree_with_what_is_there();
+    if (fs::exists(command_.out / "manifest.json")) {
+      std::printf("%s: made already\n", command_.out.c_str());
+      return true;
+    }
     std::vector<const PlannedCase*> open;
     for (const PlannedCase& p : plan_)
       if (!fs::exists(label_file(p))) open.push_back(&p);

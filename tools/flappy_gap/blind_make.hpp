@@ -13,9 +13,9 @@
 namespace flappy::gap {
 
 struct MakeCommand {
-  std::filesystem::path out, vehicle = "configs/vehicles/hummingbird_nominal.toml",
-                             randomise = "configs/randomisation/published.toml",
-                             detectable = "configs/gap/detectable.toml";
+  std::filesystem::path out, vehicle = FLAPPY_CONFIGS "/vehicles/hummingbird_nominal.toml",
+                             randomise = FLAPPY_CONFIGS "/randomisation/published.toml",
+                             detectable = FLAPPY_CONFIGS "/gap/detectable.toml";
   PlanOptions plan;
   int threads = 0;  ///< 0: one for each processor
   /// What of the catalogue's parameters comes nearest to the effects of a case, by "effect.parameter"; null: nothing does.

@@ -163,12 +163,6 @@ Json lines_json(const std::vector<ScoreLine>& lines) {
   return json;
 }
 
-std::string joined(const std::vector<std::string>& names, const char* by = "+") {
-  std::string text;
-  for (const std::string& n : names) text += (text.empty() ? "" : by) + n;
-  return text;
-}
-
 /// One line for each case, for whoever wants to know which ones went wrong.
 std::string case_list(const Manifest& manifest, const std::map<std::size_t, Label>& labels,
                       const std::vector<ScoredCase>& cases, const Predictions& predictions) {
@@ -180,9 +174,9 @@ std::string case_list(const Manifest& manifest, const std::map<std::size_t, Labe
     for (const blind::BlindEffect& e : labels.at(number).planned.effects)
       sizes += (sizes.empty() ? "" : "+") + io::shortest_digits(e.size);
     const std::optional<double> closed = c.truth.part == "singles" ? closure(c) : std::nullopt;
-    text += std::to_string(number) + "," + c.truth.part + "," + joined(c.truth.effects) + "," + sizes + "," +
-            (c.truth.separable ? "1" : "0") + "," + c.prediction.kind + "," + joined(c.prediction.effects) + "," +
-            figure(c.prediction.probability) + "," + (right(c.truth, c.prediction) ? "1" : "0") + "," +
+    text += std::to_string(number) + "," + c.truth.part + "," + io::joined(c.truth.effects, "+") + "," + sizes + "," +
+            (c.truth.separable ? "1" : "0") + "," + c.prediction.kind + "," + io::joined(c.prediction.effects, "+") +
+            "," + figure(c.prediction.probability) + "," + (right(c.truth, c.prediction) ? "1" : "0") + "," +
             (closed ? figure(closed) : "") + "," +
             io::shortest_digits(predictions.read(number).at("seconds").get<double>()) + "\n";
   }
@@ -230,7 +224,7 @@ Json blind_score(const ScoreCommand& command) {
   text += "\n" + manifest.set + " seeds, " + std::to_string(cases.size()) + " cases, " +
           std::to_string(truths.at("never_fly").size()) +
           " robots that never fly left out. Undetectable, left out: " + std::to_string(undetectable.size()) +
-          (undetectable.empty() ? "" : " (" + joined(undetectable, ", ") + ")") + ".\n";
+          (undetectable.empty() ? "" : " (" + io::joined(undetectable) + ")") + ".\n";
   if (commits.size() > 1) text += "Predicted by " + std::to_string(commits.size()) + " different versions.\n";
   std::fputs(text.c_str(), stdout);
   io::write_atomically(command.folder / "score.md", text);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
 #include "diagnosis_files.hpp"
 #include "flappy/vehicle_file.hpp"
@@ -77,9 +78,11 @@ constexpr const char* kFiles[] = {
     kJson, kVehicle, "residuals.csv", "candidates.csv", "unexplained.csv", "residuals.svg", "probabilities.svg"};
 
 /// All but diagnosis.json, which is that too until what lies ahead is known; the names of the others.
-std::string write_all(const std::filesystem::path& out, const Report& report, const model::Vehicle& corrected) {
+std::string write_all(const std::filesystem::path& out, const Report& report,
+                      const std::optional<model::Vehicle>& corrected) {
   io::write_atomically(out / kJson, diagnosis_json(report).dump(2) + "\n");
-  io::write_atomically(out / kVehicle, "# Corrected by flappy-gap diagnose.\n" + model::vehicle_text(corrected));
+  if (corrected)
+    io::write_atomically(out / kVehicle, "# Corrected by flappy-gap diagnose.\n" + model::vehicle_text(*corrected));
   write_tables(out, report);
   std::string names;
   try {
@@ -102,15 +105,11 @@ struct Asked {
 };
 
 Asked read_asked(const DiagnoseCommand& command) {
-  const model::Vehicle vehicle = model::read_vehicle(command.vehicle);
-  const io::Config file = io::Config::load(command.vehicle);
+  const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kStep_s);
   if (!vehicle.effects.empty())
-    file.root().fail("effects", "what is missing is asked of the vehicle as it was believed",
-                     "a vehicle without effects");
-  const double steps = vehicle.driver.hold_s / kStep_s;
-  if (std::abs(steps - std::round(steps)) > 1e-6 || steps < 0.5)
-    file.root().table("driver").fail(
-        "hold_s", "flights are replayed by steps of " + io::shortest_digits(kStep_s) + " s", "a multiple of that");
+    io::Config::load(command.vehicle)
+        .root()
+        .fail("effects", "what is missing is asked of the vehicle as it was believed", "a vehicle without effects");
   std::vector<std::string> withheld;
   for (const std::string& id : command.withheld) {
     if (model::effect_index(id.c_str()) < 0)
@@ -118,11 +117,7 @@ Asked read_asked(const DiagnoseCommand& command) {
                            "\"; accepted: identifiers of docs/effects.md");
     for (std::string& member : model::whole_group(id)) withheld.push_back(std::move(member));
   }
-  for (std::size_t i = 0; i < command.flights.size(); ++i)
-    for (std::size_t k = 0; k < i; ++k)
-      if (std::error_code error; std::filesystem::equivalent(command.flights[i], command.flights[k], error))
-        throw io::InputError("command line: --flights: " + command.flights[i] +
-                             " is given twice; accepted: each flight once");
+  flight::check_each_once(command.flights);
   return {vehicle, sim::read_randomisation(vehicle, io::Config::load(command.priors).root()),
           flight::read_fly_config(command.manoeuvre.empty() ? FLAPPY_CONFIGS "/fly/hover.toml" : command.manoeuvre),
           read_manoeuvres(FLAPPY_CONFIGS "/gap/experiments"), withheld};
@@ -153,7 +148,7 @@ Json run_diagnose(const DiagnoseCommand& command) {
   const std::filesystem::path out = command.out;
   if (!out.empty()) {
     io::make_folder(out);
-    { const io::AtomicFile refused_before_the_work(out / kJson); }
+    io::check_output(out / kJson);
   }
   io::stop_on_interrupt();
   Logs read = read_logs(command);
@@ -170,9 +165,10 @@ Json run_diagnose(const DiagnoseCommand& command) {
                          : report_of(command.flights, flights, asked.uncertain, d);
   std::string written = kJson;
   if (!faulty) {
-    const model::Vehicle corrected = corrected_vehicle(asked.vehicle, d, report.conclusion, asked.uncertain);
+    std::optional<model::Vehicle> corrected;
+    if (d.complete) corrected = corrected_vehicle(asked.vehicle, d, report.conclusion, asked.uncertain);
     if (!out.empty()) written += write_all(out, report, corrected);
-    if (d.complete) look_ahead(command, asked, flights, d, corrected, report);
+    if (corrected) look_ahead(command, asked, flights, d, *corrected, report);
   }
   Json json = diagnosis_json(report);
   for (const std::string& line : summary_of(report, command.out)) std::printf("%s\n", line.c_str());

@@ -8,7 +8,7 @@
 namespace flappy::gap {
 
 struct DiagnoseCommand {
-  std::string vehicle, priors = "configs/gap/priors.toml";
+  std::string vehicle, priors = FLAPPY_CONFIGS "/gap/priors.toml";
   std::string
       manoeuvre;  ///< configuration of flappy-fly that the flights flew; empty: the recorded paths, under our hover's
   std::vector<std::string> flights, withheld;

@@ -11,12 +11,6 @@ namespace {
 constexpr std::size_t kMostBars = 10;
 constexpr const char* kColours[] = {"#bdbdbd", "#6baed6", "#08519c"};
 
-std::string joined(const std::vector<std::string>& words, const char* between) {
-  std::string text;
-  for (const std::string& w : words) text += (text.empty() ? "" : between) + w;
-  return text;
-}
-
 std::string digits(const std::optional<double>& value) { return value ? io::shortest_digits(*value) : ""; }
 std::string digits(double value) { return io::shortest_digits(value); }
 
@@ -64,7 +58,7 @@ std::string probability_script(const Report& r) {
   for (std::size_t i = 0; i < top.size(); ++i) {
     const bool effect = top[i]->kind == Answer::Kind::effect;
     script += digits(static_cast<double>(top.size() - 1 - i)) + " " + digits(top[i]->probability) + " \"" +
-              (effect ? joined(top[i]->effects, ", ") : "(" + top[i]->group + ")") + "\"\n";
+              (effect ? io::joined(top[i]->effects) : "(" + top[i]->group + ")") + "\"\n";
   }
   return script +
          "end_of_rows\nplot $rows using (column(2)/2):1:(column(2)/2):(0.35):ytic(strcol(3)) with boxxyerror lc '" +
@@ -87,7 +81,7 @@ void write_tables(const std::filesystem::path& folder, const Report& r) {
   for (std::size_t i = 0; i < r.candidates.size(); ++i) {
     const Reported& c = r.candidates[i];
     const std::string first =
-        std::to_string(i + 1) + "," + kind_name(c.kind) + "," + joined(c.effects, "+") + "," + c.group + "," +
+        std::to_string(i + 1) + "," + kind_name(c.kind) + "," + io::joined(c.effects, "+") + "," + c.group + "," +
         digits(c.probability) + "," + digits(c.log_evidence) + "," + digits(c.loss) + "," +
         (c.closure ? digits(c.closure->value) + "," + digits(c.closure->low) + "," + digits(c.closure->high)
                    : std::string(",,")) +
@@ -101,7 +95,7 @@ void write_tables(const std::filesystem::path& folder, const Report& r) {
 
   std::string terms = "beside,channel,harmonic,function,times_usual,gain_nats\n";
   for (const Unexplained& u : r.unexplained)
-    terms += joined(r.beside, "+") + "," + u.channel + "," + u.harmonic + "," + u.function + "," + digits(u.times) +
+    terms += io::joined(r.beside, "+") + "," + u.channel + "," + u.harmonic + "," + u.function + "," + digits(u.times) +
              "," + digits(u.gain) + "\n";
   io::write_atomically(folder / "unexplained.csv", terms);
 }

@@ -89,6 +89,7 @@ Json to_json(const std::string& folder, const Checked& checked) {
 }
 
 Json check(const std::vector<std::string>& folders) {
+  flight::check_each_once(folders);
   std::vector<Checked> checked;
   for (const std::string& folder : folders) {
     const flight::FlightLog log = flight::read_flight_log(folder);
@@ -97,15 +98,16 @@ Json check(const std::vector<std::string>& folders) {
     checked.push_back({log.header, std::move(report), std::move(faults)});
   }
   Json flights = Json::array();
-  std::size_t warnings = 0, not_tested = 0;
+  std::size_t faults = 0, warnings = 0, not_tested = 0;
   for (std::size_t i = 0; i < folders.size(); ++i) {
     print(folders[i], checked[i]);
     flights.push_back(to_json(folders[i], checked[i]));
+    faults += checked[i].faults.size();
     warnings += checked[i].report.count(Verdict::warning);
     not_tested += checked[i].report.count(Verdict::not_tested);
   }
-  std::printf("%zu readable, warnings %zu, not tested %zu\n", folders.size(), warnings, not_tested);
-  return {{"flights", flights}, {"warnings", warnings}, {"not_tested", not_tested}};
+  std::printf("%zu readable, faults %zu, warnings %zu, not tested %zu\n", folders.size(), faults, warnings, not_tested);
+  return {{"flights", flights}, {"faults", faults}, {"warnings", warnings}, {"not_tested", not_tested}};
 }
 
 }  // namespace

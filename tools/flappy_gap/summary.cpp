@@ -95,14 +95,15 @@ std::string name_of(const Reported& c) {
 }  // namespace
 
 std::vector<std::string> summary_of(const Report& r, const std::string& out) {
-  std::vector<std::string> lines = {verdict_line(r.conclusion)};
+  std::vector<std::string> lines = {
+      r.complete ? verdict_line(r.conclusion)
+                 : "Stopped before every effect was weighed: this is no verdict, only what was weighed until then"};
   if (r.conclusion.kind == Conclusion::Kind::data) {
     for (std::size_t i = 0; i < r.faults.size() && i + 3 < kSummaryLines; ++i)
       lines.push_back(format("  %s:%zu: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
     lines.push_back(next_line(r.conclusion, out));
     return lines;
   }
-  if (!r.complete) lines.push_back("stopped before every effect was weighed");
   std::vector<const Reported*> ranked;
   for (const Reported& c : r.candidates) ranked.push_back(&c);
   std::ranges::stable_sort(ranked, std::greater{}, &Reported::probability);
@@ -166,7 +167,7 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     lines.push_back(format("%s and %s differ most in configs/gap/experiments/%s.toml (%.3g nats expected)",
                            r.next->separates.front().c_str(), r.next->separates.back().c_str(),
                            r.next->manoeuvre.c_str(), r.next->expected_nats));
-  lines.push_back(next_line(r.conclusion, out));
+  lines.push_back(r.complete ? next_line(r.conclusion, out) : "next: the same command again, to its end");
   return lines;
 }
 

@@ -191,10 +191,7 @@ Json run(const Settings& s) {
     check_scales(held);
     check_held_out(measured, held);
   }
-  for (const std::string& input : {s.measured, s.held_out})
-    if (std::error_code none; std::filesystem::equivalent(s.out, input, none))
-      throw io::InputError("--out: " + s.out + " is what was measured; accepted: another file");
-  { const io::AtomicFile refused_before_the_work(s.out); }
+  io::check_output(s.out, {s.measured, s.held_out, s.source.vehicle, s.fit.config});
 
   FitOptions options = s.fit.options(s.source.options(vehicle));
   io::stop_on_interrupt();

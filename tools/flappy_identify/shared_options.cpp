@@ -18,7 +18,7 @@ void MapSource::add(CLI::App& app, const std::string& vehicle_help) {
       ->check(CLI::Range(0, 1024));
 }
 
-model::Vehicle MapSource::read_vehicle() const { return model::read_vehicle(vehicle); }
+model::Vehicle MapSource::read_vehicle() const { return model::read_vehicle_for_steps(vehicle, kStep_s); }
 
 MapOptions MapSource::options(const model::Vehicle& v) const {
   MapOptions o;

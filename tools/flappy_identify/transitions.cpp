@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <memory>
 #include <numbers>
-#include <set>
 
 #include "command.hpp"
 #include "flappy/vehicle_file.hpp"
@@ -87,12 +86,10 @@ Json by_state(const StateVector& values, const char* unit) {
 
 Json run(const Request& request) {
   const auto begin = std::chrono::steady_clock::now();
-  if (!request.csv.empty()) io::AtomicFile refused_before_the_work(request.csv);
+  if (!request.csv.empty()) io::check_output(request.csv, {request.vehicle});
   Transitions transitions(request.options);
-  std::set<fs::path> seen;
+  flight::check_each_once(request.flights);
   for (const fs::path folder : request.flights) {
-    if (!seen.insert(fs::weakly_canonical(folder / ".")).second)
-      throw io::InputError(folder.string() + ": is given twice; accepted: each flight once");
     const flight::FlightLog log = flight::read_flight_log(folder);
     transitions.add(folder, log, model::read_vehicle(vehicle_path(request, folder, log.header)));
   }

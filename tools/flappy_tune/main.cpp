@@ -31,6 +31,7 @@ int main(int argc, char** argv) {
   program.app().add_option("--set", overrides, "override a key: generations=10")->allow_extra_args(false);
   return program.run(argc, argv, [&] {
     const flight::TuneConfig config = flight::read_tune_config(config_name, overrides);
+    io::check_output(out, {config_name});
     const auto start = std::chrono::steady_clock::now();
     io::stop_on_interrupt();
     const double before = flight::cost_of(config, config.start);
