@@ -21,6 +21,17 @@ void spin_briefly(char** argv) {
   execv("/proc/self/exe", argv);
 }
 
+/// Those that there are, where one is missing or is none of them.
+std::string subcommands(const CLI::App& app, const CLI::ParseError& error) {
+  if (!std::string_view(error.what()).starts_with("A subcommand is required")) return "";
+  const CLI::App* at = &app;
+  while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
+  std::vector<std::string> names;
+  for (const CLI::App* each : at->get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(each->get_name());
+  return "; accepted: " + joined(names);
+}
+
 }  // namespace
 
 std::string commit() { return FLAPPY_COMMIT; }
@@ -45,7 +56,8 @@ int Program::run(int argc, char** argv, const std::function<void()>& job) {
     return 0;
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app_.exit(e);  // --help, --version
-    std::fprintf(stderr, "%s: %s; see %s --help\n", app_.get_name().c_str(), e.what(), app_.get_name().c_str());
+    std::fprintf(stderr, "%s: %s%s; see %s --help\n", app_.get_name().c_str(), e.what(), subcommands(app_, e).c_str(),
+                 app_.get_name().c_str());
     return 2;
   } catch (const InputError& e) {
     std::fprintf(stderr, "%s\n", e.what());
