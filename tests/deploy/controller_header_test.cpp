@@ -278,23 +278,25 @@ TEST(ControllerHeader, WorksOutTheSameMathematics) {
   using L = model::Lanes<float, 1>;
   const auto of = [](L l) { return l.raw[0]; };
   const auto all = libraries(controller_header(config_of("escape"), kRun, record_controller(config_of("escape"))));
-  std::vector<float> out(10 * x.size());
+  std::vector<float> lanes, out(10 * x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const L a(x[i]), b(y[i]);
+    const auto near = model::sin_cos(a), pi = model::sin_cos_pi(a), wide = model::sin_cos_wide(a);
+    for (const L& each : {L(sqrt(a)), L(model::atan2(b, a)), L(model::asin(a)), near.sin, near.cos, pi.sin, pi.cos,
+                          wide.sin, wide.cos, L(model::cos_pi(a))})
+      lanes.push_back(of(each));
+  }
   for (const auto& library : all) {
     library->function<void(const float*, const float*, float*, std::uint32_t)>("w_mathematics")(
         x.data(), y.data(), out.data(), static_cast<std::uint32_t>(x.size()));
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < x.size(); ++i) {
-      const L a(x[i]), b(y[i]);
-      const auto near = model::sin_cos(a), pi = model::sin_cos_pi(a), wide = model::sin_cos_wide(a);
-      const float lanes[] = {
-          of(sqrt(a)), of(model::atan2(b, a)), of(model::asin(a)), of(near.sin),        of(near.cos), of(pi.sin),
-          of(pi.cos),  of(wide.sin),           of(wide.cos),       of(model::cos_pi(a))};
       for (std::size_t k = 0; k < 10; ++k) {
-        const float is = out[10 * i + k];
-        const bool same = std::isnan(lanes[k]) ? std::isnan(is) : std::memcmp(&is, &lanes[k], sizeof is) == 0;
+        const float is = out[10 * i + k], lane = lanes[10 * i + k];
+        const bool same = std::isnan(lane) ? std::isnan(is) : std::memcmp(&is, &lane, sizeof is) == 0;
         if (!same && wrong++ < 5)
           ADD_FAILURE() << library->name() << ", function " << k << " of " << x[i] << ", " << y[i] << ": " << is
-                        << ", not " << lanes[k];
+                        << ", not " << lane;
       }
     }
     EXPECT_EQ(wrong, 0u);

@@ -243,8 +243,7 @@ TEST(DataFaults, OfFlights) {
 }
 
 TEST(DataFaults, AreNotEffects) {
-  for (const char* effect : {"gyro_bias", "accelerometer_misalignment", "vibration_rectification", "mocap_tilt",
-                             "marker_offset", "mocap_delay", "stop_compliance", "com_offset", "driver_dead_zone"})
+  for (const char* effect : {"vibration_rectification", "stop_compliance", "com_offset", "driver_dead_zone"})
     EXPECT_EQ(describe(data_faults(blind_log(7, 0, effect), "a")), "") << effect;
   // where what is thought plausible of sensors ends; a rectification that large bends the mean force as another attitude would
   for (const char* effect : {"gyro_bias", "accelerometer_misalignment", "mocap_tilt", "marker_offset", "mocap_delay"})

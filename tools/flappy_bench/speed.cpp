@@ -20,7 +20,7 @@ namespace {
 constexpr double kStep_s = 1e-4;
 constexpr int kPeriod = 20;  // physics steps in a control period of 2 ms
 constexpr std::size_t kDistinctVehicles = 1024;
-/// Flights are this long: without a controller a flapper then tumbles, which is not what anyone simulates.
+/// Flights are no longer than this: without a controller a flapper then tumbles, which is not what anyone simulates.
 constexpr double kFlight_s = 0.2;
 constexpr int kFlightPeriods = static_cast<int>(kFlight_s / (kPeriod * kStep_s));
 
@@ -38,7 +38,7 @@ class Flock {
     for (std::size_t i = 0; i < count; ++i) batch_.set_vehicle(i, vehicles[i % vehicles.size()]);
   }
 
-  /// Flies for about `seconds`, from a fresh start every kFlight_s; seconds per flapper and step on the given clock.
+  /// Flies for about `seconds`, at least a control period, from a fresh start every kFlight_s; seconds per flapper and step on the given clock.
   double run(double seconds, double (*clock)()) {
     double spent = 0;
     std::int64_t periods = 0;
@@ -48,10 +48,11 @@ class Flock {
         batch_.set_input(i, {9 + 0.002 * static_cast<double>(i % 1000), 0, 0, 0});
       }
       batch_.step(kPeriod);
-      const double start = clock();
-      for (int i = 0; i < kFlightPeriods; ++i) batch_.step(kPeriod);
-      spent += clock() - start;
-      periods += kFlightPeriods;
+      const double start = clock() - spent;
+      for (int i = 0; i < kFlightPeriods && spent < seconds; ++i, ++periods) {
+        batch_.step(kPeriod);
+        spent = clock() - start;
+      }
     }
     return spent / (static_cast<double>(periods) * kPeriod * static_cast<double>(batch_.size()));
   }
