@@ -38,7 +38,8 @@ class Flock {
     for (std::size_t i = 0; i < count; ++i) batch_.set_vehicle(i, vehicles[i % vehicles.size()]);
   }
 
-  /// Flies for about `seconds`, at least a control period, from a fresh start every kFlight_s; seconds per flapper and step on the given clock.
+  /// Flies for about `seconds`, at least a control period, from a fresh start every kFlight_s; seconds per flapper and
+  /// step on the given clock.
   double run(double seconds, double (*clock)()) {
     double spent = 0;
     std::int64_t periods = 0;

@@ -9,8 +9,8 @@
 namespace flappy::gap {
 
 struct ScoreCommand {
-  std::filesystem::path folder, vehicle,
-      priors = FLAPPY_CONFIGS "/gap/priors.toml";                         ///< vehicle: empty for the manifest's
+  std::filesystem::path folder, vehicle;  ///< the latter: empty for the manifest's
+  std::filesystem::path priors = FLAPPY_CONFIGS "/gap/priors.toml";
   std::filesystem::path experiments = FLAPPY_CONFIGS "/gap/experiments";  ///< for the prediction
   int threads = 0;  ///< cases at a time; 0: one for each processor
   Predictor predictor = predict;
