@@ -27,7 +27,7 @@ Sizes::Sizes(const std::vector<BlindEffect>& effects) {
   for (const BlindEffect& e : effects) {
     const auto k = static_cast<std::size_t>(std::ranges::find(names, e.id) - names.begin());
     if (k == kEffects)
-      throw io::InputError("--effect " + e.id + ": no such effect; accepted: what `flappy-blind-robot effects` lists" +
+      throw io::InputError("--effect " + e.id + ": no such effect; accepted: what `flappy-blind effects` lists" +
                            io::did_you_mean(e.id, {names.begin(), names.end()}));
     if (given[k]) throw io::InputError("--effect " + e.id + ": given twice; accepted: each effect once");
     if (!(e.size >= 0 && e.size <= 4))

@@ -25,8 +25,8 @@ std::string crash(const Robot& robot, const Room& room, double least_upright) {
   return {};
 }
 
-void add(flight::FlightLog& log, const Imu::Sample& s) {
-  flight::ImuStream& m = log.imu;
+void add(flightlog::FlightLog& log, const Imu::Sample& s) {
+  flightlog::ImuStream& m = log.imu;
   m.t_s.push_back(tidy(s.arrival_s));
   m.gyro_x_rad_s.push_back(s.gyro_rad_s.x());
   m.gyro_y_rad_s.push_back(s.gyro_rad_s.y());
@@ -36,8 +36,8 @@ void add(flight::FlightLog& log, const Imu::Sample& s) {
   m.accel_z_m_s2.push_back(s.accel_m_s2.z());
 }
 
-void add(flight::FlightLog& log, const Mocap::Sample& s) {
-  flight::MocapStream& m = log.mocap;
+void add(flightlog::FlightLog& log, const Mocap::Sample& s) {
+  flightlog::MocapStream& m = log.mocap;
   m.t_s.push_back(tidy(s.arrival_s));
   m.x_m.push_back(s.position_m.x());
   m.y_m.push_back(s.position_m.y());
@@ -48,9 +48,9 @@ void add(flight::FlightLog& log, const Mocap::Sample& s) {
   m.qz.push_back(s.attitude.z());
 }
 
-void add_command(flight::FlightLog& log, double t_s, const std::array<double, 2>& volts, const Inputs& u,
+void add_command(flightlog::FlightLog& log, double t_s, const std::array<double, 2>& volts, const Inputs& u,
                  double phase_rad) {
-  flight::CommandStream& c = log.command;
+  flightlog::CommandStream& c = log.command;
   c.t_s.push_back(tidy(t_s));
   c.left_voltage_V.push_back(volts[0]);
   c.right_voltage_V.push_back(volts[1]);
@@ -61,7 +61,7 @@ void add_command(flight::FlightLog& log, double t_s, const std::array<double, 2>
   c.phase_rad->push_back(phase_rad);
 }
 
-void add_truth(std::vector<flight::Column>& truth, double t_s, const Robot& robot, const Vector3d& bias) {
+void add_truth(std::vector<flightlog::Column>& truth, double t_s, const Robot& robot, const Vector3d& bias) {
   const Torso& t = robot.torso();
   const Vector3d &p = t.position_m, &v = t.velocity_m_s, &w = t.rate_rad_s;
   const Quaterniond& q = t.attitude;
@@ -82,8 +82,8 @@ void add_truth(std::vector<flight::Column>& truth, double t_s, const Robot& robo
   for (std::size_t k = 0; k < truth.size(); ++k) truth[k].push_back(row[k]);
 }
 
-flight::FlightHeader header_of(const Case& c, const SensorSet& sensors, const Room& room) {
-  flight::FlightHeader h;
+flightlog::FlightHeader header_of(const Case& c, const SensorSet& sensors, const Room& room) {
+  flightlog::FlightHeader h;
   h.vehicle = c.vehicle_file;
   h.vehicle_sha256 = c.vehicle_sha256;
   h.flapping_Hz = c.vehicle.driver.flapping_Hz;
@@ -144,7 +144,7 @@ Flight fly(const Case& c, std::size_t flight, const Torso& start, double duratio
   f.log.command.phase_rad.emplace();
   if (sensors.power) f.log.power.emplace();
   if (sensors.wings) f.log.wings.emplace();
-  f.truth.resize(flight::kMotionNames.size());
+  f.truth.resize(flightlog::kMotionNames.size());
 
   robot.place_torso(start);
 
@@ -189,7 +189,7 @@ Flight fly(const Case& c, std::size_t flight, const Torso& start, double duratio
     if (logged && due(step, sensors.mocap.rate_hz, mocap_count))
       if (const auto s = mocap.look(robot.torso(), t_s)) add(f.log, *s);
     if (logged && sensors.wings && due(step, sensors.wings->rate_hz, wings_count)) {
-      flight::WingsStream& w = *f.log.wings;
+      flightlog::WingsStream& w = *f.log.wings;
       const auto seen = [&](double angle) { return angle + sensors.wings->noise_rad * wings_random.normal(); };
       w.t_s.push_back(tidy(t_s));
       w.left_stroke_rad.push_back(seen(robot.wing(0).stroke_rad));
@@ -201,7 +201,7 @@ Flight fly(const Case& c, std::size_t flight, const Torso& start, double duratio
     if (!logged) continue;
     if (const auto s = imu.after_step(robot, t_s + kStep_s)) add(f.log, *s);
     if (sensors.power && due(step, sensors.power->rate_hz, power_count)) {
-      flight::PowerStream& p = *f.log.power;  // of the instant at which the step began
+      flightlog::PowerStream& p = *f.log.power;  // of the instant at which the step began
       p.t_s.push_back(tidy(t_s + sensors.power->latency_s));
       p.battery_V.push_back(robot.battery_V() + sensors.power->voltage_noise_V * power_random.normal());
       p.left_current_A.push_back(robot.current_A(0) + sensors.power->current_noise_A * power_random.normal());

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "blind/pilot.hpp"
-#include "blind/sensors.hpp"
+#include "blind/robot_sensors.hpp"
 
 namespace flappy::blind {
 
@@ -24,8 +24,8 @@ struct Case {
 struct Flight {
   bool crashed = false;
   std::string how;  ///< it crashed
-  flight::FlightLog log;
-  std::vector<flight::Column> truth;         ///< columns flight::kMotionNames, at the control rate
+  flightlog::FlightLog log;
+  std::vector<flightlog::Column> truth;      ///< columns flight::kMotionNames, at the control rate
   double farthest_m = 0, most_tilt_rad = 0;  ///< from where it was meant to be; of the body's z axis
 };
 

@@ -118,7 +118,7 @@ Snapshot<T> Fleet<T>::snapshot(std::size_t i) const {
 }
 
 template <class T>
-void Fleet<T>::set_actor(const std::shared_ptr<const Actor>& actor) {
+void Fleet<T>::set_actor(const std::shared_ptr<const policy::Actor>& actor) {
   Storage& s = *storage_;
   if (actor) {
     const auto same = [](const std::vector<std::string>& names, const std::vector<Signal>& signals) {
@@ -134,7 +134,7 @@ void Fleet<T>::set_actor(const std::shared_ptr<const Actor>& actor) {
   s.actor_numbers.clear();
   for (const std::vector<double>* list : {&actor->weights, &actor->mean, &actor->scale})
     for (const double x : *list) s.actor_numbers.push_back(static_cast<T>(x));
-  ActorView<T>& a = s.plan.actor;
+  policy::ActorView<T>& a = s.plan.actor;
   a.layers = static_cast<int>(actor->widths.size()) - 1;
   for (std::size_t i = 0; i < actor->widths.size(); ++i) a.widths[i] = actor->widths[i];
   a.hidden = actor->hidden;

@@ -6,9 +6,9 @@
 #include <memory>
 #include <span>
 
-#include "flight/actor_file.hpp"
 #include "flight/setup.hpp"
 #include "flight/task.hpp"
+#include "policy/actor_file.hpp"
 
 namespace flappy::flight {
 
@@ -76,7 +76,7 @@ class Fleet {
 
   /// The actor that acts from now on, or none: then the last actions stay. std::invalid_argument unless its observation and
   /// action are those of the task.
-  void set_actor(const std::shared_ptr<const Actor>& actor);
+  void set_actor(const std::shared_ptr<const policy::Actor>& actor);
   /// Action of flapper `i` for the next period, each in [-1, 1]; an actor would overwrite it.
   void set_action(std::size_t i, const double (&action)[kActions]);
   /// The same by what the action adds to the controller's output: V, V, V, split cycle, each within the task's range.

@@ -42,7 +42,7 @@ struct Fleet<T>::Storage {
   std::vector<T> ring, queue;  // [block][slot][row][lane]
   std::size_t ring_size, queue_size;
   std::vector<Segment<T>> path;
-  std::shared_ptr<const Actor> actor;
+  std::shared_ptr<const policy::Actor> actor;
   std::vector<T> actor_numbers;
   std::vector<Period> periods;       // being flown, or flown last
   std::vector<FlightPlan<T>> plans;  // of each of them

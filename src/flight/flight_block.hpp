@@ -1,10 +1,10 @@
 // What flies a block of flappers: one row for each number, beside the block of their bodies.
 #pragma once
 
-#include "flight/actor.hpp"
 #include "flight/arc.hpp"
 #include "flight/episode.hpp"
 #include "flight/schedule.hpp"
+#include "policy/actor.hpp"
 #include "sim/step.hpp"
 
 namespace flappy::flight {
@@ -79,7 +79,7 @@ struct FlightPlan {
   TaskConstants<T> task;
   std::uint32_t parts;  // observed
   PathView<T> path;
-  ActorView<T> actor;
+  policy::ActorView<T> actor;
   std::uint32_t hold;    // control periods between its actions
   std::uint32_t period;  // since the fleet began; counts draws of exploration
   bool explores;

@@ -9,12 +9,12 @@
 #include "flappy/batch.hpp"
 #include "flight/path.hpp"
 #include "io/config.hpp"
+#include "policy/actor.hpp"
 #include "sim/random.hpp"
 
 namespace flappy::flight {
 
-inline constexpr int kActions = 4;
-inline constexpr int kMaxObservation = 40;  // all parts together
+using policy::kActions, policy::kMaxObservation;
 
 /// A row of the observation or the action, for who reads or exports it.
 struct Signal {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "flight/track.hpp"
+#include "flightlog/track.hpp"
 #include "identify/force_map.hpp"
 #include "io/csv.hpp"
 #include "sim/replay.hpp"
@@ -76,14 +76,14 @@ std::string in_ms(const std::array<double, 2>& window_s) {
   return ms(window_s[0]) + " and " + ms(window_s[1]) + " ms";
 }
 
-sim::World world_of(const flight::FlightHeader& h) {
+sim::World world_of(const flightlog::FlightHeader& h) {
   sim::World world{h.gravity_m_s2, h.ambient.ground_z_m, h.ambient.ceiling_z_m, {}};
-  for (const flight::LogWall& w : h.ambient.walls) world.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
+  for (const flightlog::LogWall& w : h.ambient.walls) world.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
   return world;
 }
 
 /// Largest angle, rate and so on that a sensor's noise would add to the range of a state at rest.
-StateVector noise_of(const flight::FlightHeader& h) {
+StateVector noise_of(const flightlog::FlightHeader& h) {
   const double x = h.mocap.position_noise_m, angle = h.mocap.attitude_noise_rad, rate = h.imu.gyro_noise_rad_s;
   // what the accelerometer's noise adds to a velocity within a beat
   const double v = h.imu.accel_noise_m_s2 / std::sqrt(h.imu.rate_hz * h.flapping_Hz);
@@ -94,7 +94,7 @@ StateVector noise_of(const flight::FlightHeader& h) {
 class Truth {
  public:
   /// InputError for rows that do not come at equal intervals of whole steps.
-  explicit Truth(const std::filesystem::path& folder) : table_(io::read_csv(folder / flight::log_file::kTruth)) {
+  explicit Truth(const std::filesystem::path& folder) : table_(io::read_csv(folder / flightlog::log_file::kTruth)) {
     const auto& t = t_s();
     if (t.size() < 2)
       throw io::InputError(table_.name + ": has " + (t.empty() ? "no row" : "one row") + "; accepted: at least two");
@@ -140,20 +140,20 @@ struct Transitions::Flight {
   StateVector noise;
   double beat_s, imu_interval_s;
   sim::VoltageScript voltages;
-  std::optional<flight::WingsStream> wings;
+  std::optional<flightlog::WingsStream> wings;
   double wings_hz;
-  flight::Track track;
+  flightlog::Track track;
   std::unique_ptr<Truth> truth;
   std::vector<double> starts_s;
   std::size_t recorded = 0, low = 0, not_covered = 0;
 
-  Flight(const std::filesystem::path& folder, const flight::FlightLog& log, const model::Vehicle& v, Source source)
+  Flight(const std::filesystem::path& folder, const flightlog::FlightLog& log, const model::Vehicle& v, Source source)
       : vehicle(v),
         world(world_of(log.header)),
         noise(noise_of(log.header)),
         beat_s(1 / log.header.flapping_Hz),
         imu_interval_s(1 / log.header.imu.rate_hz),
-        voltages(flight::motor_voltages(log)),
+        voltages(flightlog::motor_voltages(log)),
         wings(log.wings),
         wings_hz(log.header.wings ? log.header.wings->rate_hz : 0),
         track(log, folder),
@@ -174,14 +174,14 @@ struct Transitions::Flight {
 
   sim::FlapperState at(double t_s) const {
     if (truth) return truth->state(truth->row_near(t_s));
-    const flight::TorsoMotion m = track.at(t_s);
+    const flightlog::TorsoMotion m = track.at(t_s);
     sim::FlapperState x;
     for (int i = 0; i < 3; ++i) {
       x.position_m[i] = m.position_m[i];
       x.velocity_m_s[i] = m.velocity_m_s[i];
       x.body_rate_rad_s[i] = m.body_rate_rad_s[i];
     }
-    if (wings) std::ranges::copy(flight::strokes_at(*wings, wings_hz, t_s), x.stroke_rad);
+    if (wings) std::ranges::copy(flightlog::strokes_at(*wings, wings_hz, t_s), x.stroke_rad);
     const Eigen::Quaterniond& q = m.attitude;
     x.attitude[0] = q.w(), x.attitude[1] = q.x(), x.attitude[2] = q.y(), x.attitude[3] = q.z();
     return x;
@@ -235,11 +235,11 @@ struct Transitions::Flight {
 Transitions::Transitions(const TransitionOptions& options) : options_(options) {}
 Transitions::~Transitions() = default;
 
-void Transitions::add(const std::filesystem::path& folder, const flight::FlightLog& log,
+void Transitions::add(const std::filesystem::path& folder, const flightlog::FlightLog& log,
                       const model::Vehicle& vehicle) {
   const auto refuse = [&](const std::string& what) { throw io::InputError(folder.string() + ": " + what); };
   auto flight = std::make_unique<Flight>(folder, log, vehicle, options_.source);
-  const flight::Track& t = flight->track;
+  const flightlog::Track& t = flight->track;
   const double surprise = std::sqrt(std::max({t.angle_surprise(), t.position_surprise(), t.bias_surprise()}));
   if (!(surprise <= kLargestSurprise) && !options_.accept_surprise)
     refuse("motion capture and IMU disagree, or are biased, by " + io::shortest_digits(std::round(10 * surprise) / 10) +

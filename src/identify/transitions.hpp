@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "flappy/vehicle.hpp"
-#include "flight/flight_log.hpp"
+#include "flightlog/flight_log.hpp"
 
 namespace flappy::identify {
 
@@ -58,7 +58,7 @@ class Transitions {
   /// io::InputError "folder: what is wrong; accepted" where a flight is too short, never higher than five chords, no
   /// consistent record, or has beats of another length than the flights before. `vehicle` flies in the air density of the
   /// log.
-  void add(const std::filesystem::path& folder, const flight::FlightLog& log, const model::Vehicle& vehicle);
+  void add(const std::filesystem::path& folder, const flightlog::FlightLog& log, const model::Vehicle& vehicle);
   /// Of all flights that were added.
   TransitionReport run() const;
 

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <utility>
 
-#include "flight/settle.hpp"
+#include "rollout/settle.hpp"
 
 namespace flappy::learn {
 namespace {
 
-flight::FlyConfig of_training(const TrainConfig& config) {
-  flight::FlyConfig fly = config.fly;
+rollout::FlyConfig of_training(const TrainConfig& config) {
+  rollout::FlyConfig fly = config.fly;
   fly.fleet.seed = config.seed;
   fly.fleet.first_flapper = 0;
   fly.fleet.batch.threads = config.threads;
@@ -35,8 +35,8 @@ Collector::Collector(const TrainConfig& config)
       staged_(fleet_.blocks()),
       seconds_(fleet_.blocks()) {
   if (fly_.fleet.task.start.settled)
-    pool_ = flight::settle<float>(fly_.fleet, config.vehicles, flight::kHover_s,
-                                  [&](std::uint32_t flapper) { return fly_.vehicle_of(flapper); });
+    pool_ = rollout::settle<float>(fly_.fleet, config.vehicles, rollout::kHover_s,
+                                   [&](std::uint32_t flapper) { return fly_.vehicle_of(flapper); });
   fleet_.set_exploration(config.exploration);
   for (std::size_t i = 0; i < fleet_.size(); ++i) start(i);
 }
@@ -60,7 +60,7 @@ void Collector::start(std::size_t i) {
   fleet_.observation(i, observation(i, 0));
 }
 
-void Collector::begin(const std::shared_ptr<const flight::Actor>& actor) {
+void Collector::begin(const std::shared_ptr<const policy::Actor>& actor) {
   fleet_.set_actor(actor);
   fleet_.begin(static_cast<int>(fly_.fleet.task.hold));
 }

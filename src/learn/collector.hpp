@@ -4,7 +4,7 @@
 
 #include "flight/fleet.hpp"
 #include "learn/checkpoint.hpp"
-#include "learn/replay.hpp"
+#include "learn/replay_buffer.hpp"
 #include "learn/train_config.hpp"
 
 namespace flappy::learn {
@@ -20,7 +20,7 @@ class Collector {
   explicit Collector(const TrainConfig& config);
 
   /// begin() plans a step in which `actor` acts, run() takes one of items() blocks through it, end() closes it.
-  void begin(const std::shared_ptr<const flight::Actor>& actor);
+  void begin(const std::shared_ptr<const policy::Actor>& actor);
   std::size_t items() const { return fleet_.blocks(); }
   void run(std::size_t item);
   void end(Replay& replay);
@@ -50,7 +50,7 @@ class Collector {
   float* observation(std::size_t i, std::size_t step) { return observations_.data() + (i * kept_ + step) * inputs_; }
 
   const TrainConfig& config_;
-  flight::FlyConfig fly_;
+  rollout::FlyConfig fly_;
   flight::Fleet<float> fleet_;
   std::vector<flight::Snapshot<float>> pool_;
   std::size_t inputs_, kept_;

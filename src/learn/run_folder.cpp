@@ -61,12 +61,12 @@ FinishedRun read_finished_run(const fs::path& folder) {
              "the one with SHA-256 " + sha256 + ", as " + end.string() + " says");
   });
 
-  const auto policy = std::make_shared<const flight::Actor>(flight::read_actor(actor));
+  const auto policy = std::make_shared<const policy::Actor>(policy::read_actor(actor));
   const TrainConfig config = read_train_config(folder / "config" / "train.toml");
   if (config.sha256 != run.info.config_sha256)
     refuse(folder / "config", "is not the configuration of the run: SHA-256 " + config.sha256,
            "the one with " + run.info.config_sha256 + ", as " + start.string() + " says");
-  run.fly = flight::read_fly_config(folder / "config" / "fly.toml");
+  run.fly = rollout::read_fly_config(folder / "config" / "fly.toml");
   run.fly.actor = policy;
   if (policy->task != run.info.task || run.fly.fleet.task.name != run.info.task)
     refuse(actor, "is of task " + policy->task, "a policy of the run's task " + run.info.task);

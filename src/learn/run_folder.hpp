@@ -3,14 +3,14 @@
 
 #include <filesystem>
 
-#include "deploy/run_info.hpp"
-#include "flight/fly_config.hpp"
+#include "policy/run_info.hpp"
+#include "rollout/fly_config.hpp"
 
 namespace flappy::learn {
 
 struct FinishedRun {
-  deploy::RunInfo info;
-  flight::FlyConfig fly;  ///< with the run's best actor
+  policy::RunInfo info;
+  rollout::FlyConfig fly;  ///< with the run's best actor
 };
 
 /// io::InputError, one line, where `folder` is no run, the run has not come to its end, or one of its files was changed,

@@ -29,12 +29,12 @@ std::pair<Overrides, Overrides> routed(const Overrides& overrides) {
 
 std::vector<int> widths(const io::Table& t, const char* key) {
   std::vector<int> list;
-  for (const double width : t.numbers(key, {1, flight::kMaxWidth})) {
+  for (const double width : t.numbers(key, {1, policy::kMaxWidth})) {
     if (width != std::floor(width)) t.fail(key, "is no list of whole numbers", "[32, 32]");
     list.push_back(static_cast<int>(width));
   }
-  if (list.empty() || list.size() >= flight::kMaxLayers)
-    t.fail(key, "is no list of hidden layers", "1 to " + std::to_string(flight::kMaxLayers - 1) + " widths");
+  if (list.empty() || list.size() >= policy::kMaxLayers)
+    t.fail(key, "is no list of hidden layers", "1 to " + std::to_string(policy::kMaxLayers - 1) + " widths");
   return list;
 }
 
@@ -43,7 +43,7 @@ class Reader {
   Reader(const std::filesystem::path& path, const Overrides& own, const Overrides& flown)
       : main_(io::Config::load(path, own)), root_(main_.root()) {
     root_.integer("schema", 1, 1);
-    c_.fly = flight::read_fly_config(root_.file("fly"), flown);
+    c_.fly = rollout::read_fly_config(root_.file("fly"), flown);
   }
 
   TrainConfig read() {
@@ -72,7 +72,7 @@ class Reader {
     l.actor_hidden = widths(t, "actor");
     l.critic_hidden = widths(t, "critic");
     const bool relu = t.choice("activation", {"relu", "tanh"}) == "relu";
-    l.actor_activation = l.critic_activation = relu ? flight::Activation::relu : flight::Activation::tanh;
+    l.actor_activation = l.critic_activation = relu ? policy::Activation::relu : policy::Activation::tanh;
     l.last_layer_scale = t.number_or("last_layer_scale", 0.1, {0, 1});
 
     std::vector<std::string> parts;
@@ -159,8 +159,8 @@ class Reader {
 
 }  // namespace
 
-flight::Actor TrainConfig::blank_actor() const {
-  flight::Actor a;
+policy::Actor TrainConfig::blank_actor() const {
+  policy::Actor a;
   a.task = fly.fleet.task.name;
   for (const flight::Signal& s : fly.fleet.task.observation()) a.observation.push_back(s.name);
   for (const flight::Signal& s : fly.fleet.task.action()) a.action.push_back(s.name);

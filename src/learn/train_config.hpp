@@ -21,13 +21,13 @@
 // Any other override, as "task.reward.goal=1", belongs to `fly`.
 #pragma once
 
-#include "flight/fly_config.hpp"
-#include "learn/learner.hpp"
+#include "learn/lanes/learner.hpp"
+#include "rollout/fly_config.hpp"
 
 namespace flappy::learn {
 
 struct TrainConfig {
-  flight::FlyConfig fly;
+  rollout::FlyConfig fly;
   std::uint64_t seed = 0;
   int threads = 0;  ///< at least 1
   LearnerOptions learner;
@@ -48,7 +48,7 @@ struct TrainConfig {
   std::string sha256;  ///< of all of them but for the number of threads
 
   /// An actor of this task, without weights.
-  flight::Actor blank_actor() const;
+  policy::Actor blank_actor() const;
 };
 
 /// io::InputError for whatever is missing, unknown, out of range or does not fit together.

@@ -8,8 +8,8 @@
 
 #include "io/sha256.hpp"
 #include "learn/collector.hpp"
-#include "learn/evaluation.hpp"
 #include "learn/metrics.hpp"
+#include "rollout/evaluation.hpp"
 
 namespace flappy::learn {
 namespace {
@@ -40,10 +40,10 @@ class Trainer {
         names_(config.blank_actor()),
         learner_(config.learner),
         replay_(config.learner.shape, config.replay),
-        evaluator_(config.fly, {config.evaluate_vehicles, kValidationFlappers, 1024}),
+        evaluator_(config.fly, {config.evaluate_vehicles, rollout::kValidationFlappers, 1024}),
         collector_(config) {
     if (options.init) start_from(*options.init);
-    actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
+    actor_ = std::make_shared<policy::Actor>(named(learner_.actor()));
     average_ = actor_->weights;
   }
 
@@ -90,13 +90,13 @@ class Trainer {
     return updates() > 0 && (updates() % every == 0 || updates() == config_.updates) && learnt_;
   }
 
-  flight::Actor named(flight::Actor actor) const {
+  policy::Actor named(policy::Actor actor) const {
     actor.task = names_.task, actor.observation = names_.observation, actor.action = names_.action;
     return actor;
   }
 
-  void start_from(const flight::Actor& actor) {
-    const flight::Actor own = learner_.actor();
+  void start_from(const policy::Actor& actor) {
+    const policy::Actor own = learner_.actor();
     if (actor.observation != names_.observation || actor.action != names_.action)
       throw io::InputError("--init: the policy observes or does something else than task " + names_.task +
                            "; accepted: a policy of this task");
@@ -132,7 +132,7 @@ class Trainer {
       ++samples_;
       if (updates() % static_cast<std::uint64_t>(config_.learner.policy_delay) == 0)
         actor_values_ += learner_.metrics().actor_q, ++actor_samples_;
-      actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
+      actor_ = std::make_shared<policy::Actor>(named(learner_.actor()));
       for (std::size_t k = 0; k < average_.size(); ++k)
         average_[k] += config_.policy_averaging * (actor_->weights[k] - average_[k]);
     } else {
@@ -158,8 +158,9 @@ class Trainer {
     const auto from = Clock::now();
     const double wall = wall_s();
     policy_ = averaged();
-    const Evaluation e = evaluator_.fly({std::make_shared<flight::Actor>(policy_), nullptr}, Detail::success);
-    const Summary flown = learn::summarise(e.flights);
+    const rollout::Evaluation e =
+        evaluator_.fly({std::make_shared<policy::Actor>(policy_), nullptr}, rollout::Detail::success);
+    const rollout::Summary flown = rollout::summarise(e.flights);
     success_ = flown.success.value;
     if (success_ > best_success_) {
       best_success_ = success_;
@@ -196,8 +197,8 @@ class Trainer {
   }
 
   /// The policy: the actor averaged over steps, in the precision that it flies in.
-  flight::Actor averaged() const {
-    flight::Actor policy = *actor_;
+  policy::Actor averaged() const {
+    policy::Actor policy = *actor_;
     std::ranges::transform(average_, policy.weights.begin(), [](double w) { return static_cast<float>(w); });
     return policy;
   }
@@ -206,8 +207,8 @@ class Trainer {
   void publish() {
     if (policy_.widths.empty()) policy_ = averaged();
     if (best_.widths.empty()) best_ = policy_;
-    flight::write_actor(options_.folder / "best.json", best_);
-    flight::write_actor(options_.folder / "last.json", policy_);
+    policy::write_actor(options_.folder / "best.json", best_);
+    policy::write_actor(options_.folder / "last.json", policy_);
   }
 
   void write_config() {
@@ -277,7 +278,7 @@ class Trainer {
     from.get("samples", samples);
     samples_ = samples[0], actor_samples_ = samples[1];
     from.get("best_update", best_update_);
-    actor_ = std::make_shared<flight::Actor>(named(learner_.actor()));
+    actor_ = std::make_shared<policy::Actor>(named(learner_.actor()));
     policy_ = best_ = averaged();
     from.get("average", average_);
     from.get("best_weights", best_.weights);
@@ -324,10 +325,10 @@ class Trainer {
 
   const TrainConfig& config_;
   const TrainOptions& options_;
-  const flight::Actor names_;  // of the task, its inputs and outputs
+  const policy::Actor names_;  // of the task, its inputs and outputs
   Learner<float> learner_;
   Replay replay_;
-  Evaluator evaluator_;
+  rollout::Evaluator evaluator_;
   Collector collector_;
   Metrics* metrics_ = nullptr;
 
@@ -337,9 +338,9 @@ class Trainer {
   std::uint64_t samples_ = 0, actor_samples_ = 0;
   double success_ = -1, best_success_ = -1;
   std::uint64_t best_update_ = 0;
-  std::shared_ptr<const flight::Actor> actor_;  // that flies
+  std::shared_ptr<const policy::Actor> actor_;  // that flies
   std::vector<double> average_;                 // its weights, over steps
-  flight::Actor policy_, best_;                 // of the last evaluation, and of the best one
+  policy::Actor policy_, best_;                 // of the last evaluation, and of the best one
   std::string payload_sha256_;
 
   Mark start_{}, last_{};  // of this process, and of the last evaluation

@@ -33,7 +33,7 @@ struct TrainOptions {
   std::filesystem::path folder;
   /// Goes on from this checkpoint; nothing: the run starts.
   std::optional<std::filesystem::path> from;
-  std::shared_ptr<const flight::Actor> init;                                         ///< starts with this actor
+  std::shared_ptr<const policy::Actor> init;                                         ///< starts with this actor
   std::string commit;                                                                ///< of the program
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();  ///< when the process did
   std::function<bool(const TrainProgress&)> keep_going;  ///< asked after each step; false: checkpoint and stop

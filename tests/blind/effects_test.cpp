@@ -5,7 +5,7 @@
 
 #include <set>
 
-#include "blind/sensors.hpp"
+#include "blind/robot_sensors.hpp"
 #include "refusal.hpp"
 #include "vehicles.hpp"
 
@@ -136,7 +136,7 @@ TEST(BlindEffects, AreOfTypicalSize) {
 TEST(BlindEffects, RefuseWhatTheyDoNotKnow) {
   const auto refusal = [](const char* id, double size) { return test::refusal([&] { Sizes({{id, size}}); }); };
   EXPECT_EQ(refusal("ground_efect", 1),
-            "--effect ground_efect: no such effect; accepted: what `flappy-blind-robot effects` lists; did you mean "
+            "--effect ground_efect: no such effect; accepted: what `flappy-blind effects` lists; did you mean "
             "\"ground_effect\"?");
   EXPECT_EQ(test::refusal([] {
               Sizes({{"wind", 1}, {"wind", 2}});

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "flight/constants.hpp"
-#include "flight/fly_config.hpp"
+#include "rollout/fly_config.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::blind {
@@ -20,7 +20,7 @@ Case identified() {
 }
 
 EscapeRules shipped(Policy policy) {
-  const flight::FlyConfig config = flight::read_fly_config(test::source_path("configs/fly/escape.toml"));
+  const rollout::FlyConfig config = rollout::read_fly_config(test::source_path("configs/fly/escape.toml"));
   const flight::FlightConstants k = flight::flight_constants(config.fleet);
   return {config.fleet.task, k.task, k.pid, std::move(policy)};
 }
@@ -36,7 +36,7 @@ Policy watcher(Rows& seen) {
 }
 
 std::size_t command_at(const Escape& e, double t_s) {
-  const flight::Column& t = e.flight.log.command.t_s;
+  const flightlog::Column& t = e.flight.log.command.t_s;
   return static_cast<std::size_t>(std::ranges::lower_bound(t, t_s - 1e-9) - t.begin());
 }
 double amplitude_at(const Escape& e, double t_s) {
@@ -111,7 +111,7 @@ TEST(Escape, SameCaseSameBytesAnotherStartEachTime) {
   const EscapeRules rules = shipped(watcher(seen));
   const Escape a = escape(identified(), 2, rules), b = escape(identified(), 2, rules);
   EXPECT_EQ(a.flight.truth, b.flight.truth);
-  EXPECT_EQ(flight::flight_log_files(a.flight.log), flight::flight_log_files(b.flight.log));
+  EXPECT_EQ(flightlog::flight_log_files(a.flight.log), flightlog::flight_log_files(b.flight.log));
   EXPECT_GT(std::abs(escape(identified(), 3, rules).flight.truth[2][0] - a.flight.truth[2][0]), 1e-3);
 }
 

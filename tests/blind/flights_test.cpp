@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "gap/check.hpp"
+#include "flightlog/check/check.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::blind {
@@ -22,12 +22,12 @@ TEST(BlindFlights, PassTheCheckAndReadBack) {
   for (std::size_t k = 0; k < kFlights; ++k) {
     const Flight f = fly(identified(1, Programme::rich), k);
     ASSERT_FALSE(f.crashed) << f.how;
-    EXPECT_EQ(flight::parse_flight_log(flight::flight_log_files(f.log), "flight"), f.log);
-    const gap::CheckReport report = gap::check_flight(f.log);
-    for (const gap::Finding& finding : report.findings)
-      EXPECT_NE(finding.verdict, gap::Verdict::warning) << k << ": " << finding.check << ": " << finding.text;
+    EXPECT_EQ(flightlog::parse_flight_log(flightlog::flight_log_files(f.log), "flight"), f.log);
+    const flightlog::CheckReport report = flightlog::check_flight(f.log);
+    for (const flightlog::Finding& finding : report.findings)
+      EXPECT_NE(finding.verdict, flightlog::Verdict::warning) << k << ": " << finding.check << ": " << finding.text;
     EXPECT_LT(f.farthest_m, 0.15) << k;
-    ASSERT_EQ(f.truth.size(), flight::kMotionNames.size());
+    ASSERT_EQ(f.truth.size(), flightlog::kMotionNames.size());
     EXPECT_EQ(f.truth[0].size(), 5000u);
     const auto& z = f.truth[3];
     if (k == 1) {  // from near the ground to near the ceiling
@@ -42,7 +42,7 @@ TEST(BlindFlights, SameSeedSameBytes) {
   c.sizes = Sizes({{"wind", 1}, {"command_delay", 0.5}, {"gyro_bias", 1}});
   const Flight a = fly(c, 0), b = fly(c, 0);
   ASSERT_FALSE(a.crashed) << a.how;
-  EXPECT_EQ(flight::flight_log_files(a.log), flight::flight_log_files(b.log));
+  EXPECT_EQ(flightlog::flight_log_files(a.log), flightlog::flight_log_files(b.log));
   EXPECT_EQ(a.truth, b.truth);
   EXPECT_LT(a.farthest_m, 0.1);
   c.seed = 3;

@@ -35,8 +35,8 @@ model::Vehicle vehicle(std::size_t id) {
   return v;
 }
 
-std::shared_ptr<const Actor> actor(const Task& task) {
-  Actor a;
+std::shared_ptr<const policy::Actor> actor(const Task& task) {
+  policy::Actor a;
   for (const Signal& s : task.observation()) {
     a.observation.push_back(s.name);
     a.mean.push_back(0.125 * s.low);
@@ -44,10 +44,10 @@ std::shared_ptr<const Actor> actor(const Task& task) {
   }
   for (const Signal& s : task.action()) a.action.push_back(s.name);
   a.widths = {static_cast<int>(a.observation.size()), 11, 9, kActions};
-  a.hidden = Activation::tanh;
-  for (std::size_t i = 0; i < weight_count(a.widths); ++i)
+  a.hidden = policy::Activation::tanh;
+  for (std::size_t i = 0; i < policy::weight_count(a.widths); ++i)
     a.weights.push_back(static_cast<double>(i * 37 % 101) / 128 - 0.375);
-  return std::make_shared<Actor>(std::move(a));
+  return std::make_shared<policy::Actor>(std::move(a));
 }
 
 /// Rates that divide neither each other nor the control rate, delays, losses, a path, every part of an observation,

@@ -1,12 +1,12 @@
 // The learner: one result for any instruction set, any number of threads, whatever runs beside it, and after a restart.
-#include "learn/learner.hpp"
+#include "learn/lanes/learner.hpp"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
 
 #include "flappy/batch.hpp"
-#include "learn/learners.hpp"
+#include "learn/lanes/learners.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::learn {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "fleets.hpp"
 #include "flight/arc.hpp"
+#include "flight/fleets.hpp"
 
 namespace flappy::flight {
 namespace {

@@ -9,7 +9,7 @@
 #include <map>
 #include <random>
 
-#include "fleets.hpp"
+#include "flight/fleets.hpp"
 
 namespace flappy::flight {
 namespace {

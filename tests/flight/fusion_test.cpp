@@ -8,7 +8,7 @@
 #include <functional>
 #include <random>
 
-#include "fleets.hpp"
+#include "flight/fleets.hpp"
 #include "flight/schedule.hpp"
 #include "sim/storage.hpp"
 

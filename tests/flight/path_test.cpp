@@ -7,7 +7,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "fleets.hpp"
+#include "flight/fleets.hpp"
 #include "sim/lanes.hpp"
 
 namespace flappy::flight {

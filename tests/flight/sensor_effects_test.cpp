@@ -1,14 +1,13 @@
 // Effects of sensors in simulated flights: what the diagnosis undoes is what was done, a flapper without them sees as it did
 // without, and bits do not depend on the instruction set.
-#include "gap/sensor_effects.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "flight/fleet.hpp"
-#include "flight/fly.hpp"
-#include "flight/fly_fixture.hpp"
+#include "gap/replay/sensor_correction.hpp"
+#include "rollout/fly.hpp"
+#include "rollout/fly_fixture.hpp"
 #include "sim/kernels.hpp"
 
 namespace flappy::flight {
@@ -21,26 +20,27 @@ const gap::EffectValues kAll = {
     {"marker_offset", {{"x_m", 0.01}, {"y_m", -0.03}, {"z_m", 0.05}}}};
 
 /// The log of a flight without a controller, so that what is seen does not change what is flown.
-FlightLog open_loop(const gap::EffectValues& effects) {
+flightlog::FlightLog open_loop(const gap::EffectValues& effects) {
   const Folder folder;
   std::vector<std::string> overrides = {"flight.support=task", "flight.duration_s=1.0", "flight.settle_s=0",
                                         "world.ground_z_m=0", "constant_input.amplitude_V=10"};
   for (const auto& [id, values] : effects)
     for (const auto& [name, value] : values)
       overrides.push_back("vehicle.effects." + id + "." + name + "=" + std::to_string(value));
-  fly(read_fly_config(source_path("configs/fly/open_loop.toml"), overrides), {.log_folder = folder / "log"});
-  return read_flight_log(folder / "log");
+  rollout::fly(rollout::read_fly_config(source_path("configs/rollout::fly/open_loop.toml"), overrides),
+               {.log_folder = folder / "log"});
+  return flightlog::read_flight_log(folder / "log");
 }
 
-double farthest(const Column& a, const Column& b) {
+double farthest(const flightlog::Column& a, const flightlog::Column& b) {
   EXPECT_EQ(a.size(), b.size());
   double most = 0;
   for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i] - b[i]));
   return most;
 }
-double farthest(const FlightLog& a, const FlightLog& b) {
-  const MocapStream &m = a.mocap, &n = b.mocap;
-  const ImuStream &s = a.imu, &t = b.imu;
+double farthest(const flightlog::FlightLog& a, const flightlog::FlightLog& b) {
+  const flightlog::MocapStream &m = a.mocap, &n = b.mocap;
+  const flightlog::ImuStream &s = a.imu, &t = b.imu;
   return std::max({farthest(m.x_m, n.x_m), farthest(m.y_m, n.y_m), farthest(m.z_m, n.z_m), farthest(m.qw, n.qw),
                    farthest(m.qx, n.qx), farthest(m.qy, n.qy), farthest(m.qz, n.qz),
                    farthest(s.accel_x_m_s2, t.accel_x_m_s2), farthest(s.accel_y_m_s2, t.accel_y_m_s2),
@@ -51,19 +51,19 @@ double farthest(const FlightLog& a, const FlightLog& b) {
 // The lanes keep quaternions of length 1 to 1e-9, which an offset of 0.06 m sees; series are cut below 1e-13, and numbers up to
 // some hundred rounded.
 TEST(SensorEffects, AreUndoneByTheDiagnosis) {
-  const FlightLog plain = open_loop({});
+  const flightlog::FlightLog plain = open_loop({});
   ASSERT_GT(plain.imu.t_s.size(), 400u);
   for (const char* id : {"accelerometer_misalignment", "mocap_tilt", "marker_offset"}) {
     const gap::EffectValues one = {*kAll.find(id)};
-    const FlightLog seen = open_loop(one);
+    const flightlog::FlightLog seen = open_loop(one);
     EXPECT_GT(farthest(seen, plain), 0.009) << id;
     EXPECT_LT(farthest(gap::without(one, seen), plain), 1e-9) << id;
   }
   // The drift's mean stays, as part of the constant bias; the log begins one sample later than the flight, which changes the
   // rest by less than 0.3 rad/s x 2 ms / 0.5 s.
   const gap::EffectValues drift = {*kAll.find("gyro_bias")};
-  const FlightLog seen = open_loop(drift), back = gap::without(drift, seen);
-  const ImuStream &s = back.imu, &t = plain.imu;
+  const flightlog::FlightLog seen = open_loop(drift), back = gap::without(drift, seen);
+  const flightlog::ImuStream &s = back.imu, &t = plain.imu;
   const double left = s.gyro_y_rad_s[0] - t.gyro_y_rad_s[0];
   EXPECT_LT(left, -0.1);
   for (std::size_t i = 0; i < t.t_s.size(); ++i) EXPECT_NEAR(s.gyro_y_rad_s[i] - t.gyro_y_rad_s[i], left, 1.2e-3);
@@ -75,8 +75,9 @@ TEST(SensorEffects, AreUndoneByTheDiagnosis) {
 
 // From 0 when the flight starts: 1 - exp(-t / warm_up).
 TEST(SensorEffects, WarmUpFromTheStart) {
-  const FlightLog plain = open_loop({}), seen = open_loop({*kAll.find("gyro_bias")});
-  const double latency_s = read_fly_config(source_path("configs/fly/open_loop.toml")).fleet.sensors.imu.latency_s;
+  const flightlog::FlightLog plain = open_loop({}), seen = open_loop({*kAll.find("gyro_bias")});
+  const double latency_s =
+      rollout::read_fly_config(source_path("configs/fly/open_loop.toml")).fleet.sensors.imu.latency_s;
   for (std::size_t i = 0; i < plain.imu.t_s.size(); ++i) {
     const double t_s = plain.imu.t_s[i] - latency_s;
     EXPECT_NEAR(seen.imu.gyro_z_rad_s[i] - plain.imu.gyro_z_rad_s[i], 0.1 * (1 - std::exp(-t_s / 0.5)), 1e-8);
@@ -85,7 +86,7 @@ TEST(SensorEffects, WarmUpFromTheStart) {
 
 template <class T>
 Fleet<T> hover(std::size_t count, const std::string& set, bool beside) {
-  FlyConfig c = read_fly_config(kHover);
+  rollout::FlyConfig c = rollout::read_fly_config(kHover);
   c.fleet.batch.instruction_set = set;
   c.fleet.batch.threads = 1;
   Fleet<T> fleet(count, c.vehicle, c.fleet);

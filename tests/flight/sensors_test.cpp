@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "fleets.hpp"
+#include "flight/fleets.hpp"
 
 namespace flappy::flight {
 namespace {

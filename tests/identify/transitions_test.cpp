@@ -6,16 +6,16 @@
 #include <cmath>
 #include <limits>
 
-#include "flight/fly.hpp"
-#include "flight/fly_fixture.hpp"
 #include "io/csv.hpp"
+#include "rollout/fly.hpp"
+#include "rollout/fly_fixture.hpp"
 
 namespace flappy::identify {
 namespace {
 
-using flight::FlightLog;
 using flight::Folder;
 using flight::message;
+using flightlog::FlightLog;
 namespace fs = std::filesystem;
 
 /// Two flights of 4 s that take off and hover at 0.4 m.
@@ -23,13 +23,13 @@ class TransitionsTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<Folder>();
-    flight::FlyOptions options;
+    rollout::FlyOptions options;
     options.count = 2;
     options.log_folder = *folder_ / "flights";
-    flight::fly(flight::read_fly_config(flight::kHover, {"flight.duration_s=4"}), options);
+    rollout::fly(rollout::read_fly_config(flight::kHover, {"flight.duration_s=4"}), options);
     for (const std::string name : {"0000", "0001"}) {
       places().push_back(options.log_folder / name);
-      logs().push_back(flight::read_flight_log(places().back()));
+      logs().push_back(flightlog::read_flight_log(places().back()));
     }
   }
   static void TearDownTestSuite() {
@@ -270,7 +270,7 @@ TEST_F(TransitionsTest, LeavesOutWhereStreamsHaveGaps) {
     }
     std::erase_if(t, [](double x) { return x >= 2 && x <= 2.1; });
   };
-  flight::CommandStream& c = log.command;
+  flightlog::CommandStream& c = log.command;
   c.inputs.reset();
   c.phase_rad.reset();
   cut(c.t_s, {&c.left_voltage_V, &c.right_voltage_V});

@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "training.hpp"
+#include "learn/training.hpp"
 
 namespace flappy::learn {
 namespace {
@@ -15,14 +15,14 @@ namespace {
 constexpr int kSteps = 60;  // of 10 ms: every flight begins again
 
 /// A policy that stirs.
-std::shared_ptr<const flight::Actor> actor_of(const TrainConfig& c) {
-  flight::Actor a = c.blank_actor();
+std::shared_ptr<const policy::Actor> actor_of(const TrainConfig& c) {
+  policy::Actor a = c.blank_actor();
   a.widths = {static_cast<int>(a.observation.size()), 5, flight::kActions};
   a.mean.assign(a.observation.size(), 0);
   a.scale.assign(a.observation.size(), 0.3);
-  for (std::size_t k = 0; k < flight::weight_count(a.widths); ++k)
+  for (std::size_t k = 0; k < policy::weight_count(a.widths); ++k)
     a.weights.push_back(static_cast<double>(k * 29 % 61) / 128 - 0.25);
-  return std::make_shared<flight::Actor>(std::move(a));
+  return std::make_shared<policy::Actor>(std::move(a));
 }
 
 struct Collected {

@@ -8,7 +8,7 @@
 
 #include "learn/checkpoint.hpp"
 #include "learn/metrics.hpp"
-#include "training.hpp"
+#include "learn/training.hpp"
 
 namespace flappy::learn {
 namespace {
@@ -151,7 +151,7 @@ TEST(Trainer, LeavesARunFolder) {
   EXPECT_EQ(again.sha256, c.sha256);
   EXPECT_EQ(again.resolved, c.resolved);
   ASSERT_TRUE(again.fly.actor);
-  EXPECT_EQ(again.fly.actor->weights, flight::read_actor(folder / "best.json").weights);
+  EXPECT_EQ(again.fly.actor->weights, policy::read_actor(folder / "best.json").weights);
   // and what it costs is what was said
   const TrainCosts costs = costs_of(c);
   std::uintmax_t bytes = 0;
@@ -166,12 +166,12 @@ TEST(Trainer, StartsFromATrainedActor) {
   train_in(first, c);
   TrainOptions o;
   o.folder = second;
-  o.init = std::make_shared<flight::Actor>(flight::read_actor(first / "last.json"));
+  o.init = std::make_shared<policy::Actor>(policy::read_actor(first / "last.json"));
   o.keep_going = [](const TrainProgress&) { return false; };  // before it learns
   train(c, o);
-  EXPECT_EQ(flight::read_actor(second / "last.json").weights, o.init->weights);
+  EXPECT_EQ(policy::read_actor(second / "last.json").weights, o.init->weights);
 
-  const auto refused = [&](const std::shared_ptr<flight::Actor>& init, const char* why) {
+  const auto refused = [&](const std::shared_ptr<policy::Actor>& init, const char* why) {
     o.folder = fresh("refused");
     o.init = init;
     try {
@@ -181,7 +181,7 @@ TEST(Trainer, StartsFromATrainedActor) {
       EXPECT_NE(std::string(e.what()).find(why), std::string::npos) << e.what();
     }
   };
-  auto other = std::make_shared<flight::Actor>(*o.init);
+  auto other = std::make_shared<policy::Actor>(*o.init);
   other->scale[0] *= 2;
   refused(other, "scales its observations in another way");
   other->observation[0] = "something";
@@ -189,7 +189,7 @@ TEST(Trainer, StartsFromATrainedActor) {
   const TrainConfig wide = small_training({"networks.actor=[8]"});
   const fs::path third = fresh("third");
   train_in(third, wide, [](const TrainProgress&) { return false; });
-  refused(std::make_shared<flight::Actor>(flight::read_actor(third / "last.json")), "of the same networks");
+  refused(std::make_shared<policy::Actor>(policy::read_actor(third / "last.json")), "of the same networks");
 }
 
 TEST(Trainer, RefusesWhatDoesNotFit) {

@@ -7,50 +7,60 @@ another room brings in are its own affair.
 import re
 import sys
 import tempfile
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
-# What a room may include besides itself.
+BASE = {"io", "model", "sim"}
+FLIGHT = BASE | {"policy", "flight"}
+ROLLOUT = FLIGHT | {"flightlog", "flightlog/check", "rollout"}
+GAP = ROLLOUT | {"gap/replay", "gap/evidence", "gap/localise", "gap/diagnose"}
+# What a room may include besides itself. A folder is a room; a folder in it that is named here is a room of its own.
 ROOMS = {
     "io": set(),
     "model": {"io"},
-    "sim": {"model", "io"},
-    "flight": {"sim", "model", "io"},
-    "learn": {"deploy", "flight", "sim", "model", "io"},
-    "identify": {"flight", "sim", "model", "io"},
-    "gap": {"flight", "sim", "model", "io"},
-    "deploy": {"flight", "sim", "model", "io"},
-    "blind": {"flight", "sim", "model", "io"},
-    "oracle": {"blind", "gap", "flight", "sim", "model", "io"},
-    "predictor": {"gap", "flight", "sim", "model", "io"},
+    "sim": {"io", "model"},
+    "policy": BASE,
+    "flightlog": BASE,
+    "flightlog/check": {"io", "flightlog"},
+    "flight": BASE | {"policy"},
+    "rollout": FLIGHT | {"flightlog"},
+    "learn/lanes": BASE | {"policy", "learn"},
+    "learn": ROLLOUT | {"learn/lanes"},
+    "deploy": {"io"},
+    "deploy/header": ROLLOUT | {"deploy"},
+    "deploy/proof": {"io", "policy", "deploy"},
+    "identify": BASE | {"flightlog"},
+    "gap/replay": BASE | {"flight", "flightlog"},
+    "gap/evidence": BASE | {"flightlog", "gap/replay"},
+    "gap/localise": BASE | {"flightlog", "gap/replay", "gap/evidence"},
+    "gap/diagnose": ROLLOUT | {"gap/replay", "gap/evidence", "gap/localise"},
+    "blind": FLIGHT | {"flightlog"},
+    "benchmark": GAP | {"blind", "benchmark/predict"},
+    "benchmark/predict": GAP,  # answers the benchmark's questions, and knows nothing of who makes them
 }
-# Of a program, the file that answers the blind benchmark's questions: of the program it may know its own header, and of the
-# maker nothing.
-PREDICTOR = "tools/flappy_gap/blind_predict."
-# Files of a room, by how their names begin, that are a room of their own: who knows the blind robot's truth may look at both
-# sides, and neither side at him.
-APART = {("blind", "oracle"): "oracle"}
 # Rooms that may include no more than these files of others, and io: the blind robot shares neither physics nor effects
 # with what it is a test of, only plain data, the log, and what flies.
 ONLY = {
-    "blind": {"flight/flight_log.hpp", "flight/pid.hpp", "flight/episode.hpp", "flight/excitation.hpp", "model/wing_beat.hpp", "sim/randomise.hpp",
+    "blind": {"flightlog/flight_log.hpp", "flight/pid.hpp", "flight/episode.hpp", "flight/excitation.hpp", "model/wing_beat.hpp", "sim/randomise.hpp",
               "flappy/vehicle.hpp", "flappy/vehicle_file.hpp"},
 }
+# Programs that must not know a room: a diagnosis never sees the truth.
+IGNORANT = {"tools/flappy_gap": {"blind", "benchmark", "benchmark/predict"}}
 # Which room declares itself in which public header.
 PUBLIC = {"vehicle.hpp": "model", "vehicle_file.hpp": "model", "world.hpp": "sim", "batch.hpp": "sim"}
 TORCH = {"torch", "ATen", "c10", "caffe2"}
-MAY_USE_TORCH = {"deploy"}
+MAY_USE_TORCH = {"policy"}
 GENERATED = {"io/version.hpp"}
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTILINE)
 STANDARD = re.compile(r"[a-z][a-z0-9_]*")
 
 
-def room_of(folder, name):
-    """The room of a file `name` in src/`folder`; None if the folder is none."""
-    for (room, start), apart in APART.items():
-        if folder == room and name.startswith(start):
-            return apart
-    return folder if folder in ROOMS else None
+def room_of(path):
+    """The room of a path below src/: the deepest folder that is one; None if there is none."""
+    for folder in PurePosixPath(path).parents:
+        if str(folder) in ROOMS:
+            return str(folder)
+    return None
 
 
 def faults(root):
@@ -59,15 +69,15 @@ def faults(root):
     files = [p for folder in ("src", "include", "tools") for p in sorted((root / folder).rglob("*")) if p.suffix in (".hpp", ".cpp", ".h")]
     for path in files:
         where = path.relative_to(root)
-        if where.parts[0] == "tools" and not str(where).startswith(PREDICTOR):
-            continue
         public = where.parts[0] == "include"
-        if public:
+        if where.parts[0] == "tools":
+            room = "/".join(where.parts[:2])
+            if room not in IGNORANT:
+                continue
+        elif public:
             room = PUBLIC.get("/".join(where.parts[2:])) if where.parts[1] == "flappy" else None
-        elif where.parts[0] == "tools":
-            room = "predictor"
         else:
-            room = room_of(where.parts[1], "/".join(where.parts[2:]))
+            room = room_of("/".join(where.parts[1:]))
         if room is None:
             found.append(f"{where}: no known room; name it in {Path(__file__).name}")
             continue
@@ -83,8 +93,6 @@ def faults(root):
 def fault_of(root, room, public, bracket, name):
     """Why a file of `room` may not include `name`; None if it may."""
     first, _, rest = name.partition("/")
-    if room == "predictor" and name == "blind_predict.hpp":
-        return None
     if first in TORCH:
         return None if room in MAY_USE_TORCH else f"LibTorch belongs to {', '.join(sorted(MAY_USE_TORCH))}"
     if first == "flappy":
@@ -93,14 +101,16 @@ def fault_of(root, room, public, bracket, name):
         target = PUBLIC.get(rest)
     elif public:
         return None if bracket == "<" and STANDARD.fullmatch(name) else "a public header includes flappy/ and the standard library only"
-    elif first in ROOMS and rest:
+    elif room_of(name):
         if name not in GENERATED and not (root / "src" / name).exists():
             return "no such file"
-        target = room_of(first, rest)
+        target = room_of(name)
     else:
-        return None if bracket == "<" else "no known room"
+        return None if bracket == "<" or room in IGNORANT else "no known room"
     if target is None or target == room:
         return None
+    if room in IGNORANT:
+        return f"{room} must not know {target}" if target in IGNORANT[room] else None
     if room in ONLY and target != "io" and name not in ONLY[room]:
         return f"{room} may include io and {', '.join(sorted(ONLY[room]))} only"
     if target in ROOMS[room]:
@@ -116,7 +126,7 @@ def self_test():
             "src/flight/c.hpp": '#include "sim/b.hpp"\n', "src/sim/b.hpp": ""}
     cases = [
         ({}, None),
-        ({"src/deploy/d.cpp": '#include <torch/script.h>\n#include "flight/c.hpp"\n'}, None),
+        ({"src/policy/d.cpp": '#include <torch/script.h>\n#include "sim/b.hpp"\n'}, None),
         ({"src/model/x.hpp": '#pragma once\n#include "sim/b.hpp"\n'}, "src/model/x.hpp:2: sim/b.hpp: model may include io, not sim"),
         ({"src/model/x.hpp": "#  include <sim/b.hpp>\n"}, "not sim"),
         ({"src/model/x.hpp": '#include "flappy/batch.hpp"\n'}, "not sim"),
@@ -126,21 +136,24 @@ def self_test():
         ({"src/blind/x.cpp": '#include "flight/c.hpp"\n'}, "flight/c.hpp: blind may include io and"),
         ({"src/blind/x.cpp": '#include "flappy/batch.hpp"\n'}, "flappy/batch.hpp: blind may include io and"),
         ({"src/blind/x.cpp": '#include "flappy/vehicle.hpp"\n#include "io/files.hpp"\n#include "blind/y.hpp"\n', "src/blind/y.hpp": ""}, None),
-        ({"src/blind/oracle.cpp": '#include "gap/b.hpp"\n#include "blind/oracle_y.hpp"\n#include "blind/y.hpp"\n',
-          "src/blind/oracle_y.hpp": "", "src/blind/y.hpp": "", "src/gap/b.hpp": ""}, None),
-        ({"src/blind/x.cpp": '#include "gap/b.hpp"\n', "src/gap/b.hpp": ""}, "gap/b.hpp: blind may include io and"),
-        ({"src/blind/x.cpp": '#include "blind/oracle.hpp"\n', "src/blind/oracle.hpp": ""}, "blind/oracle.hpp: blind may include io and"),
-        ({"src/gap/x.cpp": '#include "blind/oracle.hpp"\n', "src/blind/oracle.hpp": ""}, "not oracle"),
-        ({"src/deploy/x.cpp": '#include "learn/d.hpp"\n', "src/learn/d.hpp": ""}, "not learn"),
-        ({"src/learn/x.cpp": '#include "deploy/d.hpp"\n', "src/deploy/d.hpp": '#include "flight/c.hpp"\n'}, None),
-        ({"src/deploy/x.cpp": '#include "gap/b.hpp"\n', "src/gap/b.hpp": ""}, "deploy may include flight, io, model, sim, not gap"),
-        ({"src/flight/x.cpp": "#include <torch/script.h>\n"}, "LibTorch belongs to deploy"),
-        ({"src/learn/x.cpp": "#include <torch/torch.h>\n"}, "LibTorch belongs to deploy"),
+        ({"src/benchmark/x.cpp": '#include "gap/replay/b.hpp"\n#include "blind/y.hpp"\n', "src/blind/y.hpp": "", "src/gap/replay/b.hpp": ""}, None),
+        ({"src/benchmark/predict/x.cpp": '#include "gap/replay/b.hpp"\n', "src/gap/replay/b.hpp": ""}, None),
+        ({"src/benchmark/predict/x.cpp": '#include "blind/y.hpp"\n', "src/blind/y.hpp": ""}, "not blind"),
+        ({"src/benchmark/predict/x.cpp": '#include "benchmark/y.hpp"\n', "src/benchmark/y.hpp": ""}, "not benchmark"),
+        ({"src/blind/x.cpp": '#include "gap/replay/b.hpp"\n', "src/gap/replay/b.hpp": ""}, "gap/replay/b.hpp: blind may include io and"),
+        ({"src/gap/diagnose/x.cpp": '#include "benchmark/y.hpp"\n', "src/benchmark/y.hpp": ""}, "not benchmark"),
+        ({"src/gap/replay/x.cpp": '#include "gap/evidence/y.hpp"\n', "src/gap/evidence/y.hpp": ""}, "not gap/evidence"),
+        ({"src/gap/x.cpp": ""}, "src/gap/x.cpp: no known room"),
+        ({"src/deploy/header/x.cpp": '#include "learn/d.hpp"\n', "src/learn/d.hpp": ""}, "not learn"),
+        ({"src/learn/x.cpp": '#include "deploy/d.hpp"\n', "src/deploy/d.hpp": ""}, "not deploy"),
+        ({"src/flightlog/check/x.cpp": '#include "sim/b.hpp"\n'}, "flightlog/check may include flightlog, io, not sim"),
+        ({"src/flight/x.cpp": "#include <torch/script.h>\n"}, "LibTorch belongs to policy"),
+        ({"src/learn/x.cpp": "#include <torch/torch.h>\n"}, "LibTorch belongs to policy"),
         ({"src/attic/x.cpp": ""}, "src/attic/x.cpp: no known room"),
-        ({"tools/flappy_gap/main.cpp": '#include "blind/y.hpp"\n'}, None),
-        ({"tools/flappy_gap/blind_predict.cpp": '#include "blind_predict.hpp"\n#include "flappy/vehicle.hpp"\n#include "io/files.hpp"\n'}, None),
-        ({"tools/flappy_gap/blind_predict.cpp": '#include "blind/y.hpp"\n', "src/blind/y.hpp": ""}, "predictor may include flight, gap, io, model, sim, not blind"),
-        ({"tools/flappy_gap/blind_predict.cpp": '#include "blind_records.hpp"\n'}, "no known room"),
+        ({"tools/flappy_blind/main.cpp": '#include "blind/y.hpp"\n', "src/blind/y.hpp": ""}, None),
+        ({"tools/flappy_gap/main.cpp": '#include "gap/diagnose/y.hpp"\n#include "command.hpp"\n', "src/gap/diagnose/y.hpp": ""}, None),
+        ({"tools/flappy_gap/main.cpp": '#include "blind/y.hpp"\n', "src/blind/y.hpp": ""}, "tools/flappy_gap must not know blind"),
+        ({"tools/flappy_gap/main.cpp": '#include "benchmark/y.hpp"\n', "src/benchmark/y.hpp": ""}, "tools/flappy_gap must not know benchmark"),
         ({"src/loose.cpp": ""}, "no known room"),
         ({"src/sim/x.cpp": '#include "b.hpp"\n'}, "no known room"),
         ({"src/sim/x.cpp": '#include "model/gone.hpp"\n'}, "no such file"),

@@ -91,7 +91,7 @@ file(WRITE ${WORK}/bad/mocap.csv "t_s,x_mm,y_m,z_m,qw,qx,qy,qz\n")
 expect_refused("${WORK}/bad/mocap.csv:1: x_mm: unknown column; accepted here with another unit: \"x_m\"" check ${WORK}/bad)
 file(REMOVE ${WORK}/bad/flight.toml)
 expect_refused("${WORK}/bad/flight.toml: cannot be read: No such file or directory" check ${WORK}/bad)
-expect_refused("flappy-gap: A subcommand is required; accepted: check, diagnose, blind; see flappy-gap --help")
+expect_refused("flappy-gap: A subcommand is required; accepted: check, diagnose; see flappy-gap --help")
 expect_refused("flappy-gap: flight is required; see flappy-gap --help" check)
 set(diagnose diagnose --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --priors ${SOURCE}/configs/gap/priors.toml
   --flights ${WORK}/good)

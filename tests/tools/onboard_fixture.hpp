@@ -5,22 +5,22 @@
 
 #include <random>
 
-#include "deploy/board.hpp"
-#include "deploy/controller_header.hpp"
-#include "deploy/policy_header.hpp"
-#include "deploy/rollout.hpp"
+#include "deploy/header/controller_header.hpp"
+#include "deploy/header/policy_header.hpp"
+#include "deploy/header/policy_vectors.hpp"
+#include "deploy/proof/board.hpp"
 #include "tools/onboard_loop.hpp"
 
 namespace flappy::deploy {
 
-using flight::FlyConfig;
 using flight::Folder;
 using flight::source_path;
+using rollout::FlyConfig;
 using Words = std::vector<std::string>;
 
 /// Keeps roll, pitch and height much as the feedback would, besides small weights of everything it sees.
-inline std::shared_ptr<const flight::Actor> upright_actor(const flight::Task& task) {
-  flight::Actor a;
+inline std::shared_ptr<const policy::Actor> upright_actor(const flight::Task& task) {
+  policy::Actor a;
   a.task = task.name;
   std::mt19937 random(3);
   for (const auto& s : task.observation()) a.observation.push_back(s.name);
@@ -43,7 +43,7 @@ inline std::shared_ptr<const flight::Actor> upright_actor(const flight::Task& ta
       a.weights.push_back(w);
     }
   }
-  return std::make_shared<const flight::Actor>(a);
+  return std::make_shared<const policy::Actor>(a);
 }
 
 /// A short way, which the feedback can go if the policy does not.
@@ -51,7 +51,7 @@ inline const Words kShort = {"task.start.position_m.x=-0.05", "task.start.x_low_
                              "task.start.rotation_rad.z=0.1", "task.hand_back.distance_m=0.01"};
 
 inline FlyConfig escape(const Words& overrides = kShort) {
-  FlyConfig c = flight::read_fly_config(source_path("configs/fly/escape.toml"), overrides);
+  FlyConfig c = rollout::read_fly_config(source_path("configs/fly/escape.toml"), overrides);
   c.actor = upright_actor(c.fleet.task);
   return c;
 }
@@ -61,11 +61,11 @@ inline FlyConfig of_nominal(FlyConfig config) {
   return config;
 }
 
-inline const RunInfo kRun{std::string(64, 'a'), "0123456789ab", false, "escape"};
+inline const policy::RunInfo kRun{std::string(64, 'a'), "0123456789ab", false, "escape"};
 
 inline std::string policy_text(const FlyConfig& config) {
-  const PolicyNetwork network = network_of(config);
-  PolicyVectors v = some_of(roll_out(config, 0, 4), 20);
+  const policy::PolicyNetwork network = network_of(config);
+  policy::PolicyVectors v = some_of(roll_out(config, 0, 4), 20);
   append(v, corners(network, config.fleet.task.observation()));
   v.action = evaluate(network, v.observation);
   return policy_header(config, kRun, network, v);

@@ -17,9 +17,9 @@
 #include <stdexcept>
 
 #include "flight/flight_block.hpp"
-#include "flight/fly_fixture.hpp"
-#include "flight/recorder.hpp"
 #include "hal_simulated.h"
+#include "rollout/fly_fixture.hpp"
+#include "rollout/recorder.hpp"
 
 namespace flappy::deploy {
 
@@ -124,7 +124,7 @@ struct Script {
 /// A flapper whose inputs come from a loop; it starts at rest where the task begins.
 class LedFlight {
  public:
-  LedFlight(const flight::FlyConfig& config, std::uint32_t flapper, const std::vector<std::string>& program)
+  LedFlight(const rollout::FlyConfig& config, std::uint32_t flapper, const std::vector<std::string>& program)
       : program_(program), latency_(config.fleet.sensors), fleet_(1, config.vehicle_of(flapper), led(config, flapper)) {
     place(fleet_, config);
     const double nothing[flight::kActions] = {};
@@ -138,7 +138,7 @@ class LedFlight {
     return o;
   }
   /// At rest in the air where the task begins; the estimate is off by a pose's noise.
-  static void place(flight::Fleet<float>& fleet, const flight::FlyConfig& config) {
+  static void place(flight::Fleet<float>& fleet, const rollout::FlyConfig& config) {
     const flight::StartRange& start = config.fleet.task.start;
     sim::FlapperState s{};
     for (int i = 0; i < 3; ++i) s.position_m[i] = start.position_m[i].centre;
@@ -185,7 +185,7 @@ class LedFlight {
     const float* u = said_.input;
     fleet_.set_added(0, {u[0], u[1], u[2], u[3]});
     fly(script);
-    const auto updates = driver_updates(fleet_, 0);
+    const auto updates = rollout::driver_updates(fleet_, 0);
     if (held > 0) return true;
     bool same = updates.size() == said_.drive_count;
     for (std::size_t d = 0; same && d < updates.size(); ++d) {
@@ -215,7 +215,7 @@ class LedFlight {
     std::vector<float> x;
   };
 
-  static flight::FleetOptions led(const flight::FlyConfig& config, std::uint32_t flapper) {
+  static flight::FleetOptions led(const rollout::FlyConfig& config, std::uint32_t flapper) {
     flight::FleetOptions o = with_number(config.fleet, flapper);
     o.controller = {};
     return o;

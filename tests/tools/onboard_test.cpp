@@ -133,14 +133,14 @@ TEST(Onboard, FliesAnyPolicyAsTheLanesDo) {
   // with its turn, several samples in a control period, and a tracker that does not always see
   FlyConfig config = escape({"sensors.mocap.loss_probability=0.1", "sensors.mocap.loss_length=1.5",
                              "sensors.imu.rate_hz=1000.0", "sensors.mocap.rate_hz=750.0"});
-  flight::Actor a = *config.actor;
+  policy::Actor a = *config.actor;
   a.widths = {static_cast<int>(a.observation.size()), 16, 16, flight::kActions};
-  a.hidden = flight::Activation::relu;
+  a.hidden = policy::Activation::relu;
   std::mt19937 random(7);
   a.weights.clear();
-  for (std::size_t i = 0; i < flight::weight_count(a.widths); ++i)
+  for (std::size_t i = 0; i < policy::weight_count(a.widths); ++i)
     a.weights.push_back(0.6 * (static_cast<double>(random()) / 0x1p31 - 1));
-  config.actor = std::make_shared<const flight::Actor>(a);
+  config.actor = std::make_shared<const policy::Actor>(a);
   Loop loop({policy_text(config), controller_text(config)});
   ASSERT_EQ(loop.build("gcc"), "");
   for (std::uint32_t flapper = 0; flapper < 3; ++flapper) fly_as_the_lanes(config, flapper, loop.program());

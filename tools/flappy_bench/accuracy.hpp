@@ -9,7 +9,7 @@
 namespace flappy::bench {
 
 /// Converged mean thrust at 10 V of the nominal vehicle, torso welded, hard stops, N: two independent engines
-/// with hard stops tend to 0.12585 and 0.12586 (tests/oracle), the published study to 0.1258.
+/// with hard stops tend to 0.12585 and 0.12586 (tests/reference), the published study to 0.1258.
 inline constexpr double kConvergedThrust_N = 0.1258;
 
 struct Flight {

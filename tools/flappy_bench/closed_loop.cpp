@@ -12,13 +12,13 @@ constexpr double kControl_hz = 500;
 io::Table table(const std::string& path) { return io::Config::load(path).root(); }
 
 /// An actor of the usual size that does nothing: its weights are zero, its time is not.
-std::shared_ptr<const flight::Actor> idle_actor(const flight::Task& task) {
-  auto actor = std::make_shared<flight::Actor>();
+std::shared_ptr<const policy::Actor> idle_actor(const flight::Task& task) {
+  auto actor = std::make_shared<policy::Actor>();
   const int inputs = static_cast<int>(task.observation().size());
   for (const flight::Signal& s : task.observation()) actor->observation.push_back(s.name);
   for (const flight::Signal& s : task.action()) actor->action.push_back(s.name);
   actor->widths = {inputs, 32, 32, flight::kActions};
-  actor->weights.assign(flight::weight_count(actor->widths), 0);
+  actor->weights.assign(policy::weight_count(actor->widths), 0);
   actor->mean.assign(static_cast<std::size_t>(inputs), 0);
   actor->scale.assign(static_cast<std::size_t>(inputs), 1);
   return actor;

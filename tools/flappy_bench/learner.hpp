@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "learn/learner.hpp"
+#include "learn/lanes/learner.hpp"
 #include "speed.hpp"
 
 namespace flappy::bench {

@@ -9,7 +9,7 @@
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/toml_writer.hpp"
-#include "learn/evaluation.hpp"
+#include "rollout/evaluation.hpp"
 
 namespace flappy::eval {
 namespace {
@@ -17,10 +17,10 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 using flight::Controller;
-using flight::FlyConfig;
-using learn::Rate;
-using learn::Spread;
-using learn::Summary;
+using rollout::FlyConfig;
+using rollout::Rate;
+using rollout::Spread;
+using rollout::Summary;
 using Number = std::optional<double>;
 
 constexpr std::size_t kNominalFlights = 20;
@@ -57,7 +57,7 @@ FlyConfig read_config(const Request& r) {
   if (!r.vehicle.empty()) overrides.push_back(file_override("vehicle", r.vehicle));
   if (!r.task.empty()) overrides.push_back(file_override("task", r.task));
   overrides.insert(overrides.end(), r.overrides.begin(), r.overrides.end());
-  FlyConfig c = flight::read_fly_config(config, overrides);
+  FlyConfig c = rollout::read_fly_config(config, overrides);
   if (fs::is_directory(policy) && !c.actor)
     throw io::InputError(config.string() + ": actor: is missing; accepted: the trained actor's file");
   c.fleet.seed = r.seed;
@@ -79,42 +79,42 @@ class Evaluation {
   Evaluation(const Request& request, const FlyConfig& config)
       : config_(config),
         options_{.count = request.episodes,
-                 .first_flapper = request.stream == "test" ? learn::kTestFlappers : learn::kValidationFlappers},
+                 .first_flapper = request.stream == "test" ? rollout::kTestFlappers : rollout::kValidationFlappers},
         evaluator_(config, options_),
-        nominal_(learn::nominal(config), nominal_options()) {}
+        nominal_(rollout::nominal(config), nominal_options()) {}
 
-  Column fly_policy(const learn::Pilot& pilot) { return fly("policy", evaluator_, nominal_, pilot); }
+  Column fly_policy(const rollout::Pilot& pilot) { return fly("policy", evaluator_, nominal_, pilot); }
 
   /// The vehicles of the policy, hovering under this controller and flown by it alone.
   Column fly_alone(const char* name, const Controller& controller) {
     if (controller.kind == config_.fleet.controller.kind) return fly(name, evaluator_, nominal_, {});
     FlyConfig other = config_;
     other.fleet.controller = controller;
-    learn::Evaluator evaluator(other, options_), nominal(learn::nominal(other), nominal_options());
+    rollout::Evaluator evaluator(other, options_), nominal(rollout::nominal(other), nominal_options());
     return fly(name, evaluator, nominal, {});
   }
 
  private:
-  learn::EvaluationOptions nominal_options() const {
-    learn::EvaluationOptions o = options_;
+  rollout::EvaluationOptions nominal_options() const {
+    rollout::EvaluationOptions o = options_;
     o.count = kNominalFlights;
     return o;
   }
 
-  Column fly(const char* name, learn::Evaluator& evaluator, learn::Evaluator& nominal,
-             const learn::Pilot& pilot) const {
+  Column fly(const char* name, rollout::Evaluator& evaluator, rollout::Evaluator& nominal,
+             const rollout::Pilot& pilot) const {
     io::ProgressLine progress(std::string(name) + " flown");
     Column column{.name = name, .asked = options_.count};
     const auto keep_going = [&](double done) {
       progress.show(done);
       return !io::interrupted();
     };
-    const learn::Evaluation few = nominal.fly(pilot, learn::Detail::full, keep_going);
-    column.nominal = learn::summarise(few.flights);
+    const rollout::Evaluation few = nominal.fly(pilot, rollout::Detail::full, keep_going);
+    column.nominal = rollout::summarise(few.flights);
     column.stopped = few.stopped;
     if (few.stopped) return column;
-    const learn::Evaluation all = evaluator.fly(pilot, learn::Detail::full, keep_going);
-    column.flights = learn::summarise(all.flights);
+    const rollout::Evaluation all = evaluator.fly(pilot, rollout::Detail::full, keep_going);
+    column.flights = rollout::summarise(all.flights);
     column.stopped = all.stopped;
     column.wall_s = few.wall_s + all.wall_s;
     column.steps = few.steps + all.steps;
@@ -122,8 +122,8 @@ class Evaluation {
   }
 
   const FlyConfig& config_;
-  learn::EvaluationOptions options_;
-  learn::Evaluator evaluator_, nominal_;
+  rollout::EvaluationOptions options_;
+  rollout::Evaluator evaluator_, nominal_;
 };
 
 Number finite(Number x) { return x && std::isfinite(*x) ? x : std::nullopt; }
@@ -171,11 +171,11 @@ void print_failures(const std::vector<Column>& columns) {
       if (c == '_') c = ' ';
     return name;
   };
-  for (std::size_t k = 1; k < learn::kFailures; ++k) {
-    const auto failure = static_cast<learn::Failure>(k);
+  for (std::size_t k = 1; k < rollout::kFailures; ++k) {
+    const auto failure = static_cast<rollout::Failure>(k);
     count("failed: " + shown(name_of(failure)), [&](const Column& c) { return c.flights.failures[k]; });
-    for (std::size_t d = 0; d < learn::kDemands && failure == learn::Failure::never_captured; ++d)
-      count("  missing most: " + shown(name_of(static_cast<learn::Demand>(d))),
+    for (std::size_t d = 0; d < rollout::kDemands && failure == rollout::Failure::never_captured; ++d)
+      count("  missing most: " + shown(name_of(static_cast<rollout::Demand>(d))),
             [&](const Column& c) { return c.flights.missing[d]; });
   }
 }
@@ -245,10 +245,10 @@ Json json_of(const Column& c) {
   json["final_heading_error_p90_deg"] = or_null(times(s.heading_error_rad.p90, kDegrees));
   put_spread(json, "energy", "J", s.energy_J);
   put_spread(json, "mean_power", "W", s.power_W);
-  for (std::size_t k = 1; k < learn::kFailures; ++k)
-    json["failures"][name_of(static_cast<learn::Failure>(k))] = s.failures[k];
-  for (std::size_t d = 0; d < learn::kDemands; ++d)
-    json["never_captured_missing"][name_of(static_cast<learn::Demand>(d))] = s.missing[d];
+  for (std::size_t k = 1; k < rollout::kFailures; ++k)
+    json["failures"][name_of(static_cast<rollout::Failure>(k))] = s.failures[k];
+  for (std::size_t d = 0; d < rollout::kDemands; ++d)
+    json["never_captured_missing"][name_of(static_cast<rollout::Demand>(d))] = s.missing[d];
   json["nominal"] = {{"episodes", c.nominal.flights},
                      {"success_rate", or_null(if_flown(c.nominal, c.nominal.success.value))},
                      {"strict_rate", or_null(if_flown(c.nominal, c.nominal.strict.value))}};
@@ -295,9 +295,9 @@ void evaluate(const Request& request, const io::Program& program) {
   }
   const FlyConfig config = read_config(request);
   const flight::Task& task = config.fleet.task;
-  std::unique_ptr<const deploy::Policy> policy;
+  std::unique_ptr<const policy::Policy> policy;
   if (kind == ".pt" || kind == ".h")
-    policy = deploy::load_policy(path, static_cast<int>(task.observation().size()), flight::kActions);
+    policy = policy::load_policy(path, static_cast<int>(task.observation().size()), flight::kActions);
   std::vector<std::pair<const char*, Controller>> alone;
   if (!request.no_baselines)
     alone = {{"PID alone", controller_named("pid", config)}, {"ARC alone", controller_named("arc", config)}};
@@ -319,7 +319,7 @@ int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-eval", "Flies a policy on randomised vehicles, scored beside PID and ARC alone.",
                       {"instruction set " + sim::best_instruction_set(),
-                       std::string("TorchScript ") + (deploy::reads_torch_script() ? "yes" : "no")});
+                       std::string("TorchScript ") + (policy::reads_torch_script() ? "yes" : "no")});
   CLI::App& app = program.app();
   eval::Request r;
   app.add_option("policy", r.policy, eval::kPolicies)->required();

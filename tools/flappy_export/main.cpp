@@ -4,22 +4,22 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "deploy/controller_header.hpp"
-#include "deploy/policy_header.hpp"
-#include "deploy/proof.hpp"
-#include "deploy/rollout.hpp"
-#include "deploy/temporary_folder.hpp"
-#include "deploy/torch_script.hpp"
+#include "deploy/header/controller_header.hpp"
+#include "deploy/header/policy_header.hpp"
+#include "deploy/header/policy_vectors.hpp"
+#include "deploy/proof/proof.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
+#include "io/temporary_folder.hpp"
 #include "learn/run_folder.hpp"
+#include "policy/torch_script.hpp"
 
 namespace flappy::exports {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-using deploy::PolicyVectors;
+using policy::PolicyVectors;
 
 /// Flights whose observations become test vectors, those that the headers are proven on, and those that 8 bits are fitted to.
 constexpr std::size_t kProofFlights = 64, kFitFlights = 512;
@@ -42,10 +42,10 @@ template <class Network>
 void add_header(Export& e, const std::string& name, const learn::FinishedRun& run, const Network& network,
                 const PolicyVectors& tests) {
   PolicyVectors own = tests;
-  own.action = evaluate(network, own.observation);
-  e.files[name] = policy_header(run.fly, run.info, network, own);
-  own = some_of(e.flown, kProofVectors);
-  own.action = evaluate(network, own.observation);
+  own.action = deploy::evaluate(network, own.observation);
+  e.files[name] = deploy::policy_header(run.fly, run.info, network, own);
+  own = deploy::some_of(e.flown, kProofVectors);
+  own.action = deploy::evaluate(network, own.observation);
   e.proofs[name] = own;
 }
 
@@ -92,7 +92,7 @@ void write_all(const fs::path& folder, const std::map<std::string, std::string>&
 
 void run(const Request& request, const io::Program& program) {
   const learn::FinishedRun run = learn::read_finished_run(request.run);
-  const deploy::PolicyNetwork network = deploy::network_of(run.fly);
+  const policy::PolicyNetwork network = deploy::network_of(run.fly);
   const auto signals = run.fly.fleet.task.observation();
   Export e;
   e.files["flappy_controller.h"] = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
@@ -101,25 +101,25 @@ void run(const Request& request, const io::Program& program) {
   if (!std::ranges::all_of(e.flown.action, [](float x) { return std::isfinite(x); }))
     throw io::InputError((fs::path(request.run) / "best.json").string() +
                          ": adds what is not finite in flight; accepted: a policy that flies");
-  PolicyVectors tests = some_of(e.flown, kTestVectors);
-  append(tests, deploy::corners(network, signals));
+  PolicyVectors tests = deploy::some_of(e.flown, kTestVectors);
+  deploy::append(tests, deploy::corners(network, signals));
   Json json = {{"run", request.run}, {"out", request.out}, {"config_sha256", run.info.config_sha256}};
 
   add_header(e, "flappy_policy.h", run, network, tests);
   if (request.int8) {
-    const PolicyVectors fit = some_of(deploy::roll_out(run.fly, kProofFlights, kFitFlights), kFitVectors);
+    const PolicyVectors fit = deploy::some_of(deploy::roll_out(run.fly, kProofFlights, kFitFlights), kFitVectors);
     const deploy::QuantisedNetwork whole = deploy::quantise(network, fit.observation);
     add_header(e, "flappy_policy_int8.h", run, whole, tests);
     const OutputError error = output_error(evaluate(whole, e.flown.observation), e.flown.action, network.half);
     print("8 bits differ by at most", error, run.fly.fleet.task.action());
     json["int8_error"] = json_of(error);
   }
-  const deploy::TemporaryFolder work;
-  if (deploy::reads_torch_script()) {
-    e.files["policy.pt"] = deploy::torch_script(network, deploy::contract_text(run.fly, run.info));
+  const io::TemporaryFolder work;
+  if (policy::reads_torch_script()) {
+    e.files["policy.pt"] = policy::torch_script(network, deploy::contract_text(run.fly, run.info));
     io::write_atomically(work / "policy.pt", e.files["policy.pt"]);
     std::vector<float> action(e.flown.action.size());
-    deploy::load_policy(work / "policy.pt", network.inputs(), network.outputs())
+    policy::load_policy(work / "policy.pt", network.inputs(), network.outputs())
         ->act(e.flown.rows(), e.flown.observation.data(), action.data());
     const OutputError error = output_error(action, e.flown.action, network.half);
     print("TorchScript differs by at most", error, run.fly.fleet.task.action());
@@ -164,7 +164,7 @@ void run(const Request& request, const io::Program& program) {
 int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-export", "Exports a finished run as TorchScript and as C headers that prove themselves.",
-                      {std::string("TorchScript ") + (deploy::reads_torch_script() ? "yes" : "no")});
+                      {std::string("TorchScript ") + (policy::reads_torch_script() ? "yes" : "no")});
   exports::Request r;
   program.app().add_option("run", r.run, "run folder that flappy-train left")->required();
   program.app().add_option("--out", r.out, "folder for what is exported")->required();

@@ -5,9 +5,9 @@
 #include <numbers>
 #include <optional>
 
-#include "flight/fly.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "rollout/fly.hpp"
 
 namespace flappy::fly {
 namespace {
@@ -20,12 +20,12 @@ constexpr const char* kEnds[6] = {"time_out", "contact", "not_finite", "out_of_b
 constexpr const char* kKeys[6] = {"rms_roll_deg", "rms_pitch_deg", "rms_yaw_deg", "rms_x_mm", "rms_y_mm", "rms_z_mm"};
 
 /// Degrees and millimetres.
-Errors shown(Errors e) {
+rollout::Errors shown(rollout::Errors e) {
   for (std::size_t k = 0; k < e.size(); ++k) e[k] *= k < 3 ? 180 / std::numbers::pi : 1000;
   return e;
 }
 
-void print_row(const std::string& name, const Errors& e) {
+void print_row(const std::string& name, const rollout::Errors& e) {
   std::printf("  %-22s", name.c_str());
   for (std::size_t k = 0; k < e.size(); ++k) {
     if (std::isfinite(e[k])) std::printf(k < 3 ? "%8.2f" : "%8.1f", e[k]);
@@ -40,7 +40,7 @@ std::string hexadecimal(std::uint64_t value) {
   return text;
 }
 
-void print_score(const FlyConfig& config, const FlightSummary& s) {
+void print_score(const rollout::FlyConfig& config, const rollout::FlightSummary& s) {
   std::printf("  %-22s", "rms in degrees and mm");
   for (const char* axis : kAxes) std::printf("%8s", axis);
   std::printf("\n");
@@ -53,11 +53,12 @@ void print_score(const FlyConfig& config, const FlightSummary& s) {
     print_row("paper, simulation", {1.60, 3.86, 4.79, 36.5, 38.7, 26.9});
   }
   if (s.crashed > 0) std::printf("  over the %zu flights that did not crash\n", s.flights - s.crashed);
-  std::printf("  never farther than %g m: %.2f %%; crashed: %zu\n", kFarAway_m, 100 * s.within_share, s.crashed);
-  for (std::size_t k = 0; k < kFailures; ++k) {
-    const FailureCount& f = s.failures[k];
+  std::printf("  never farther than %g m: %.2f %%; crashed: %zu\n", rollout::kFarAway_m, 100 * s.within_share,
+              s.crashed);
+  for (std::size_t k = 0; k < rollout::kFlightFailures; ++k) {
+    const rollout::FailureCount& f = s.failures[k];
     if (f.flights == 0) continue;
-    std::string name = name_of(static_cast<Failure>(k));
+    std::string name = name_of(static_cast<rollout::FlightFailure>(k));
     for (char& c : name)
       if (c == '_') c = ' ';
     std::printf("  %zu %s: flight %zu first, at %.2f s; half of them by %.2f s, the last at %.2f s\n", f.flights,
@@ -65,17 +66,17 @@ void print_score(const FlyConfig& config, const FlightSummary& s) {
   }
 }
 
-void print_success(const FlyResult& r) {
+void print_success(const rollout::FlyResult& r) {
   const auto n = static_cast<double>(r.summary.flights);
   std::printf("  captured the goal: %.2f %%; and kept it: %.2f %%\n", 100 * static_cast<double>(r.capture_s.size()) / n,
               100 * static_cast<double>(r.successes) / n);
   if (!r.capture_s.empty())
-    std::printf("  time to capture, 10 / 50 / 90 %%: %.3f %.3f %.3f s\n", *quantile(r.capture_s, 0.1),
-                *quantile(r.capture_s, 0.5), *quantile(r.capture_s, 0.9));
+    std::printf("  time to capture, 10 / 50 / 90 %%: %.3f %.3f %.3f s\n", *rollout::quantile(r.capture_s, 0.1),
+                *rollout::quantile(r.capture_s, 0.5), *rollout::quantile(r.capture_s, 0.9));
 }
 
-void print(const FlyConfig& config, const FlyOptions& options, const FlyResult& r) {
-  const FlightSummary& s = r.summary;
+void print(const rollout::FlyConfig& config, const rollout::FlyOptions& options, const rollout::FlyResult& r) {
+  const rollout::FlightSummary& s = r.summary;
   if (r.stopped) std::printf("stopped: %zu of %zu flights, the last at %g s\n", s.flights, options.count, r.flown_s);
   std::printf("%zu flight%s of %g s, task %s, seed %llu, %s\n", s.flights, s.flights == 1 ? "" : "s", config.duration_s,
               config.fleet.task.name.c_str(), static_cast<unsigned long long>(config.fleet.seed),
@@ -94,10 +95,10 @@ void print(const FlyConfig& config, const FlyOptions& options, const FlyResult& 
               r.steps * config.fleet.batch.step_s / r.wall_s, hexadecimal(r.hash).c_str());
 }
 
-Json json_of(const FlyConfig& config, const FlyOptions& options, const FlyResult& r) {
-  const FlightSummary& s = r.summary;
+Json json_of(const rollout::FlyConfig& config, const rollout::FlyOptions& options, const rollout::FlyResult& r) {
+  const rollout::FlightSummary& s = r.summary;
   Json json;
-  const Errors settled = shown(s.settled), takeoff = shown(s.takeoff);  // not a number becomes null
+  const rollout::Errors settled = shown(s.settled), takeoff = shown(s.takeoff);  // not a number becomes null
   for (std::size_t k = 0; k < 6; ++k) json[kKeys[k]] = settled[k];
   for (std::size_t k = 0; k < 6; ++k) json[std::string(kKeys[k]) + "_takeoff"] = takeoff[k];
   json["crashed"] = s.crashed;
@@ -110,10 +111,10 @@ Json json_of(const FlyConfig& config, const FlyOptions& options, const FlyResult
   json["task"] = config.fleet.task.name;
   json["stopped"] = r.stopped;
   json["failed"] = s.failed;
-  for (std::size_t k = 1; k < kFailures; ++k) {
-    const FailureCount& f = s.failures[k];
+  for (std::size_t k = 1; k < rollout::kFlightFailures; ++k) {
+    const rollout::FailureCount& f = s.failures[k];
     const auto when = [&](double t_s) { return f.flights > 0 ? Json(t_s) : Json(nullptr); };
-    json["failures"][name_of(static_cast<Failure>(k))] = {
+    json["failures"][name_of(static_cast<rollout::FlightFailure>(k))] = {
         {"flights", f.flights},
         {"first_flight", f.flights > 0 ? Json(config.fleet.first_flapper + f.first_flight) : Json(nullptr)},
         {"first_s", when(f.first_s)},
@@ -125,9 +126,9 @@ Json json_of(const FlyConfig& config, const FlyOptions& options, const FlyResult
   if (config.fleet.task.constants.success.by_s > 0) {
     const auto or_null = [](std::optional<double> x) { return x ? Json(*x) : Json(nullptr); };
     json["success_rate"] = static_cast<double>(r.successes) / static_cast<double>(s.flights);
-    json["time_to_capture_p10_s"] = or_null(quantile(r.capture_s, 0.1));
-    json["time_to_capture_median_s"] = or_null(quantile(r.capture_s, 0.5));
-    json["time_to_capture_p90_s"] = or_null(quantile(r.capture_s, 0.9));
+    json["time_to_capture_p10_s"] = or_null(rollout::quantile(r.capture_s, 0.1));
+    json["time_to_capture_median_s"] = or_null(rollout::quantile(r.capture_s, 0.5));
+    json["time_to_capture_p90_s"] = or_null(rollout::quantile(r.capture_s, 0.9));
   }
   json["hash"] = hexadecimal(r.hash);
   json["logs"] = options.log_folder.empty() ? Json(nullptr) : Json(r.logs);
@@ -151,7 +152,7 @@ int main(int argc, char** argv) {
   std::string config_name, log;
   std::vector<std::string> overrides;
   std::uint64_t seed = 0;
-  flight::FlyOptions options;
+  rollout::FlyOptions options;
   app.add_option("config", config_name, "what to fly: configs/fly/*.toml")->required();
   app.add_option("--count", options.count, "flights, each with noise of its own")
       ->check(CLI::Range(1, 1'000'000))
@@ -163,7 +164,7 @@ int main(int argc, char** argv) {
                             ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{INT64_MAX}));
   return program.run(argc, argv, [&] {
     if (*seeded) overrides.push_back("flight.seed=" + std::to_string(seed));
-    const flight::FlyConfig config = flight::read_fly_config(config_name, overrides);
+    const rollout::FlyConfig config = rollout::read_fly_config(config_name, overrides);
     options.log_folder = log;
     io::ProgressLine progress("flown");
     options.keep_going = [&](double done) {
@@ -171,7 +172,7 @@ int main(int argc, char** argv) {
       return !io::interrupted();
     };
     io::stop_on_interrupt();
-    const flight::FlyResult result = flight::fly(config, options);
+    const rollout::FlyResult result = rollout::fly(config, options);
     progress.clear();
     fly::print(config, options, result);
     program.write_json(fly::json_of(config, options, result));

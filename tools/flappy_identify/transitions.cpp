@@ -23,7 +23,7 @@ struct Request {
 };
 
 /// Given, or of the name that the log has, in the log's folder or beside it.
-fs::path vehicle_path(const Request& request, const fs::path& folder, const flight::FlightHeader& header) {
+fs::path vehicle_path(const Request& request, const fs::path& folder, const flightlog::FlightHeader& header) {
   if (!request.vehicle.empty()) return request.vehicle;
   for (const fs::path& place : {folder / header.vehicle, folder / ".." / header.vehicle}) {
     if (!fs::exists(place)) continue;
@@ -88,9 +88,9 @@ Json run(const Request& request) {
   const auto begin = std::chrono::steady_clock::now();
   if (!request.csv.empty()) io::check_output(request.csv, {request.vehicle});
   Transitions transitions(request.options);
-  flight::check_each_once(request.flights);
+  flightlog::check_each_once(request.flights);
   for (const fs::path folder : request.flights) {
-    const flight::FlightLog log = flight::read_flight_log(folder);
+    const flightlog::FlightLog log = flightlog::read_flight_log(folder);
     transitions.add(folder, log, model::read_vehicle(vehicle_path(request, folder, log.header)));
   }
   const TransitionReport r = transitions.run();

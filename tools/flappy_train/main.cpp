@@ -139,7 +139,7 @@ int main(int argc, char** argv) {
     }
     if (!init.empty()) {
       const fs::path file = fs::is_directory(init) ? fs::path(init) / "best.json" : fs::path(init);
-      options.init = std::make_shared<flight::Actor>(flight::read_actor(file));
+      options.init = std::make_shared<policy::Actor>(policy::read_actor(file));
     }
     const fs::path folder = out.empty() ? fs::path("runs") / fs::path(config_name).stem() : fs::path(out);
     if (seeds.empty()) {

@@ -3,9 +3,9 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "flight/tune.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "rollout/tune.hpp"
 
 namespace {
 
@@ -30,14 +30,14 @@ int main(int argc, char** argv) {
   program.app().add_option("out", out, "controller file to write")->required();
   program.app().add_option("--set", overrides, "override a key: generations=10")->allow_extra_args(false);
   return program.run(argc, argv, [&] {
-    const flight::TuneConfig config = flight::read_tune_config(config_name, overrides);
+    const rollout::TuneConfig config = rollout::read_tune_config(config_name, overrides);
     io::check_output(out, {config_name});
     const auto start = std::chrono::steady_clock::now();
     io::stop_on_interrupt();
-    const double before = flight::cost_of(config, config.start);
+    const double before = rollout::cost_of(config, config.start);
     std::printf("start: cost %.4f\n", before);
     unsigned generation = 0;
-    const flight::TuneResult result = flight::tune(config, [&](const flight::TuneResult& r) {
+    const rollout::TuneResult result = rollout::tune(config, [&](const rollout::TuneResult& r) {
       const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       std::printf("generation %u of %u: cost %.4f, %.0f s\n", ++generation, config.generations, r.cost, wall_s);
       std::fflush(stdout);

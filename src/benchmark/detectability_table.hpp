@@ -1,0 +1,21 @@
+// flappy-blind detectability.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace flappy::benchmark {
+
+struct DetectabilityCommand {
+  std::string vehicle, randomise = FLAPPY_CONFIGS "/randomisation/published.toml",
+                       priors = FLAPPY_CONFIGS "/gap/priors.toml", out;
+  int vehicles = 8;
+  std::uint64_t seed = 2001;  ///< of the first
+  int threads = 0;            ///< 0: one for each processor
+};
+
+/// Finds, prints and writes how large effects have to be; the machine-readable result.
+nlohmann::ordered_json run_detectability(const DetectabilityCommand& command);
+
+}  // namespace flappy::benchmark

@@ -1,0 +1,31 @@
+// flappy-blind make.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "benchmark/plan.hpp"
+#include "blind/flights.hpp"
+
+namespace flappy::benchmark {
+
+struct MakeCommand {
+  std::filesystem::path out, vehicle = FLAPPY_CONFIGS "/vehicles/hummingbird_nominal.toml",
+                             randomise = FLAPPY_CONFIGS "/randomisation/published.toml",
+                             detectable = FLAPPY_CONFIGS "/gap/detectable.toml";
+  PlanOptions plan;
+  int threads = 0;  ///< 0: one for each processor
+  /// What of the catalogue's parameters comes nearest to the effects of a case, by "effect.parameter"; null: nothing does.
+  /// Asked of the parts whose intervals are scored; without it none is.
+  std::function<std::map<std::string, std::optional<double>>(const blind::Case&,
+                                                             const std::vector<blind::BlindEffect>&)>
+      true_values;
+};
+
+/// Flies the cases into `out`/cases and seals what they are. Goes on where it was stopped; false where it was stopped again.
+bool make_bench(const MakeCommand& command);
+
+}  // namespace flappy::benchmark

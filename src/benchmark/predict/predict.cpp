@@ -1,0 +1,51 @@
+#include "benchmark/predict/predict.hpp"
+
+#include "benchmark/predict/baselines.hpp"
+#include "flappy/vehicle_file.hpp"
+#include "gap/diagnose/next_experiment.hpp"
+#include "gap/diagnose/report.hpp"
+#include "io/config.hpp"
+
+namespace flappy::benchmark {
+
+Prediction predict(const Question& q) {
+  const model::Vehicle vehicle = model::read_vehicle(q.vehicle);
+  const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(q.priors).root());
+  std::vector<gap::CarriedFlight> flights;
+  for (const std::filesystem::path& folder : q.flights) {
+    flightlog::FlightLog log = flightlog::read_flight_log(folder);
+    if (!data_faults(log, folder).empty())
+      return {.kind = gap::kind_name(gap::Conclusion::Kind::data), .probability = 1};
+    flights.emplace_back(gap::Recording(folder, std::move(log), vehicle));
+  }
+  gap::DiagnoseOptions options;
+  options.threads = 1;
+  options.withheld = q.withheld;
+  const gap::Diagnosis d = diagnose(flights, uncertain, options);
+  const gap::Report r = answers_of(flights, uncertain, d);
+  Prediction p;
+  p.kind = gap::kind_name(r.conclusion.kind);
+  p.effects = r.conclusion.effects;
+  p.probability = r.conclusion.probability;
+  p.nominal = r.nominal;
+  p.refit = r.refit;
+  p.floor = r.noise_floor;
+  for (const gap::Reported& c : r.candidates) {
+    if (c.kind == gap::Answer::Kind::none) p.none = c.probability;
+    if (c.kind == gap::Answer::Kind::parameters) p.parameters = c.probability;
+    if (c.kind == gap::Answer::Kind::unknown) p.unknown = c.probability;
+    if (c.kind != gap::Answer::Kind::effect) continue;
+    FittedSet set{c.effects, c.probability, {}, c.loss, c.gain_sd};
+    for (const gap::Size& s : c.sizes) set.values[s.name] = {s.value, s.low, s.high};
+    p.sets.push_back(std::move(set));
+  }
+  if (!q.experiments.empty() && abstains(p)) {
+    const auto ranked =
+        rank_experiments(d, uncertain, gap::read_manoeuvres(q.experiments), {.threads = options.threads});
+    if (!ranked.empty()) p.next = ranked.front().separates;
+  }
+  if (q.baselines) p.baselines = baselines(flights, uncertain, d, q.withheld, options.threads);
+  return p;
+}
+
+}  // namespace flappy::benchmark

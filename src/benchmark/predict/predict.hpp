@@ -1,0 +1,58 @@
+// The diagnosing side of the blind benchmark: all that it gets is a question.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace flappy::benchmark {
+
+struct ScoredSize {
+  double value = 0, low = 0, high = 0;  ///< 90 % interval
+};
+
+/// A set of effects that was fitted.
+struct FittedSet {
+  std::vector<std::string> effects;
+  double probability = 0;
+  std::map<std::string, ScoredSize> values;  ///< by "effect.parameter"
+  std::optional<double> left;                ///< E, its mean loss on held-out flights
+  double gain_sd = 0;                        ///< of E_refit - E, from blocks of beats
+};
+
+/// What a simpler method said.
+struct Baseline {
+  std::vector<std::string> named;    ///< none: parameters
+  std::vector<std::string> ranking;  ///< all it can rank, the likeliest first
+};
+
+/// What a diagnosis said of a case before its label was opened.
+struct Prediction {
+  std::string kind = "data";         ///< effect, group, parameters, none, unknown, data
+  std::vector<std::string> effects;  ///< of an effect all that act together, of a group the rivals
+  double probability = 0;            ///< of this verdict
+  std::vector<FittedSet> sets;       ///< most probable first
+  double none = 0, parameters = 0, unknown = 0;
+  std::optional<double> nominal, refit, floor;  ///< E
+  std::map<std::string, Baseline> baselines;    ///< by kBaselines
+  /// Of a verdict that abstains: the two answers that the manoeuvre proposed tells apart, effects joined by +; or none.
+  std::vector<std::string> next;
+};
+inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "stlsq"};
+
+struct Question {
+  std::vector<std::filesystem::path> flights;  ///< folders of logs
+  std::filesystem::path vehicle, priors;
+  std::vector<std::string> withheld;  ///< entries that the catalogue is to lack
+  bool baselines = true;
+  std::filesystem::path experiments;  ///< manoeuvres to propose one of, where the verdict abstains; empty: none
+};
+using Predictor = std::function<Prediction(const Question&)>;
+
+/// Diagnoses on one thread.
+Prediction predict(const Question& question);
+
+}  // namespace flappy::benchmark

@@ -1,0 +1,154 @@
+#include "benchmark/records.hpp"
+
+#include <cstdio>
+#include <set>
+
+#include "io/files.hpp"
+
+namespace flappy::benchmark {
+namespace {
+
+Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+std::optional<double> optional_from(const Json& json) {
+  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
+}
+
+using Names = std::vector<std::string>;
+
+}  // namespace
+
+std::string number_text(std::size_t number) {
+  char text[24];
+  std::snprintf(text, sizeof text, "%04zu", number);
+  return text;
+}
+
+Json read_json(const std::filesystem::path& file) {
+  const std::string text = io::read_text(file);
+  try {
+    return Json::parse(text);
+  } catch (const Json::exception& e) {
+    throw io::InputError(file.string() + ": is no JSON: " + e.what() + "; accepted: what flappy-gap blind wrote");
+  }
+}
+
+std::vector<std::filesystem::path> PublicCase::flights(const std::filesystem::path& folder) const {
+  std::set<std::filesystem::path> all;
+  for (const auto& [file, sha256] : files) all.insert((folder / file).parent_path());
+  return {all.begin(), all.end()};
+}
+
+Json to_json(const Manifest& m) {
+  Json cases = Json::array();
+  for (const PublicCase& c : m.cases)
+    cases.push_back({{"number", c.number}, {"withheld", c.withheld}, {"files", c.files}});
+  return {{"schema", 1},
+          {"set", m.set},
+          {"vehicle", m.vehicle},
+          {"vehicle_sha256", m.vehicle_sha256},
+          {"labels_sha256", m.labels_sha256},
+          {"commit", m.commit},
+          {"cases", cases}};
+}
+
+Manifest read_manifest(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "manifest.json";
+  const Json json = read_json(file);
+  try {
+    Manifest m{json.at("set"),           json.at("vehicle"), json.at("vehicle_sha256"),
+               json.at("labels_sha256"), json.at("commit"),  {}};
+    for (const Json& c : json.at("cases"))
+      m.cases.push_back({c.at("number"), c.at("withheld"), c.at("files").get<std::map<std::string, std::string>>()});
+    return m;
+  } catch (const Json::exception& e) {
+    throw io::InputError(file.string() + ": " + e.what() + "; accepted: what flappy-blind make wrote");
+  }
+}
+
+Truth Label::truth() const {
+  Truth t{planned.part, {}, planned.inseparable.empty(), true_values};
+  for (const blind::BlindEffect& e : planned.effects) t.effects.push_back(e.id);
+  return t;
+}
+
+Json to_json(const PlannedCase& p) {
+  Json effects = Json::array();
+  for (const blind::BlindEffect& e : p.effects) effects.push_back({{"id", e.id}, {"size", e.size}});
+  return {{"number", p.number},    {"part", p.part},   {"effects", effects},         {"seed", p.seed},
+          {"hover", p.hover},      {"power", p.power}, {"randomised", p.randomised}, {"inseparable", p.inseparable},
+          {"withheld", p.withheld}};
+}
+
+Json to_json(const Label& label) {
+  Json json = to_json(label.planned);
+  json["draw"] = label.draw;
+  json["true_values"] = label.true_values;
+  return json;
+}
+
+Label label_from(const Json& json) {
+  Label l;
+  PlannedCase& p = l.planned;
+  p.number = json.at("number");
+  p.part = json.at("part");
+  for (const Json& e : json.at("effects")) p.effects.push_back({e.at("id"), e.at("size")});
+  p.seed = json.at("seed");
+  p.hover = json.at("hover");
+  p.power = json.at("power");
+  p.randomised = json.at("randomised");
+  p.inseparable = json.at("inseparable").get<Names>();
+  p.withheld = json.at("withheld").get<Names>();
+  l.draw = json.at("draw");
+  l.true_values = json.at("true_values").get<std::map<std::string, double>>();
+  return l;
+}
+
+Json to_json(const Prediction& p) {
+  Json sets = Json::array(), baselines = Json::object();
+  for (const FittedSet& s : p.sets) {
+    Json values = Json::object();
+    for (const auto& [name, e] : s.values) values[name] = {{"value", e.value}, {"low", e.low}, {"high", e.high}};
+    sets.push_back({{"effects", s.effects},
+                    {"probability", s.probability},
+                    {"parameters", values},
+                    {"left", optional(s.left)},
+                    {"gain_sd", s.gain_sd}});
+  }
+  for (const auto& [name, b] : p.baselines) baselines[name] = {{"named", b.named}, {"ranking", b.ranking}};
+  return {{"verdict", {{"kind", p.kind}, {"effects", p.effects}, {"probability", p.probability}}},
+          {"candidates", sets},
+          {"none", p.none},
+          {"parameters", p.parameters},
+          {"unknown", p.unknown},
+          {"gap", {{"nominal", optional(p.nominal)}, {"refit", optional(p.refit)}, {"noise_floor", optional(p.floor)}}},
+          {"next", p.next},
+          {"baselines", baselines}};
+}
+
+Prediction prediction_from(const Json& json) {
+  Prediction p;
+  const Json& verdict = json.at("verdict");
+  p.kind = verdict.at("kind");
+  p.effects = verdict.at("effects").get<Names>();
+  p.probability = verdict.at("probability");
+  for (const Json& c : json.at("candidates")) {
+    FittedSet s{c.at("effects").get<Names>(), c.at("probability"), {}, optional_from(c.at("left")), c.at("gain_sd")};
+    for (const auto& [name, e] : c.at("parameters").items())
+      s.values[name] = {e.at("value"), e.at("low"), e.at("high")};
+    p.sets.push_back(std::move(s));
+  }
+  p.none = json.at("none");
+  p.parameters = json.at("parameters");
+  p.unknown = json.at("unknown");
+  const Json& gap = json.at("gap");
+  p.nominal = optional_from(gap.at("nominal"));
+  p.refit = optional_from(gap.at("refit"));
+  p.floor = optional_from(gap.at("noise_floor"));
+  p.next = json.at("next").get<Names>();
+  for (const auto& [name, b] : json.at("baselines").items())
+    p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
+  return p;
+}
+
+}  // namespace flappy::benchmark

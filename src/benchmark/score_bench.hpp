@@ -1,0 +1,23 @@
+// flappy-blind score.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "benchmark/predict/predict.hpp"
+
+namespace flappy::benchmark {
+
+struct ScoreCommand {
+  std::filesystem::path folder, vehicle;  ///< the latter: empty for the manifest's
+  std::filesystem::path priors = FLAPPY_CONFIGS "/gap/priors.toml";
+  std::filesystem::path experiments = FLAPPY_CONFIGS "/gap/experiments";  ///< for the prediction
+  int threads = 0;  ///< cases at a time; 0: one for each processor
+  Predictor predictor = predict;
+};
+
+/// Predicts what has no prediction yet, seals the predictions, opens the labels, scores. Goes on where it was stopped; null where
+/// it was stopped again. InputError where logs, labels or predictions are not what was sealed.
+nlohmann::ordered_json score_bench(const ScoreCommand& command);
+
+}  // namespace flappy::benchmark

@@ -1,0 +1,89 @@
+#include "benchmark/score_statistics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace flappy::benchmark {
+namespace {
+
+constexpr double kZ95 = 1.959964;
+constexpr std::size_t kResamples = 2000, kBins = 10;
+
+/// The same draws every time, and wherever the program runs: no distribution of the standard library is.
+class Draws {
+ public:
+  double uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+  std::size_t below(std::size_t n) {
+    return std::min(n - 1, static_cast<std::size_t>(uniform() * static_cast<double>(n)));
+  }
+
+ private:
+  std::mt19937_64 engine_{1};
+};
+
+/// Of claims in the order of their probability.
+double error_of(const std::vector<Claim>& sorted) {
+  const std::size_t n = sorted.size(), bins = std::min(n, kBins);
+  double error = 0;
+  for (std::size_t b = 0; b < bins; ++b) {
+    double difference = 0;
+    for (std::size_t i = b * n / bins; i < (b + 1) * n / bins; ++i)
+      difference += sorted[i].probability - (sorted[i].right ? 1 : 0);
+    error += std::abs(difference);
+  }
+  return n > 0 ? error / static_cast<double>(n) : 0;
+}
+
+}  // namespace
+
+Score proportion(std::size_t successes, std::size_t count) {
+  if (count == 0) return {};
+  const double n = static_cast<double>(count), p = static_cast<double>(successes) / n, z2 = kZ95 * kZ95;
+  const double middle = (p + z2 / (2 * n)) / (1 + z2 / n);
+  const double half = kZ95 / (1 + z2 / n) * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n));
+  return {p, std::max(0.0, middle - half), std::min(1.0, middle + half), count};
+}
+
+Score resampled(std::size_t count,
+                const std::function<std::optional<double>(const std::vector<std::size_t>&)>& statistic) {
+  std::vector<std::size_t> cases(count);
+  for (std::size_t i = 0; i < count; ++i) cases[i] = i;
+  Score score;
+  if (count == 0 || !(score.value = statistic(cases))) return {};
+  score.count = count;
+  Draws draws;
+  std::vector<double> values;
+  for (std::size_t k = 0; k < kResamples; ++k) {
+    for (std::size_t& c : cases) c = draws.below(count);
+    if (const auto value = statistic(cases)) values.push_back(*value);
+  }
+  score.low = values.empty() ? *score.value : quantile(values, 0.025);
+  score.high = values.empty() ? *score.value : quantile(values, 0.975);
+  return score;
+}
+
+double calibration_error(std::vector<Claim> claims) {
+  std::ranges::stable_sort(claims, {}, &Claim::probability);
+  return error_of(claims);
+}
+
+double calibrated_error_95(std::vector<Claim> claims) {
+  std::ranges::stable_sort(claims, {}, &Claim::probability);
+  Draws draws;
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < kResamples; ++k) {
+    for (Claim& c : claims) c.right = draws.uniform() < c.probability;
+    errors.push_back(error_of(claims));
+  }
+  return quantile(errors, 0.95);
+}
+
+double quantile(std::vector<double> values, double share) {
+  std::ranges::sort(values);
+  const double at = share * static_cast<double>(values.size() - 1);
+  const auto i = static_cast<std::size_t>(at);
+  return i + 1 < values.size() ? std::lerp(values[i], values[i + 1], at - static_cast<double>(i)) : values.back();
+}
+
+}  // namespace flappy::benchmark

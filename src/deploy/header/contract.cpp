@@ -1,0 +1,104 @@
+#include "deploy/header/contract.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <sstream>
+
+#include "deploy/header/c_text.hpp"
+#include "io/files.hpp"
+
+namespace flappy::deploy {
+namespace {
+
+using flight::Signal;
+using rollout::FlyConfig;
+
+long whole_us(const char* what, double seconds) {
+  const double us = seconds * 1e6;
+  if (std::abs(us - std::round(us)) > 1e-6 * us)
+    throw io::InputError(std::string(what) + " of " + io::shortest_digits(seconds) +
+                         " s is no whole number of microseconds, in which headers count; accepted: one that is");
+  return std::lround(us);
+}
+
+void list(std::ostringstream& text, const char* title, const std::vector<Signal>& signals) {
+  char line[160];
+  std::snprintf(line, sizeof line, "  %-3s %-22s %-7s %-12s %s\n", "", title, "unit", "range", "frame");
+  text << line;
+  for (std::size_t i = 0; i < signals.size(); ++i) {
+    const Signal& s = signals[i];
+    const std::string range = io::shortest_digits(s.low) + " to " + io::shortest_digits(s.high);
+    std::snprintf(line, sizeof line, "  %3zu %-22s %-7s %-12s %s", i, s.name.c_str(), s.unit.c_str(), range.c_str(),
+                  s.frame.c_str());
+    std::string trimmed = line;
+    trimmed.erase(trimmed.find_last_not_of(' ') + 1);
+    text << trimmed << "\n";
+  }
+}
+
+bool holds_trim(const FlyConfig& config) { return config.fleet.task.constants.holds_trim > 0; }
+
+}  // namespace
+
+Periods periods_of(const FlyConfig& config) {
+  const double control_s = 1 / config.fleet.control_hz;
+  return {whole_us("a control period", control_s), whole_us("a policy's period", control_s * config.fleet.task.hold),
+          whole_us("the driver's hold", config.vehicle.driver.hold_s)};
+}
+
+std::string contract_text(const FlyConfig& config, const policy::RunInfo& run) {
+  const Periods p = periods_of(config);
+  std::ostringstream text;
+  text << "Format " << kHeaderFormat << ", task " << run.task << ", of the configuration with SHA-256\n"
+       << run.config_sha256 << ",\ntrained by commit " << run.commit << (run.dirty ? " and uncommitted changes" : "")
+       << ".\n\n"
+       << "A control period takes " << p.control_us << " us; the policy acts every " << p.policy_us << " us and its\n"
+       << "action stays until the next. The wings beat at " << io::shortest_digits(config.vehicle.driver.flapping_Hz)
+       << " Hz. The action is added to\n"
+       << (holds_trim(config) ? "the trim that the feedback controller has learnt and, while the policy acts, holds.\n"
+                              : "the output of the feedback controller, which goes on flying.\n")
+       << "\nFrames: world W (x, y level, z up), body B (x forward, y left, z up, at the torso's origin). R_xy is row "
+          "x,\n"
+       << "column y of the rotation matrix from B to W. Errors and velocities are estimate minus set point.\n"
+       << "added_* is what the last action added, trim_* what the controller has learnt to hold.\n"
+       << "Ranges are those expected; other values are allowed.\n\n";
+  list(text, "observation", config.fleet.task.observation());
+  text << "\n";
+  list(text, "action", config.fleet.task.action());
+  return text.str();
+}
+
+std::uint32_t contract_crc32(const FlyConfig& config) {
+  const Periods p = periods_of(config);
+  std::ostringstream text;
+  text << kHeaderFormat << "\n"
+       << config.fleet.task.name << "\n"
+       << p.control_us << " " << p.policy_us << "\n"
+       << holds_trim(config) << "\n";
+  for (const auto& signals : {config.fleet.task.observation(), config.fleet.task.action()})
+    for (const Signal& s : signals) text << s.name << " " << s.unit << " " << s.frame << "\n";
+  std::vector<float> letters;  // each a number of its own: only equality matters
+  for (const char c : text.str()) letters.push_back(c);
+  return crc32(0, letters);
+}
+
+std::string contract_macros(const std::string& prefix, const FlyConfig& config, const policy::RunInfo& run) {
+  const Periods p = periods_of(config);
+  std::ostringstream text;
+  const auto define = [&](const char* name, const std::string& value) {
+    text << "#define " << prefix << name << " " << value << "\n";
+  };
+  define("FORMAT", std::to_string(kHeaderFormat));
+  define("CONTRACT", std::to_string(contract_crc32(config)) + "U");
+  define("TASK", c_string(run.task));
+  define("CONFIG_SHA256", c_string(run.config_sha256));
+  define("COMMIT", c_string(run.commit));
+  define("DIRTY", run.dirty ? "1" : "0");
+  define("CONTROL_US", std::to_string(p.control_us) + "U");
+  define("PERIOD_US", std::to_string(p.policy_us) + "U");
+  define("FLAPPING_HZ", c_number(static_cast<float>(config.vehicle.driver.flapping_Hz)));
+  define("HOLDS_TRIM", holds_trim(config) ? "1" : "0");
+  return text.str();
+}
+
+}  // namespace flappy::deploy

@@ -1,0 +1,174 @@
+#include "deploy/header/controller_trace.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "flight/flight_block.hpp"
+#include "rollout/recorder.hpp"
+#include "rollout/settle.hpp"
+
+namespace flappy::deploy {
+namespace {
+
+using flight::Fleet;
+using flight::FlightBlock;
+using Lane = model::Lanes<float, 1>;
+
+std::int32_t whole_us(double s) { return static_cast<std::int32_t>(std::lround(s * 1e6)); }
+
+flight::FleetOptions on_board(const rollout::FlyConfig& config) {
+  flight::FleetOptions o = config.fleet;
+  o.batch.threads = 1;
+  o.task.constants.hand_back.on_estimate = 1;
+  double& latency_s = o.sensors.imu.latency_s;
+  latency_s = std::ceil(latency_s * o.control_hz - 1e-6) / o.control_hz;
+  return o;
+}
+
+/// One flight, from its start on.
+class Flight {
+ public:
+  explicit Flight(const rollout::FlyConfig& config) : options_(on_board(config)), fleet_(1, config.vehicle, options_) {
+    if (options_.task.start.settled)
+      fleet_.start(0, 0, rollout::settle<float>(options_, 1, rollout::kHover_s, [&](std::uint32_t) {
+                     return config.vehicle;
+                   })[0]);
+    fleet_.set_actor(config.actor);
+    fleet_.record(true);
+  }
+  Fleet<float>& fleet() { return fleet_; }
+  const flight::FleetOptions& options() const { return options_; }
+
+  /// Rows of a flight's block.
+  std::vector<float> rows(std::size_t offset, std::size_t count) {
+    const auto all = fleet_.snapshot(0).flight;
+    const auto begin = all.begin() + static_cast<std::ptrdiff_t>(offset / sizeof(float[flight::kLanes<float>]));
+    return {begin, begin + static_cast<std::ptrdiff_t>(count)};
+  }
+
+ private:
+  flight::FleetOptions options_;
+  Fleet<float> fleet_;
+};
+
+/// When it is handed back, in control periods; half of the flight where it never is.
+int hand_back_period(const rollout::FlyConfig& config) {
+  Flight flight(config);
+  const int last = std::max(2, static_cast<int>(std::lround(config.duration_s / flight.fleet().period_s())));
+  for (int period = 1; period <= last; ++period) {
+    flight.fleet().step();
+    if (flight.fleet().handed_back(0)) return period;
+  }
+  return last / 2;
+}
+
+void copy(const auto& from, float* to) {
+  for (const auto x : from) *to++ = static_cast<float>(x);
+}
+
+/// What the samples in [first, last) add up to.
+ControllerTrace::Increment gathered(const std::vector<ControllerTrace::Imu>& samples, std::size_t first,
+                                    std::size_t last) {
+  flight::Increment<Lane> sum{{0, 0, 0}, {0, 0, 0}};
+  const auto vector = [](const float(&x)[3]) { return model::Vec3<Lane>{x[0], x[1], x[2]}; };
+  const auto before_us = [&](std::size_t i) { return i > 0 ? samples[i - 1].taken_us : 0; };
+  for (std::size_t i = first; i < last; ++i)
+    gather(sum, {vector(samples[i].gyro_rad_s), vector(samples[i].accel_m_s2)},
+           Lane((samples[i].taken_us - before_us(i)) / 1e6));
+  return {{sum.turn_rad.x.raw[0], sum.turn_rad.y.raw[0], sum.turn_rad.z.raw[0]},
+          {sum.velocity_m_s.x.raw[0], sum.velocity_m_s.y.raw[0], sum.velocity_m_s.z.raw[0]},
+          before_us(first),
+          samples[last - 1].taken_us};
+}
+
+/// The increments that have arrived by the end of `period`, one for each that gathered something.
+std::vector<ControllerTrace::Increment> arrived(const std::vector<ControllerTrace::Imu>& samples, int period,
+                                                std::int32_t period_us, std::int32_t latency_us) {
+  std::vector<ControllerTrace::Increment> list;
+  std::size_t next = 0;
+  for (int p = 1; p <= period; ++p) {
+    std::size_t last = next;
+    while (last < samples.size() && samples[last].taken_us <= p * period_us - latency_us) ++last;
+    if (last > next) list.push_back(gathered(samples, next, last));
+    next = last;
+  }
+  return list;
+}
+
+}  // namespace
+
+ControllerTrace record_controller(const rollout::FlyConfig& config, int periods, int begin) {
+  if (begin < 0) begin = std::max(1, hand_back_period(config) - periods / 2);
+  Flight flight(config);
+  Fleet<float>& fleet = flight.fleet();
+  const flight::FleetOptions& o = flight.options();
+  flight::Schedule schedule(o.sensors, o.batch.step_s,
+                            static_cast<int>(std::lround(fleet.period_s() / o.batch.step_s)));
+  const std::int32_t period_us = whole_us(fleet.period_s()), zero_us = begin * period_us;
+  const std::int32_t imu_latency_us = whole_us(o.sensors.imu.latency_s), lag_us = whole_us(schedule.imu_lag_s());
+  const std::int32_t mocap_latency_us = whole_us(o.sensors.mocap.latency_s);
+
+  ControllerTrace t;
+  std::vector<ControllerTrace::Imu> imu;  // times since the flight began, as in `frames`
+  std::vector<ControllerTrace::Frame> frames;
+  for (int period = 0; period < begin + periods; ++period) {
+    if (period == begin) {
+      t.estimator = flight.rows(offsetof(FlightBlock<float>, fusion), flight::kFusionRows);
+      t.estimate = flight.rows(offsetof(FlightBlock<float>, estimate), flight::kEstimateRows);
+      t.pid = flight.rows(offsetof(FlightBlock<float>, controller), flight::kPidRows);
+      t.tick = fleet.tick(0);
+      t.phase = fleet.snapshot(0).phase;
+      t.handed_back = fleet.handed_back(0);
+      t.horizon_us = -whole_us(schedule.horizon_age_s());
+      t.present_us = -whole_us(schedule.present_age_s());
+      const auto all = arrived(imu, begin, period_us, imu_latency_us);
+      t.last_imu_us = all.empty() ? -zero_us : all.back().to_us - zero_us;
+      for (ControllerTrace::Increment i : all) {
+        i.from_us -= zero_us + lag_us;
+        i.to_us -= zero_us + lag_us;
+        if (i.to_us > t.horizon_us || i.to_us == t.last_imu_us - lag_us) t.ring.push_back(i);
+      }
+    }
+    if (period == begin && t.ring.empty()) t.ring.push_back({{}, {}, t.horizon_us, t.horizon_us});  // of no time
+    fleet.step();
+    schedule.next();
+    for (const auto& s : fleet.imu_samples(0)) {
+      const std::int32_t arrived_us = whole_us(s.arrival_s);
+      imu.push_back({arrived_us - imu_latency_us, arrived_us, {}, {}});
+      copy(s.gyro_rad_s, imu.back().gyro_rad_s);
+      copy(s.accel_m_s2, imu.back().accel_m_s2);
+    }
+    for (const auto& s : fleet.mocap_samples(0)) {
+      const std::int32_t arrived_us = whole_us(s.arrival_s);
+      frames.push_back({arrived_us - mocap_latency_us, arrived_us, s.valid, {}, {}});
+      copy(s.position_m, frames.back().position_m);
+      copy(s.attitude, frames.back().attitude);
+    }
+    if (period < begin) continue;
+    const sim::Input u = fleet.input(0);
+    ControllerTrace::Period& p = t.periods.emplace_back();
+    copy(fleet.adds(0), p.added);
+    copy(std::initializer_list<double>{u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle}, p.input);
+    std::ranges::copy(flight.rows(offsetof(FlightBlock<float>, estimate), flight::kEstimateRows), p.estimate);
+    p.handed_back = fleet.handed_back(0);
+    for (const rollout::DriverUpdate& update : rollout::driver_updates(fleet, 0)) {
+      if (t.updates.empty()) t.first_update_us = whole_us(static_cast<double>(update.step) * o.batch.step_s) - zero_us;
+      t.updates.push_back({static_cast<float>(update.left_V), static_cast<float>(update.right_V)});
+    }
+  }
+  const std::int32_t end_us = periods * period_us;
+  for (ControllerTrace::Imu s : imu) {
+    s.taken_us -= zero_us;
+    s.arrived_us -= zero_us;
+    if (s.taken_us > t.last_imu_us && s.arrived_us <= end_us) t.imu.push_back(s);
+  }
+  for (ControllerTrace::Frame f : frames) {
+    f.taken_us -= zero_us;
+    f.arrived_us -= zero_us;
+    if (f.taken_us > t.horizon_us && f.arrived_us <= end_us) t.frames.push_back(f);
+  }
+  return t;
+}
+
+}  // namespace flappy::deploy

@@ -1,0 +1,135 @@
+#include "deploy/header/policy_vectors.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rollout/settle.hpp"
+
+namespace flappy::deploy {
+namespace {
+
+using flight::Fleet;
+using flight::kActions;
+using Lane = model::Lanes<float, 1>;
+
+template <class To, class From>
+std::vector<To> cast(const From& from) {
+  std::vector<To> to;
+  for (const auto x : from) to.push_back(static_cast<To>(x));
+  return to;
+}
+
+}  // namespace
+
+policy::PolicyNetwork network_of(const rollout::FlyConfig& config) {
+  const policy::Actor& a = *config.actor;
+  policy::PolicyNetwork n{a.widths,
+                          a.hidden == policy::Activation::relu,
+                          static_cast<float>(a.clip),
+                          cast<float>(a.mean),
+                          cast<float>(a.scale),
+                          cast<float>(a.weights),
+                          {},
+                          {}};
+  const auto& k = config.fleet.task.constants;
+  for (int i = 0; i < kActions; ++i) {  // as scaled_action() has them
+    const auto low = static_cast<float>(k.action_low[i]), high = static_cast<float>(k.action_high[i]);
+    n.middle.push_back(static_cast<float>(0.5 * static_cast<double>(low + high)));
+    n.half.push_back(static_cast<float>(0.5 * static_cast<double>(high - low)));
+  }
+  return n;
+}
+
+std::vector<float> evaluate(const policy::PolicyNetwork& n, const std::vector<float>& observation) {
+  policy::ActorView<float> view;
+  view.layers = static_cast<int>(n.widths.size()) - 1;
+  std::ranges::copy(n.widths, view.widths);
+  view.hidden = n.relu ? policy::Activation::relu : policy::Activation::tanh;
+  view.weights = n.weights.data();
+  view.mean = n.mean.data();
+  view.scale = n.scale.data();
+  view.clip = n.clip;
+  const auto inputs = static_cast<std::size_t>(n.inputs()), outputs = static_cast<std::size_t>(n.outputs());
+  std::vector<float> action;
+  std::vector<Lane> in(inputs), out(outputs);
+  for (std::size_t row = 0; row < observation.size(); row += inputs) {
+    for (std::size_t i = 0; i < inputs; ++i) in[i] = Lane::load(&observation[row + i]);
+    policy::evaluate(view, in.data(), out.data());
+    for (std::size_t i = 0; i < outputs; ++i) {
+      const Lane adds = Lane::load(&n.middle[i]) + Lane::load(&n.half[i]) * clamp(out[i], Lane(-1), Lane(1));
+      action.push_back(adds.raw[0]);
+    }
+  }
+  return action;
+}
+
+policy::PolicyVectors roll_out(const rollout::FlyConfig& config, std::size_t first, std::size_t flights) {
+  flight::FleetOptions o = config.fleet;
+  o.first_flapper = kRolloutFlappers + static_cast<std::uint32_t>(first);
+  const auto vehicle = [&](std::uint32_t flapper) { return config.vehicle_of(flapper); };
+  Fleet<float> fleet(flights, config.vehicle, o);
+  std::vector<flight::Snapshot<float>> hover;
+  if (o.task.start.settled) hover = rollout::settle<float>(o, flights, rollout::kHover_s, vehicle);
+  for (std::size_t i = 0; i < flights; ++i) {
+    if (hover.empty()) {
+      fleet.set_vehicle(i, vehicle(o.first_flapper + static_cast<std::uint32_t>(i)));
+      fleet.start(i, 0);
+    } else {
+      fleet.start(i, 0, hover[i]);
+    }
+  }
+  fleet.set_actor(config.actor);
+  const auto inputs = o.task.observation().size();
+  std::vector<policy::PolicyVectors> each(flights);
+  const long ticks = std::lround(config.duration_s / fleet.period_s());
+  for (long tick = 0; tick < ticks; ++tick) {
+    std::vector<std::size_t> acting;
+    for (std::size_t i = 0; i < flights && tick % o.task.hold == 0; ++i)
+      if (fleet.ended(i) == 0 && !fleet.handed_back(i)) acting.push_back(i);
+    if (acting.empty() && tick % o.task.hold == 0) break;
+    for (const std::size_t i : acting) {
+      std::vector<float>& seen = each[i].observation;
+      seen.resize(seen.size() + inputs);
+      fleet.observation(i, &seen[seen.size() - inputs]);
+    }
+    fleet.step();
+    for (const std::size_t i : acting)
+      for (const float x : fleet.adds(i)) each[i].action.push_back(x);
+  }
+  policy::PolicyVectors all{static_cast<int>(inputs), kActions, {}, {}};
+  for (const policy::PolicyVectors& v : each) append(all, v);
+  return all;
+}
+
+policy::PolicyVectors some_of(const policy::PolicyVectors& all, std::size_t count) {
+  const auto in = static_cast<std::size_t>(all.inputs), out = static_cast<std::size_t>(all.outputs);
+  const std::size_t rows = std::min(count, all.rows());
+  policy::PolicyVectors some{all.inputs, all.outputs, {}, {}};
+  for (std::size_t k = 0; k < rows; ++k) {
+    const std::size_t row = all.rows() * k / rows;
+    some.observation.insert(some.observation.end(), &all.observation[row * in], &all.observation[row * in] + in);
+    some.action.insert(some.action.end(), &all.action[row * out], &all.action[row * out] + out);
+  }
+  return some;
+}
+
+void append(policy::PolicyVectors& to, const policy::PolicyVectors& more) {
+  to.observation.insert(to.observation.end(), more.observation.begin(), more.observation.end());
+  to.action.insert(to.action.end(), more.action.begin(), more.action.end());
+}
+
+policy::PolicyVectors corners(const policy::PolicyNetwork& network, const std::vector<flight::Signal>& observation) {
+  policy::PolicyVectors v{network.inputs(), network.outputs(), {}, {}};
+  for (const float reach : {0.0F, 1.0F, 1000.0F, 1e30F})  // of half the range, about its middle
+    for (unsigned pattern = 0; pattern < 4 && (reach > 0 || pattern == 0); ++pattern)
+      for (std::size_t i = 0; i < observation.size(); ++i) {
+        const auto middle = static_cast<float>((observation[i].low + observation[i].high) / 2);
+        const auto half = static_cast<float>((observation[i].high - observation[i].low) / 2);
+        const bool high = (pattern < 2 ? pattern : (i + pattern) % 2) == 1;
+        v.observation.push_back(middle + (high ? reach : -reach) * half);
+      }
+  v.action = evaluate(network, v.observation);
+  return v;
+}
+
+}  // namespace flappy::deploy

@@ -1,0 +1,170 @@
+#include "flightlog/check/check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "flightlog/check/check_parts.hpp"
+
+namespace flappy::flightlog {
+namespace {
+
+using flightlog::Column;
+using flightlog::FlightLog;
+
+void check_stream(const StreamStatistics& s, double flapping_Hz, Findings& findings) {
+  const auto warn = [&](const std::string& text) { findings.push_back({s.name, Verdict::warning, text, {}}); };
+  if (!s.declared_hz) return;
+  const std::size_t before = findings.size();
+  const double interval = 1 / s.rate_hz;
+  // Crystals agree to 1e-4 and a stream's mean rate is exact to 1 / samples: 5 % is another rate, or another unit.
+  if (std::abs(s.rate_hz / *s.declared_hz - 1) > 0.05)
+    warn(format("%.4g samples/s, %.4g declared: thinned out, repeated, or t_s not in seconds", s.rate_hz,
+                *s.declared_hz));
+  const double missing = static_cast<double>(s.missing) / static_cast<double>(s.samples + s.missing);
+  if (missing > 0.01)
+    warn(format("%zu samples missing (%.1f %%), at most 1 %% expected: dropouts", s.missing, 100 * missing));
+  // Three beats unseen cannot be bridged: the body's motion within a beat is not smooth.
+  if (s.longest_gap_s > std::max(10 * interval, 3 / flapping_Hz))
+    warn(format("a gap of %.3g s, at most %.3g s expected: lost tracking or a lost link", s.longest_gap_s,
+                std::max(10 * interval, 3 / flapping_Hz)));
+  // Beyond this, samples begin to change places.
+  if (s.jitter_s > 0.3 * interval)
+    warn(format("intervals vary by %.2g ms of %.2g ms: arrival times are not evenly spaced; a buffered link?",
+                1e3 * s.jitter_s, 1e3 * interval));
+  if (findings.size() == before) findings.push_back({s.name, Verdict::ok, "rate, gaps and intervals as declared", {}});
+}
+
+/// Samples that repeat the one before to the last digit, which noise does not allow.
+void check_repeats(const std::string& name, const std::vector<const Column*>& columns, double noise,
+                   Findings& findings) {
+  const std::size_t count = columns.front()->size();
+  std::size_t repeats = 0;
+  for (std::size_t i = 1; i < count; ++i)
+    repeats += std::ranges::all_of(columns, [&](const Column* c) { return (*c)[i] == (*c)[i - 1]; });
+  if (noise > 0 && static_cast<double>(repeats) > 0.01 * static_cast<double>(count))
+    findings.push_back(
+        {name,
+         Verdict::warning,
+         format("%zu of %zu samples repeat the one before: tracking lost, or written faster than measured", repeats,
+                count),
+         {}});
+}
+
+void check_latencies(const flightlog::FlightHeader& h, Findings& findings) {
+  // Cameras and radio links take a hundredth of a second; a tenth is three beats of open loop, which nobody flies.
+  constexpr double kLargest_s = 0.1;
+  std::string wrong;
+  const auto look = [&](const char* key, double value) {
+    if (value > kLargest_s) wrong += (wrong.empty() ? "" : ", ") + format("%s = %g", key, value);
+  };
+  look("mocap.latency_s", h.mocap.latency_s);
+  look("imu.latency_s", h.imu.latency_s);
+  if (h.power) look("power.latency_s", h.power->latency_s);
+  if (wrong.empty()) findings.push_back({"latencies", Verdict::ok, "declared ones are plausible", {}});
+  else findings.push_back({"latencies", Verdict::warning, wrong + ": at most 0.1 s expected: milliseconds?", {}});
+}
+
+}  // namespace
+
+std::string format(const char* pattern, ...) {
+  char text[512];
+  va_list arguments;
+  va_start(arguments, pattern);
+  std::vsnprintf(text, sizeof text, pattern, arguments);
+  va_end(arguments);
+  return text;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+std::size_t index_before(const std::vector<double>& times, double t) {
+  const auto after = std::ranges::upper_bound(times, t);
+  return after == times.begin() ? times.size() : static_cast<std::size_t>(after - times.begin()) - 1;
+}
+
+std::size_t line_at(const Column& t_s, double after_s) {
+  const auto at = std::ranges::lower_bound(t_s, t_s.front() + after_s);
+  // below the line of names, counted from 1
+  return static_cast<std::size_t>(std::min(at, t_s.end() - 1) - t_s.begin()) + 2;
+}
+
+StreamStatistics stream_statistics(const std::string& name, const Column& t_s, std::optional<double> declared_hz) {
+  StreamStatistics s;
+  s.name = name;
+  s.samples = t_s.size();
+  s.duration_s = t_s.back() - t_s.front();
+  s.declared_hz = declared_hz;
+  std::vector<double> intervals, pairs;
+  for (std::size_t i = 1; i < t_s.size(); ++i) intervals.push_back(t_s[i] - t_s[i - 1]);
+  for (std::size_t i = 2; i < t_s.size(); ++i) pairs.push_back((t_s[i] - t_s[i - 2]) / 2);
+  const double usual = median(pairs.empty() ? intervals : pairs);
+  double sum = 0, squares = 0, count = 0;
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    const double dt = intervals[i];
+    s.longest_gap_s = std::max(s.longest_gap_s, dt);
+    // With either neighbour: a late sample makes a long interval and a short one.
+    const double before = i > 0 ? intervals[i - 1] : usual, after = i + 1 < intervals.size() ? intervals[i + 1] : usual;
+    const long missing = dt > 1.5 * usual ? std::lround((dt + std::min(before, after)) / usual) - 2 : 0;
+    if (missing > 0) {
+      if (declared_hz) s.missing += static_cast<std::size_t>(missing);
+    } else {
+      sum += dt, squares += dt * dt, ++count;
+    }
+  }
+  s.jitter_s = std::sqrt(std::max(squares / count - (sum / count) * (sum / count), 0.0));
+  s.rate_hz = static_cast<double>(s.samples + s.missing - 1) / s.duration_s;
+  return s;
+}
+
+std::optional<double> beat_frequency(const Column& t_s, const Column& values) {
+  double mean = 0;
+  for (const double v : values) mean += v / static_cast<double>(values.size());
+  std::vector<double> rises, periods;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double before = values[i - 1] - mean, after = values[i] - mean;
+    if (before < 0 && after >= 0) rises.push_back(t_s[i - 1] + (t_s[i] - t_s[i - 1]) * before / (before - after));
+  }
+  for (std::size_t i = 1; i < rises.size(); ++i) periods.push_back(rises[i] - rises[i - 1]);
+  if (periods.size() < 4) return std::nullopt;
+  return 1 / median(periods);
+}
+
+std::size_t CheckReport::count(Verdict verdict) const {
+  return static_cast<std::size_t>(std::ranges::count(findings, verdict, &Finding::verdict));
+}
+
+CheckReport check_flight(const FlightLog& log) {
+  const flightlog::FlightHeader& h = log.header;
+  CheckReport report;
+  const auto add = [&](const char* name, const Column& t_s, std::optional<double> declared_hz) {
+    report.streams.push_back(stream_statistics(name, t_s, declared_hz));
+    check_stream(report.streams.back(), h.flapping_Hz, report.findings);
+  };
+  add("command", log.command.t_s, std::nullopt);
+  add("mocap", log.mocap.t_s, h.mocap.rate_hz);
+  add("imu", log.imu.t_s, h.imu.rate_hz);
+  if (log.power) add("power", log.power->t_s, h.power->rate_hz);
+  if (log.wings) add("wings", log.wings->t_s, h.wings->rate_hz);
+  const flightlog::MocapStream& m = log.mocap;
+  check_repeats("mocap", {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz}, h.mocap.position_noise_m,
+                report.findings);
+  const flightlog::ImuStream& i = log.imu;
+  check_repeats("imu",
+                {&i.gyro_x_rad_s, &i.gyro_y_rad_s, &i.gyro_z_rad_s, &i.accel_x_m_s2, &i.accel_y_m_s2, &i.accel_z_m_s2},
+                h.imu.gyro_noise_rad_s, report.findings);
+  check_latencies(h, report.findings);
+  check_motion(log, report.findings);
+  check_space(log, report.findings);
+  check_command(log, report.findings);
+  check_beat(log, report.findings);
+  check_power(log, report.findings);
+  check_wings(log, report.findings);
+  return report;
+}
+
+}  // namespace flappy::flightlog

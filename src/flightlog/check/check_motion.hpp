@@ -1,0 +1,38 @@
+// The parts of check_motion(), and what one finds out and the next needs.
+#pragma once
+
+#include <numbers>
+
+#include "flightlog/check/check_parts.hpp"
+#include "flightlog/check/motion.hpp"
+
+namespace flappy::flightlog {
+
+using Values = std::vector<std::pair<std::string, double>>;
+
+inline constexpr double kDegree = std::numbers::pi / 180;
+inline constexpr char kAxes[] = "xyz";
+
+struct Context {
+  const flightlog::FlightLog& log;
+  Findings& findings;
+  Motion motion;
+  std::vector<Window> windows;
+  double window_s;
+  double rate_noise;  ///< rad/s, of a window's mean rate, from mocap
+  double gyro_noise;  ///< rad/s, of a window's mean rate, from the gyro
+  Frame frame;        ///< as found; as declared where that fits or nothing was found
+  Lag lag;
+
+  void say(const std::string& check, Verdict verdict, const std::string& text, Values values = {},
+           LogPlace fault = {}) {
+    findings.push_back({check, verdict, text, std::move(values), std::move(fault)});
+  }
+};
+
+/// Clock and gyro against the attitude; leaves frame and lag.
+void check_rotation(Context& c);
+/// Accelerometer and position, by the attitude as it was understood.
+void check_translation(Context& c);
+
+}  // namespace flappy::flightlog

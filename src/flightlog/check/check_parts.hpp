@@ -1,0 +1,47 @@
+// The parts of check_flight().
+#pragma once
+
+#include <cstdarg>
+#include <string>
+#include <vector>
+
+#include "flightlog/check/check.hpp"
+
+namespace flappy::flightlog {
+
+/// What a deviation must exceed to be no accident, in standard deviations: one in 16,000.
+inline constexpr double kSigmas = 4;
+
+using log_file::kCommand, log_file::kImu, log_file::kMocap, log_file::kPower, log_file::kWings;
+
+using Findings = std::vector<Finding>;
+
+/// As printf.
+[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
+
+double median(std::vector<double> values);
+
+/// Index of the last time not after t; times.size() where there is none.
+std::size_t index_before(const std::vector<double>& times, double t);
+
+/// The line of a stream's file at a time since its first sample.
+std::size_t line_at(const flightlog::Column& t_s, double after_s);
+
+StreamStatistics stream_statistics(const std::string& name, const flightlog::Column& t_s,
+                                   std::optional<double> declared_hz);
+
+/// Rate of rises through the mean, from the median of the time between them; nothing with fewer than five.
+std::optional<double> beat_frequency(const flightlog::Column& t_s, const flightlog::Column& values);
+
+/// Gyro, attitude, accelerometer, position and their clocks.
+void check_motion(const flightlog::FlightLog& log, Findings& findings);
+/// Positions against the ground, the ceiling and the walls.
+void check_space(const flightlog::FlightLog& log, Findings& findings);
+/// The beat of the other streams against that of the voltages: their clocks.
+void check_beat(const flightlog::FlightLog& log, Findings& findings);
+/// Voltages against the frequency, inputs and phase of the beat.
+void check_command(const flightlog::FlightLog& log, Findings& findings);
+void check_power(const flightlog::FlightLog& log, Findings& findings);
+void check_wings(const flightlog::FlightLog& log, Findings& findings);
+
+}  // namespace flappy::flightlog

@@ -1,0 +1,31 @@
+// Faults of the data that forbid a diagnosis: what no vehicle and no effect explains, found before anything is fitted.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "flightlog/check/check.hpp"
+
+namespace flappy::flightlog {
+
+/// A flight must have this many beats seen by voltages, motion capture and IMU alike: ten in which the wings settle, and
+/// fifty of which mean, harmonics and noise are told apart. Nor does gravity show in less than the time.
+inline constexpr double kLeastBeats = 60, kLeastTime_s = 2;
+
+struct DataFault {
+  std::string file;  ///< of the log, in its folder
+  std::size_t line;  ///< where it first shows
+  std::string what;
+};
+
+/// At most one for each file, the one that explains the others; none where the log can be diagnosed. `report`: of the
+/// log; `folder` stands for the place in `file`. Effects of sensors within their priors are none, but for
+/// a vibration rectification of several times its typical size: the mean force is bent as by another attitude.
+std::vector<DataFault> data_faults(const flightlog::FlightLog& log, const CheckReport& report,
+                                   const std::filesystem::path& folder);
+inline std::vector<DataFault> data_faults(const flightlog::FlightLog& log, const std::filesystem::path& folder) {
+  return data_faults(log, check_flight(log), folder);
+}
+
+}  // namespace flappy::flightlog

@@ -1,0 +1,331 @@
+#include "flightlog/check/motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "flightlog/check/check_parts.hpp"
+#include "flightlog/rotation.hpp"
+
+namespace flappy::flightlog {
+namespace {
+
+double longest_bridged(const std::vector<double>& t_s) {
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < t_s.size(); ++i) intervals.push_back(t_s[i] - t_s[i - 1]);
+  return std::max(3 * median(intervals), 0.01);
+}
+
+Vector3d mean_of(const std::vector<Vector3d>& values) {
+  Vector3d sum = Vector3d::Zero();
+  for (const Vector3d& v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+/// The sums that all hypotheses about frames need.
+struct Moments {
+  Matrix3d cross = Matrix3d::Zero();  ///< mocap x gyro
+  double mocap = 0, gyro = 0;
+};
+
+Moments moments(const Pairs& pairs) {
+  const Vector3d m0 = mean_of(pairs.mocap), g0 = mean_of(pairs.gyro);
+  Moments sum;
+  for (std::size_t i = 0; i < pairs.mocap.size(); ++i) {
+    const Vector3d m = pairs.mocap[i] - m0, g = pairs.gyro[i] - g0;
+    sum.cross += m * g.transpose();
+    sum.mocap += m.squaredNorm();
+    sum.gyro += g.squaredNorm();
+  }
+  return sum;
+}
+
+double overlap(const Matrix3d& axes, const Matrix3d& cross) { return axes.cwiseProduct(cross).sum(); }
+
+}  // namespace
+
+const std::vector<Matrix3d>& signed_permutations() {
+  static const std::vector<Matrix3d> all = [] {
+    std::vector<Matrix3d> list;
+    std::array<int, 3> order = {0, 1, 2};
+    do {
+      for (int signs = 0; signs < 8; ++signs) {
+        Matrix3d m = Matrix3d::Zero();
+        for (int i = 0; i < 3; ++i) m(i, order[static_cast<std::size_t>(i)]) = (signs >> i & 1) ? -1 : 1;
+        list.push_back(m);
+      }
+    } while (std::ranges::next_permutation(order).found);
+    return list;
+  }();
+  return all;
+}
+
+Motion::Motion(const flightlog::FlightLog& log) {
+  const flightlog::MocapStream& m = log.mocap;
+  const flightlog::ImuStream& s = log.imu;
+  const double start_s = m.t_s.front() - log.header.mocap.latency_s;
+  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
+    const Vector3d position(m.x_m[i], m.y_m[i], m.z_m[i]);
+    const std::array<double, 4> quaternion = {m.qw[i], m.qx[i], m.qy[i], m.qz[i]};
+    const bool repeated = i > 1 && log.header.mocap.position_noise_m > 0 && position == position_m_.back() &&
+                          quaternion == quaternion_.back();
+    if (repeated) continue;
+    mocap_t_s_.push_back(m.t_s[i] - log.header.mocap.latency_s - start_s);
+    position_m_.push_back(position);
+    quaternion_.push_back(quaternion);
+  }
+  for (std::size_t i = 0; i < s.t_s.size(); ++i) {
+    imu_t_s_.push_back(s.t_s[i] - log.header.imu.latency_s - start_s);
+    gyro_rad_s_.emplace_back(s.gyro_x_rad_s[i], s.gyro_y_rad_s[i], s.gyro_z_rad_s[i]);
+    accel_m_s2_.emplace_back(s.accel_x_m_s2[i], s.accel_y_m_s2[i], s.accel_z_m_s2[i]);
+  }
+  longest_mocap_s_ = longest_bridged(mocap_t_s_);
+  longest_imu_s_ = longest_bridged(imu_t_s_);
+  gyro_integral_rad_.emplace_back(Vector3d::Zero());
+  gaps_before_.push_back(0);
+  for (std::size_t i = 1; i < imu_t_s_.size(); ++i) {
+    const double dt = imu_t_s_[i] - imu_t_s_[i - 1];
+    gyro_integral_rad_.push_back(gyro_integral_rad_.back() + (gyro_rad_s_[i] + gyro_rad_s_[i - 1]) * (dt / 2));
+    gaps_before_.push_back(gaps_before_.back() + (dt > longest_imu_s_));
+  }
+}
+
+Quaterniond Motion::attitude(std::size_t sample, Order order) const {
+  const auto& [a, b, c, d] = quaternion_[sample];
+  const bool w_first = order == Order::wxyz || order == Order::wxyz_inverse;
+  const Quaterniond q = w_first ? Quaterniond(a, b, c, d) : Quaterniond(d, a, b, c);
+  return order == Order::wxyz || order == Order::xyzw ? q : q.conjugate();
+}
+
+std::optional<std::size_t> Motion::bracket(double t_s) const {
+  const std::size_t k = index_before(mocap_t_s_, t_s);
+  if (k + 1 >= mocap_t_s_.size() || mocap_t_s_[k + 1] - mocap_t_s_[k] > longest_mocap_s_) return std::nullopt;
+  return k;
+}
+
+std::optional<Quaterniond> Motion::attitude_at(double t_s, Order order) const {
+  const auto k = bracket(t_s);
+  if (!k) return std::nullopt;
+  const double share = (t_s - mocap_t_s_[*k]) / (mocap_t_s_[*k + 1] - mocap_t_s_[*k]);
+  return attitude(*k, order).slerp(share, attitude(*k + 1, order));
+}
+
+std::optional<Vector3d> Motion::position_at(double t_s) const {
+  const auto k = bracket(t_s);
+  if (!k) return std::nullopt;
+  const double share = (t_s - mocap_t_s_[*k]) / (mocap_t_s_[*k + 1] - mocap_t_s_[*k]);
+  return position_m_[*k] + share * (position_m_[*k + 1] - position_m_[*k]);
+}
+
+Vector3d Motion::gyro_integral(std::size_t k, double t_s) const {
+  const double dt = t_s - imu_t_s_[k];
+  const Vector3d slope = (gyro_rad_s_[k + 1] - gyro_rad_s_[k]) / (imu_t_s_[k + 1] - imu_t_s_[k]);
+  return gyro_integral_rad_[k] + dt * gyro_rad_s_[k] + dt * dt / 2 * slope;
+}
+
+std::optional<Vector3d> Motion::mean_rate(double begin_s, double end_s) const {
+  const std::size_t first = index_before(imu_t_s_, begin_s), last = index_before(imu_t_s_, end_s);
+  if (first + 1 >= imu_t_s_.size() || last + 1 >= imu_t_s_.size()) return std::nullopt;
+  if (gaps_before_[last + 1] != gaps_before_[first]) return std::nullopt;
+  return (gyro_integral(last, end_s) - gyro_integral(first, begin_s)) / (end_s - begin_s);
+}
+
+Vector3d Motion::gyro_at(std::size_t k, double t_s) const {
+  const double share = (t_s - imu_t_s_[k]) / (imu_t_s_[k + 1] - imu_t_s_[k]);
+  return gyro_rad_s_[k] + share * (gyro_rad_s_[k + 1] - gyro_rad_s_[k]);
+}
+
+std::optional<Vector3d> Motion::mean_turn(double begin_s, double end_s) const {
+  if (!mean_rate(begin_s, end_s)) return std::nullopt;
+  Quaterniond turn = Quaterniond::Identity();
+  double from_s = begin_s;
+  for (std::size_t k = index_before(imu_t_s_, begin_s); from_s < end_s; ++k) {
+    const double to_s = std::min(end_s, imu_t_s_[k + 1]), dt = to_s - from_s;
+    const Vector3d first = gyro_at(k, from_s), last = gyro_at(k, to_s);
+    // of a rate on a line, coning within the interval included: Savage, J. Guidance, Control and Dynamics 21 (1998)
+    turn = turn * flightlog::exponential((first + last) * (dt / 2) + first.cross(last) * (dt * dt / 12));
+    from_s = to_s;
+  }
+  return flightlog::logarithm(turn) / (end_s - begin_s);
+}
+
+double Motion::roughness_rad() const {
+  double squares = 0, count = 0;
+  for (std::size_t i = 1; i + 1 < mocap_t_s_.size(); ++i) {
+    const double before = mocap_t_s_[i] - mocap_t_s_[i - 1], after = mocap_t_s_[i + 1] - mocap_t_s_[i];
+    if (std::max(before, after) > longest_mocap_s_) continue;
+    const Quaterniond between =
+        attitude(i - 1, Order::wxyz).slerp(before / (before + after), attitude(i + 1, Order::wxyz));
+    squares += flightlog::logarithm(between.conjugate() * attitude(i, Order::wxyz)).squaredNorm() / 3;
+    ++count;
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0;
+}
+
+std::vector<Window> make_windows(const Motion& motion, double length_s) {
+  const std::vector<double>& t = motion.mocap_t_s();
+  std::vector<Window> windows;
+  for (std::size_t i = 0; i < t.size();) {
+    const double end_s = t[i] + length_s;
+    Window w{t[i], end_s, {}};
+    bool whole = true;
+    for (const Order order : kOrders) {
+      const auto end = motion.attitude_at(end_s, order);
+      whole &= end.has_value();
+      if (end)
+        w.rate_rad_s[static_cast<std::size_t>(order)] =
+            flightlog::logarithm(motion.attitude(i, order).conjugate() * *end) / length_s;
+    }
+    if (whole) windows.push_back(w);
+    const std::size_t last = index_before(t, end_s);
+    i = whole ? std::max(last, i + 1) : i + 1;
+    if (last + 1 >= t.size()) break;
+  }
+  return windows;
+}
+
+Pairs pair_up(const Motion& motion, const std::vector<Window>& windows, Order order, const Lag& lag) {
+  constexpr double kStep_s = 0.005;  // wide enough to smooth the change over the gyro's samples
+  Pairs pairs;
+  for (std::size_t i = 0; i < windows.size(); ++i) {
+    const Window& w = windows[i];
+    const double shift = lag.at(w.middle_s());
+    const auto rate = motion.mean_rate(w.begin_s + shift, w.end_s + shift);
+    const auto before = motion.mean_rate(w.begin_s + shift - kStep_s, w.end_s + shift - kStep_s);
+    const auto after = motion.mean_rate(w.begin_s + shift + kStep_s, w.end_s + shift + kStep_s);
+    if (!rate || !before || !after) continue;
+    pairs.mocap.push_back(w.rate_rad_s[static_cast<std::size_t>(order)]);
+    pairs.gyro.push_back(*rate);
+    pairs.gyro_change.emplace_back((*after - *before) / (2 * kStep_s));
+    pairs.window.push_back(i);
+  }
+  return pairs;
+}
+
+Pairs with_turns(const Motion& motion, const std::vector<Window>& windows, const Pairs& pairs, const Lag& lag) {
+  Pairs turned = pairs;
+  for (std::size_t i = 0; i < pairs.gyro.size(); ++i) {
+    const Window& w = windows[pairs.window[i]];
+    const double shift = lag.at(w.middle_s());
+    if (const auto turn = motion.mean_turn(w.begin_s + shift, w.end_s + shift)) turned.gyro[i] = *turn;
+  }
+  return turned;
+}
+
+std::optional<Sync> find_lag(const Motion& motion, const std::vector<Window>& windows) {
+  constexpr double kRange_s = 1, kStep_s = 0.005;
+  // Of nearly periodic motion, the lag that is nearer and the frame that is declared.
+  constexpr double kPenalty_per_s = 0.1, kOtherFrame = 0.01;
+  std::optional<Sync> best;
+  double best_score = 0;
+  for (double lag_s = -kRange_s; lag_s <= kRange_s; lag_s += kStep_s) {
+    Pairs pairs = pair_up(motion, windows, Order::wxyz, {0, lag_s, 0});
+    if (pairs.mocap.size() < 10) continue;
+    for (const Order order : kOrders) {
+      for (std::size_t i = 0; i < pairs.mocap.size(); ++i)
+        pairs.mocap[i] = windows[pairs.window[i]].rate_rad_s[static_cast<std::size_t>(order)];
+      const Moments m = moments(pairs);
+      if (!(m.mocap > 0 && m.gyro > 0)) continue;
+      for (const Matrix3d& axes : signed_permutations()) {
+        if (order != Order::wxyz && !axes.isIdentity()) break;  // one mistake at a time
+        const double correlation = overlap(axes, m.cross) / std::sqrt(m.mocap * m.gyro);
+        const bool as_declared = order == Order::wxyz && axes.isIdentity();
+        const double score = correlation - kPenalty_per_s * std::abs(lag_s) - (as_declared ? 0 : kOtherFrame);
+        if (best && score <= best_score) continue;
+        best_score = score;
+        best = Sync{lag_s, correlation, {order, axes}};
+      }
+    }
+  }
+  return best;
+}
+
+std::optional<Estimate> refine_lag(const Motion& motion, const std::vector<Window>& windows, const Frame& frame,
+                                   Lag start, double noise) {
+  double moved_s = 0, sd = 0;
+  for (int iteration = 0; iteration < 4; ++iteration) {
+    // mocap = a gyro + a step gyro_change + constant, for a and a step
+    const Pairs pairs = pair_up(motion, windows, frame.order, start);
+    if (pairs.mocap.size() < 10) return std::nullopt;
+    const Vector3d m0 = mean_of(pairs.mocap), g0 = mean_of(pairs.gyro), c0 = mean_of(pairs.gyro_change);
+    Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d right = Eigen::Vector2d::Zero();
+    double squares = 0;
+    for (std::size_t i = 0; i < pairs.mocap.size(); ++i) {
+      const Vector3d m = pairs.mocap[i] - m0, g = frame.axes * (pairs.gyro[i] - g0);
+      const Vector3d c = frame.axes * (pairs.gyro_change[i] - c0);
+      normal += Eigen::Matrix2d{{g.dot(g), g.dot(c)}, {g.dot(c), c.dot(c)}};
+      right += Eigen::Vector2d(g.dot(m), c.dot(m));
+      squares += m.squaredNorm();
+    }
+    if (!(normal.determinant() > 1e-12 * normal(0, 0) * normal(1, 1))) return std::nullopt;
+    const Eigen::Vector2d x = normal.inverse() * right;
+    const double gain = x(0), step = x(1) / gain;
+    const double residual =
+        std::sqrt(std::max(squares - x.dot(right), 0.0) / (3.0 * static_cast<double>(pairs.mocap.size())));
+    // the noise declared or seen, whichever is larger: here too small a figure would cry wolf
+    sd = std::max(noise, residual) * std::sqrt(normal.inverse()(1, 1)) / std::abs(gain);
+    if (!(std::abs(step) < 0.1)) return std::nullopt;
+    start.at_middle_s += step;
+    moved_s += step;
+  }
+  return Estimate{moved_s, sd};
+}
+
+double remainder(const Pairs& pairs, const Matrix3d& axes, double scale) {
+  const Moments m = moments(pairs);
+  return m.mocap - 2 * scale * overlap(axes, m.cross) + scale * scale * m.gyro;
+}
+
+Gains fit_gains(const Pairs& pairs, double mocap_noise, double gyro_noise) {
+  // A gain known to a twentieth tells every mistake there is from none; a gyro spread of ten times its own noise
+  // biases it by a hundredth.
+  constexpr double kLargestSd = 0.05, kLeastSpread = 10;
+  const double n = static_cast<double>(pairs.mocap.size());
+  const Vector3d m0 = mean_of(pairs.mocap), g0 = mean_of(pairs.gyro);
+  Matrix3d square = Matrix3d::Zero(), cross = Matrix3d::Zero();
+  for (std::size_t i = 0; i < pairs.mocap.size(); ++i) {
+    const Vector3d g = pairs.gyro[i] - g0;
+    square += g * g.transpose();
+    cross += (pairs.mocap[i] - m0) * g.transpose();
+  }
+  Gains fit;
+  fit.spread = (square.diagonal() / n).cwiseSqrt();
+  std::vector<int> axes;
+  for (int i = 0; i < 3; ++i) {
+    if (fit.spread(i) > kLeastSpread * gyro_noise && fit.spread(i) > 0) axes.push_back(i);
+  }
+  // Drops the axis that is least known until all are known well enough.
+  Eigen::MatrixXd inverse;
+  while (!axes.empty()) {
+    inverse = Eigen::MatrixXd(square(axes, axes)).inverse();
+    Eigen::Index worst = 0;
+    const double variance = inverse.diagonal().maxCoeff(&worst);
+    if (mocap_noise * std::sqrt(variance) <= kLargestSd) break;
+    axes.erase(axes.begin() + worst);
+  }
+  // What an axis turns that is not tested goes along with what others turn: it is taken as it stands.
+  for (int i = 0; i < 3; ++i) {
+    if (std::ranges::find(axes, i) != axes.end()) continue;
+    fit.gain(i, i) = 1;
+    cross.row(i) -= square.row(i);
+  }
+  if (!axes.empty()) {
+    const Eigen::MatrixXd solved = Eigen::MatrixXd(cross(Eigen::all, axes)) * inverse;
+    for (std::size_t k = 0; k < axes.size(); ++k) {
+      const auto column = static_cast<Eigen::Index>(k);
+      fit.gain.col(axes[k]) = solved.col(column);
+      fit.gain_sd(axes[k]) = mocap_noise * std::sqrt(inverse(column, column));
+      fit.tested[static_cast<std::size_t>(axes[k])] = true;
+    }
+  }
+  fit.offset = m0 - fit.gain * g0;
+  for (int i = 0; i < 3; ++i)
+    fit.offset_sd(i) =
+        mocap_noise * std::sqrt(1 / n + (fit.gain_sd.cwiseProduct(g0) / std::max(mocap_noise, 1e-12)).squaredNorm());
+  for (std::size_t i = 0; i < pairs.mocap.size(); ++i)
+    fit.residual += (pairs.mocap[i] - fit.gain * pairs.gyro[i] - fit.offset).cwiseAbs2() / n;
+  fit.residual = fit.residual.cwiseSqrt();
+  return fit;
+}
+
+}  // namespace flappy::flightlog

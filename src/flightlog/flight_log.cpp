@@ -1,0 +1,386 @@
+#include "flightlog/flight_log.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "io/config.hpp"
+#include "io/csv.hpp"
+#include "io/toml_writer.hpp"
+
+namespace flappy::flightlog {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace log_file;
+using io::non_negative;
+using io::positive;
+using io::shortest_digits;
+
+constexpr double kUnitTolerance = 1e-3;
+constexpr std::string_view kBothOrNeither = "both or neither";
+
+/// A column of a stream and the largest magnitude that is still read; what is merely odd is left to the checks.
+template <class Stream>
+struct Field {
+  const char* name;
+  Column Stream::*column;
+  double limit;
+};
+
+constexpr double kLatest = 1e10;  // s; clocks that count from 1970 still have room
+const std::vector<Field<CommandStream>> kCommandFields = {{"t_s", &CommandStream::t_s, kLatest},
+                                                          {"left_voltage_V", &CommandStream::left_voltage_V, 100},
+                                                          {"right_voltage_V", &CommandStream::right_voltage_V, 100}};
+const std::vector<Field<BeatInputs>> kInputFields = {{"amplitude_V", &BeatInputs::amplitude_V, 100},
+                                                     {"difference_V", &BeatInputs::difference_V, 100},
+                                                     {"bias_V", &BeatInputs::bias_V, 100},
+                                                     {"split_cycle", &BeatInputs::split_cycle, 0.5}};
+const std::string kPhase = "phase_rad";
+constexpr double kPhaseLimit = 1e9;
+const std::vector<Field<MocapStream>> kMocapFields = {
+    {"t_s", &MocapStream::t_s, kLatest}, {"x_m", &MocapStream::x_m, 1e6}, {"y_m", &MocapStream::y_m, 1e6},
+    {"z_m", &MocapStream::z_m, 1e6},     {"qw", &MocapStream::qw, 2},     {"qx", &MocapStream::qx, 2},
+    {"qy", &MocapStream::qy, 2},         {"qz", &MocapStream::qz, 2}};
+const std::vector<Field<ImuStream>> kImuFields = {{"t_s", &ImuStream::t_s, kLatest},
+                                                  {"gyro_x_rad_s", &ImuStream::gyro_x_rad_s, 1e5},
+                                                  {"gyro_y_rad_s", &ImuStream::gyro_y_rad_s, 1e5},
+                                                  {"gyro_z_rad_s", &ImuStream::gyro_z_rad_s, 1e5},
+                                                  {"accel_x_m_s2", &ImuStream::accel_x_m_s2, 1e5},
+                                                  {"accel_y_m_s2", &ImuStream::accel_y_m_s2, 1e5},
+                                                  {"accel_z_m_s2", &ImuStream::accel_z_m_s2, 1e5}};
+const std::vector<Field<PowerStream>> kPowerFields = {{"t_s", &PowerStream::t_s, kLatest},
+                                                      {"battery_V", &PowerStream::battery_V, 100},
+                                                      {"left_current_A", &PowerStream::left_current_A, 100},
+                                                      {"right_current_A", &PowerStream::right_current_A, 100}};
+const std::vector<Field<WingsStream>> kWingsFields = {{"t_s", &WingsStream::t_s, kLatest},
+                                                      {"left_stroke_rad", &WingsStream::left_stroke_rad, 1e3},
+                                                      {"left_rotation_rad", &WingsStream::left_rotation_rad, 1e3},
+                                                      {"right_stroke_rad", &WingsStream::right_stroke_rad, 1e3},
+                                                      {"right_rotation_rad", &WingsStream::right_rotation_rad, 1e3}};
+
+[[noreturn]] void refuse(const std::string& place, const std::string& what, std::string_view accepted) {
+  throw io::InputError(place + ": " + what + (accepted.empty() ? "" : "; accepted: " + std::string(accepted)));
+}
+
+/// Length 1 to the last digits, so that what was written reads back exactly.
+void normalise(double length, std::initializer_list<double*> components) {
+  if (std::abs(length - 1) <= 4 * std::numeric_limits<double>::epsilon()) return;
+  for (double* c : components) *c /= length;
+}
+
+// ---- the header
+
+FlightHeader parse_header(const io::Table& root) {
+  root.integer("schema", 1, 1);
+  FlightHeader h;
+  h.vehicle = root.string("vehicle");
+  if (h.vehicle.empty() || h.vehicle.find_first_of("/\\") != std::string::npos)
+    root.fail("vehicle", "\"" + h.vehicle + "\" is no file name", "the name of the vehicle's file, without folder");
+  h.vehicle_sha256 = root.string_or("vehicle_sha256", "");
+  if (!h.vehicle_sha256.empty() &&
+      (h.vehicle_sha256.size() != 64 || h.vehicle_sha256.find_first_not_of("0123456789abcdef") != std::string::npos))
+    root.fail("vehicle_sha256", "is no SHA-256", "64 digits of 0 to 9 and a to f");
+  h.flapping_Hz = root.number("flapping_Hz", positive(1e3));
+  h.gravity_m_s2 = root.number("gravity_m_s2", non_negative(100));
+
+  const io::Range place = {-1e6, 1e6};
+  const io::Table ambient = root.table("ambient");
+  h.ambient.air_density_kg_m3 = ambient.number("air_density_kg_m3", positive(100));
+  h.ambient.ground_z_m = ambient.number("ground_z_m", place);
+  h.ambient.ceiling_z_m = ambient.number("ceiling_z_m", place);
+  if (h.ambient.ceiling_z_m <= h.ambient.ground_z_m)
+    ambient.fail("ceiling_z_m", shortest_digits(h.ambient.ceiling_z_m) + " is not above the ground",
+                 "a number above " + shortest_digits(h.ambient.ground_z_m));
+  for (const auto& row : ambient.rows("walls", 4, place)) {
+    LogWall wall = {row[0], row[1], row[2], row[3]};
+    const double length = std::hypot(wall.normal_x, wall.normal_y);
+    if (std::abs(length - 1) > kUnitTolerance)
+      ambient.fail(
+          "walls",
+          "normal of wall " + std::to_string(h.ambient.walls.size()) + " has length " + shortest_digits(length),
+          "[x_m, y_m, normal_x, normal_y], the normal of length 1");
+    normalise(length, {&wall.normal_x, &wall.normal_y});
+    h.ambient.walls.push_back(wall);
+  }
+
+  const io::Range rate = positive(1e6), latency = non_negative(10);
+  const io::Table mocap = root.table("mocap");
+  h.mocap = {mocap.number("rate_hz", rate), mocap.number("latency_s", latency),
+             mocap.number("position_noise_m", non_negative(1)), mocap.number("attitude_noise_rad", non_negative(1))};
+  const io::Table imu = root.table("imu");
+  h.imu.rate_hz = imu.number("rate_hz", rate);
+  h.imu.latency_s = imu.number("latency_s", latency);
+  h.imu.bandwidth_hz = imu.number("bandwidth_hz", rate);
+  h.imu.gyro_noise_rad_s = imu.number("gyro_noise_rad_s", non_negative(10));
+  h.imu.accel_noise_m_s2 = imu.number("accel_noise_m_s2", non_negative(1e3));
+  std::ranges::copy(imu.numbers("position_m", 3, {-1, 1}), h.imu.position_m.begin());
+  std::ranges::copy(imu.numbers("gyro_bias_sd_rad_s", 3, non_negative(10)), h.imu.gyro_bias_sd_rad_s.begin());
+  if (const auto power = root.optional_table("power"))
+    h.power = {power->number("battery_nominal_V", positive(100)), power->number("rate_hz", rate),
+               power->number("latency_s", latency), power->number("voltage_noise_V", non_negative(10)),
+               power->number("current_noise_A", non_negative(10))};
+  if (const auto wings = root.optional_table("wings"))
+    h.wings = {wings->number("rate_hz", rate), wings->number("noise_rad", non_negative(1))};
+  root.finish();
+  return h;
+}
+
+std::string header_text(const FlightHeader& h) {
+  std::string text;
+  const auto line = [&](const std::string& key, const std::string& value) { text += key + " = " + value + "\n"; };
+  const auto number = [&](const std::string& key, double value) { line(key, io::toml_number(value)); };
+  const auto array = [](const auto& values) {
+    std::string list;
+    for (const double value : values) list += (list.empty() ? "" : ", ") + io::toml_number(value);
+    return "[" + list + "]";
+  };
+  line("schema", "1");
+  line("vehicle", io::toml_string(h.vehicle));
+  if (!h.vehicle_sha256.empty()) line("vehicle_sha256", io::toml_string(h.vehicle_sha256));
+  number("flapping_Hz", h.flapping_Hz);
+  number("gravity_m_s2", h.gravity_m_s2);
+
+  text += "\n[ambient]\n";
+  number("air_density_kg_m3", h.ambient.air_density_kg_m3);
+  number("ground_z_m", h.ambient.ground_z_m);
+  number("ceiling_z_m", h.ambient.ceiling_z_m);
+  std::string walls;
+  for (const LogWall& w : h.ambient.walls)
+    walls += (walls.empty() ? "" : ", ") + array(std::array{w.x_m, w.y_m, w.normal_x, w.normal_y});
+  line("walls", "[" + walls + "]");
+
+  text += "\n[mocap]\n";
+  number("rate_hz", h.mocap.rate_hz);
+  number("latency_s", h.mocap.latency_s);
+  number("position_noise_m", h.mocap.position_noise_m);
+  number("attitude_noise_rad", h.mocap.attitude_noise_rad);
+
+  text += "\n[imu]\n";
+  number("rate_hz", h.imu.rate_hz);
+  number("latency_s", h.imu.latency_s);
+  number("bandwidth_hz", h.imu.bandwidth_hz);
+  line("position_m", array(h.imu.position_m));
+  number("gyro_noise_rad_s", h.imu.gyro_noise_rad_s);
+  line("gyro_bias_sd_rad_s", array(h.imu.gyro_bias_sd_rad_s));
+  number("accel_noise_m_s2", h.imu.accel_noise_m_s2);
+
+  if (h.power) {
+    text += "\n[power]\n";
+    number("battery_nominal_V", h.power->battery_nominal_V);
+    number("rate_hz", h.power->rate_hz);
+    number("latency_s", h.power->latency_s);
+    number("voltage_noise_V", h.power->voltage_noise_V);
+    number("current_noise_A", h.power->current_noise_A);
+  }
+  if (h.wings) {
+    text += "\n[wings]\n";
+    number("rate_hz", h.wings->rate_hz);
+    number("noise_rad", h.wings->noise_rad);
+  }
+  return text;
+}
+
+// ---- a stream
+
+/// Takes columns out of a table that is known to have these and perhaps those columns, and no others.
+class StreamReader {
+ public:
+  StreamReader(std::string_view text, const fs::path& path, const std::vector<std::string>& required,
+               const std::vector<std::string>& optional = {})
+      : table_(io::parse_csv(text, path.string())) {
+    std::vector<std::string> known = required;
+    known.insert(known.end(), optional.begin(), optional.end());
+    const std::string list = io::joined(known);
+    const std::string header = table_.name + ":1";
+    for (const auto& name : table_.names) {
+      if (std::ranges::find(known, name) != known.end()) continue;
+      const std::string same = io::in_another_unit(name, known);
+      if (!same.empty())
+        refuse(header, name + ": unknown column; accepted here with another unit: \"" + same + "\"", "");
+      refuse(header, name + ": unknown column", list + io::did_you_mean(name, known));
+    }
+    for (const auto& name : required) {
+      if (!has(name)) refuse(header, name + ": column is missing", list);
+    }
+    const std::size_t count = table_.columns.front().size();
+    if (count < 2) refuse(table_.name, "holds " + std::to_string(count) + " samples", "at least 2");
+  }
+
+  bool has(std::string_view name) const { return std::ranges::find(table_.names, name) != table_.names.end(); }
+
+  /// `file:line` of a sample.
+  std::string place(std::size_t row) const { return table_.name + ":" + std::to_string(row + 2); }
+
+  Column take(const std::string& name, double limit) const {
+    const Column& column = table_.column(name);
+    for (std::size_t i = 0; i < column.size(); ++i) {
+      if (std::abs(column[i]) <= limit) continue;
+      const std::string bound = shortest_digits(limit);
+      refuse(place(i), name + ": " + shortest_digits(column[i]) + " is out of range",
+             "a number from -" + bound + " to " + bound);
+    }
+    return column;
+  }
+
+  template <class Part>
+  void fill(Part& part, const std::vector<Field<Part>>& fields) const {
+    for (const auto& field : fields) part.*field.column = take(field.name, field.limit);
+  }
+
+  void require_increasing(const Column& t_s) const {
+    for (std::size_t i = 1; i < t_s.size(); ++i) {
+      if (!(t_s[i] > t_s[i - 1]))
+        refuse(place(i),
+               "t_s: " + shortest_digits(t_s[i]) + " does not come after " + shortest_digits(t_s[i - 1]) +
+                   " of the line before",
+               "times that increase");
+    }
+  }
+
+ private:
+  io::CsvTable table_;
+};
+
+template <class Stream>
+std::vector<std::string> names_of(const std::vector<Field<Stream>>& fields) {
+  std::vector<std::string> names;
+  for (const auto& field : fields) names.emplace_back(field.name);
+  return names;
+}
+
+template <class Stream>
+Stream parse_stream(const std::string& text, const fs::path& path, const std::vector<Field<Stream>>& fields) {
+  const StreamReader reader(text, path, names_of(fields));
+  Stream stream;
+  reader.fill(stream, fields);
+  reader.require_increasing(stream.t_s);
+  return stream;
+}
+
+CommandStream parse_command(const std::string& text, const fs::path& path) {
+  std::vector<std::string> optional = names_of(kInputFields);
+  optional.push_back(kPhase);
+  const StreamReader reader(text, path, names_of(kCommandFields), optional);
+  CommandStream command;
+  reader.fill(command, kCommandFields);
+  reader.require_increasing(command.t_s);
+  std::string missing;
+  for (const auto& field : kInputFields) {
+    if (reader.has(field.name)) command.inputs.emplace();
+    else missing += (missing.empty() ? "" : ", ") + std::string(field.name);
+  }
+  if (command.inputs && !missing.empty())
+    refuse(path.string() + ":1", missing + ": missing beside other inputs of the wing beat", "all four or none");
+  if (command.inputs) reader.fill(*command.inputs, kInputFields);
+  if (reader.has(kPhase)) command.phase_rad = reader.take(kPhase, kPhaseLimit);
+  return command;
+}
+
+MocapStream parse_mocap(const std::string& text, const fs::path& path) {
+  MocapStream m = parse_stream(text, path, kMocapFields);
+  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
+    const double length = std::sqrt(m.qw[i] * m.qw[i] + m.qx[i] * m.qx[i] + m.qy[i] * m.qy[i] + m.qz[i] * m.qz[i]);
+    if (std::abs(length - 1) > kUnitTolerance)
+      refuse(path.string() + ":" + std::to_string(i + 2), "qw, qx, qy, qz: length is " + shortest_digits(length),
+             "a quaternion of length 1 to within " + shortest_digits(kUnitTolerance));
+    normalise(length, {&m.qw[i], &m.qx[i], &m.qy[i], &m.qz[i]});
+  }
+  return m;
+}
+
+template <class Stream>
+void add_columns(const Stream& stream, const std::vector<Field<Stream>>& fields, std::vector<std::string>& names,
+                 std::vector<Column>& columns) {
+  for (const auto& field : fields) {
+    names.emplace_back(field.name);
+    columns.push_back(stream.*field.column);
+  }
+}
+
+template <class Stream>
+std::string stream_text(const Stream& stream, const std::vector<Field<Stream>>& fields) {
+  std::vector<std::string> names;
+  std::vector<Column> columns;
+  add_columns(stream, fields, names, columns);
+  return io::csv_text(names, columns);
+}
+
+std::string command_text(const CommandStream& command) {
+  std::vector<std::string> names;
+  std::vector<Column> columns;
+  add_columns(command, kCommandFields, names, columns);
+  if (command.inputs) add_columns(*command.inputs, kInputFields, names, columns);
+  if (command.phase_rad) {
+    names.push_back(kPhase);
+    columns.push_back(*command.phase_rad);
+  }
+  return io::csv_text(names, columns);
+}
+
+// ---- the whole
+
+void require_overlap(const FlightLog& log, const fs::path& folder) {
+  std::vector<std::pair<std::string, const Column*>> streams = {
+      {kCommand, &log.command.t_s}, {kMocap, &log.mocap.t_s}, {kImu, &log.imu.t_s}};
+  if (log.power) streams.emplace_back(kPower, &log.power->t_s);
+  if (log.wings) streams.emplace_back(kWings, &log.wings->t_s);
+  const auto& last = *std::ranges::max_element(streams, {}, [](const auto& s) { return s.second->front(); });
+  const auto& first = *std::ranges::min_element(streams, {}, [](const auto& s) { return s.second->back(); });
+  if (last.second->front() >= first.second->back())
+    refuse((folder / last.first).string() + ":2",
+           "t_s: begins at " + shortest_digits(last.second->front()) + " s, when " + first.first + " has ended at " +
+               shortest_digits(first.second->back()) + " s",
+           "streams that overlap, of one clock");
+}
+
+const std::string& text_of(const LogFiles& files, const std::string& name, const fs::path& folder) {
+  const auto found = files.find(name);
+  if (found == files.end())
+    refuse((folder / name).string(), "is missing", "a folder with flight.toml, command.csv, mocap.csv and imu.csv");
+  return found->second;
+}
+
+/// The stream of an optional file, whose table of the same name the header must have exactly where the file is.
+template <class Stream>
+std::optional<Stream> parse_optional(const LogFiles& files, const std::string& name, const fs::path& folder,
+                                     bool declared, const io::Table& root, const std::vector<Field<Stream>>& fields) {
+  const std::string table = name.substr(0, name.find('.'));
+  const auto found = files.find(name);
+  if (found == files.end()) {
+    if (declared) root.fail(table, "is declared, but " + name + " is missing", kBothOrNeither);
+    return std::nullopt;
+  }
+  if (!declared)
+    refuse((folder / name).string(), "is there, but " + kHeader + " has no [" + table + "]", kBothOrNeither);
+  return parse_stream(found->second, folder / name, fields);
+}
+
+}  // namespace
+
+FlightLog parse_flight_log(const LogFiles& files, const fs::path& folder) {
+  const io::Table root = io::Config::parse(text_of(files, kHeader, folder), (folder / kHeader).string()).root();
+  FlightLog log;
+  log.header = parse_header(root);
+  log.command = parse_command(text_of(files, kCommand, folder), folder / kCommand);
+  log.mocap = parse_mocap(text_of(files, kMocap, folder), folder / kMocap);
+  log.imu = parse_stream(text_of(files, kImu, folder), folder / kImu, kImuFields);
+  log.power = parse_optional(files, kPower, folder, log.header.power.has_value(), root, kPowerFields);
+  log.wings = parse_optional(files, kWings, folder, log.header.wings.has_value(), root, kWingsFields);
+  require_overlap(log, folder);
+  return log;
+}
+
+LogFiles flight_log_files(const FlightLog& log) {
+  LogFiles files = {{kHeader, header_text(log.header)},
+                    {kCommand, command_text(log.command)},
+                    {kMocap, stream_text(log.mocap, kMocapFields)},
+                    {kImu, stream_text(log.imu, kImuFields)}};
+  if (log.power) files[kPower] = stream_text(*log.power, kPowerFields);
+  if (log.wings) files[kWings] = stream_text(*log.wings, kWingsFields);
+  return files;
+}
+
+}  // namespace flappy::flightlog

@@ -1,0 +1,189 @@
+// The log of a flight, as any laboratory can write it: a folder of one header and one table for each stream.
+//
+//   flight.toml   what is declared: FlightHeader, `schema = 1`
+//   command.csv   t_s,left_voltage_V,right_voltage_V; optional: amplitude_V,difference_V,bias_V,split_cycle and phase_rad
+//   mocap.csv     t_s,x_m,y_m,z_m,qw,qx,qy,qz
+//   imu.csv       t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2
+//   power.csv     optional: t_s,battery_V,left_current_A,right_current_A
+//   wings.csv     optional: t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad
+//   truth.csv     only from a simulator: the full state; no reader here opens it
+//
+// All streams share one clock; each has its own rate and may have gaps; time increases. World W: z up. Body B: x
+// forward, y left, z up. Quaternion w, x, y, z, body to world, of length 1.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/files.hpp"
+
+namespace flappy::flightlog {
+
+/// A vertical wall through (x, y); its normal points into the free space and has length 1.
+struct LogWall {
+  double x_m = 0, y_m = 0, normal_x = 1, normal_y = 0;
+  bool operator==(const LogWall&) const = default;
+};
+
+/// What surrounded the flight; far away where there was none.
+struct LogAmbient {
+  double air_density_kg_m3 = 1.18, ground_z_m = -1e3, ceiling_z_m = 1e3;
+  std::vector<LogWall> walls;
+  bool operator==(const LogAmbient&) const = default;
+};
+
+/// Noise is the standard deviation of one sample, latency the mean from the instant measured to the sample's t_s.
+struct MocapHeader {
+  double rate_hz = 0, latency_s = 0, position_noise_m = 0, attitude_noise_rad = 0;
+  bool operator==(const MocapHeader&) const = default;
+};
+
+struct ImuHeader {
+  double rate_hz = 0, latency_s = 0, bandwidth_hz = 0;
+  std::array<double, 3> position_m = {0, 0, 0};  ///< in B
+  double gyro_noise_rad_s = 0;
+  std::array<double, 3> gyro_bias_sd_rad_s = {0, 0, 0};
+  double accel_noise_m_s2 = 0;
+  bool operator==(const ImuHeader&) const = default;
+};
+
+/// Voltage at a motor = command x battery_V / battery_nominal_V.
+struct PowerHeader {
+  double battery_nominal_V = 0, rate_hz = 0, latency_s = 0, voltage_noise_V = 0, current_noise_A = 0;
+  bool operator==(const PowerHeader&) const = default;
+};
+
+struct WingsHeader {
+  double rate_hz = 0, noise_rad = 0;
+  bool operator==(const WingsHeader&) const = default;
+};
+
+/// All of flight.toml.
+struct FlightHeader {
+  std::string vehicle;         ///< name of the vehicle's file as declared, without folder
+  std::string vehicle_sha256;  ///< of that file's bytes, lower-case hex; empty where not declared
+  double flapping_Hz = 0, gravity_m_s2 = 9.81;
+  LogAmbient ambient;
+  MocapHeader mocap;
+  ImuHeader imu;
+  std::optional<PowerHeader> power;
+  std::optional<WingsHeader> wings;
+  bool operator==(const FlightHeader&) const = default;
+};
+
+using Column = std::vector<double>;
+
+/// The inputs of the wing beat that made the voltages.
+struct BeatInputs {
+  Column amplitude_V, difference_V, bias_V, split_cycle;
+  bool operator==(const BeatInputs&) const = default;
+};
+
+/// t_s is when the driver applied the voltages; they hold until the next.
+struct CommandStream {
+  Column t_s, left_voltage_V, right_voltage_V;
+  std::optional<BeatInputs> inputs;
+  std::optional<Column> phase_rad;  ///< of the beat, 2 pi each; wrapped or not
+  bool operator==(const CommandStream&) const = default;
+};
+
+/// The torso origin in W; t_s is when the sample arrived.
+struct MocapStream {
+  Column t_s, x_m, y_m, z_m, qw, qx, qy, qz;
+  bool operator==(const MocapStream&) const = default;
+};
+
+/// Rate and specific force in B; t_s is when the sample arrived.
+struct ImuStream {
+  Column t_s, gyro_x_rad_s, gyro_y_rad_s, gyro_z_rad_s, accel_x_m_s2, accel_y_m_s2, accel_z_m_s2;
+  bool operator==(const ImuStream&) const = default;
+};
+
+/// Instantaneous and signed.
+struct PowerStream {
+  Column t_s, battery_V, left_current_A, right_current_A;
+  bool operator==(const PowerStream&) const = default;
+};
+
+struct WingsStream {
+  Column t_s, left_stroke_rad, left_rotation_rad, right_stroke_rad, right_rotation_rad;
+  bool operator==(const WingsStream&) const = default;
+};
+
+struct FlightLog {
+  FlightHeader header;
+  CommandStream command;
+  MocapStream mocap;
+  ImuStream imu;
+  std::optional<PowerStream> power;  ///< where the header has it, as the next
+  std::optional<WingsStream> wings;
+  bool operator==(const FlightLog&) const = default;
+};
+
+/// The names of the files.
+namespace log_file {
+inline const std::string kHeader = "flight.toml", kCommand = "command.csv", kMocap = "mocap.csv", kImu = "imu.csv",
+                         kPower = "power.csv", kWings = "wings.csv", kTruth = "truth.csv";
+inline const std::vector<std::string> kAll = {kHeader, kCommand, kMocap, kImu, kPower, kWings, kTruth};
+}  // namespace log_file
+
+/// Columns of truth.csv: pose, motion and wings, as the flapper has them, and its gyro's bias.
+inline const std::vector<std::string> kMotionNames = {"t_s",
+                                                      "x_m",
+                                                      "y_m",
+                                                      "z_m",
+                                                      "qw",
+                                                      "qx",
+                                                      "qy",
+                                                      "qz",
+                                                      "velocity_x_m_s",
+                                                      "velocity_y_m_s",
+                                                      "velocity_z_m_s",
+                                                      "rate_x_rad_s",
+                                                      "rate_y_rad_s",
+                                                      "rate_z_rad_s",
+                                                      "left_stroke_rad",
+                                                      "left_rotation_rad",
+                                                      "right_stroke_rad",
+                                                      "right_rotation_rad",
+                                                      "left_stroke_rate_rad_s",
+                                                      "left_rotation_rate_rad_s",
+                                                      "right_stroke_rate_rad_s",
+                                                      "right_rotation_rate_rad_s",
+                                                      "gyro_bias_x_rad_s",
+                                                      "gyro_bias_y_rad_s",
+                                                      "gyro_bias_z_rad_s"};
+
+/// Texts of the files of a log by name, truth.csv left out.
+using LogFiles = std::map<std::string, std::string>;
+
+/// Reads a log. InputError "folder/file:line: column: what is wrong; what is accepted" for a file or column that is
+/// missing, unknown or faulty, time that does not increase, a quaternion whose length is not 1 to 1e-3 (others are
+/// normalised), and streams that never overlap. Never opens truth.csv.
+FlightLog read_flight_log(const std::filesystem::path& folder);
+
+/// The same from texts; `folder` stands for the place in messages.
+FlightLog parse_flight_log(const LogFiles& files, const std::filesystem::path& folder);
+
+/// InputError where one of these folders is given twice, under whatever name.
+void check_each_once(const std::vector<std::string>& folders);
+
+/// The texts that parse_flight_log reads back exactly, quaternions to the last digit where their length is 1.
+LogFiles flight_log_files(const FlightLog& log);
+
+/// Writes a log as a whole or not at all. The folder is created, or replaced, truth.csv, vehicle and all, if it is a
+/// flight log already. InputError if it holds anything else, if it cannot be written, or if the log would be refused when read.
+void write_flight_log(const std::filesystem::path& folder, const FlightLog& log);
+
+/// Adds truth.csv to a log; columns of one length. InputError if the folder holds no flight log.
+void write_truth(const std::filesystem::path& folder, const std::vector<std::string>& names,
+                 const std::vector<Column>& columns);
+
+/// Adds the file of the vehicle, `name` as the header declares it, so that the folder stands alone. InputError as above.
+void write_vehicle(const std::filesystem::path& folder, const std::string& name, std::string_view text);
+
+}  // namespace flappy::flightlog

@@ -1,0 +1,391 @@
+#include "flightlog/track.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "flightlog/rotation.hpp"
+
+namespace flappy::flightlog {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kPi = std::numbers::pi;
+/// What no header declares: a consumer accelerometer's bias (BMI088 data sheet: 20 mg), slow drifts, any velocity of a
+/// small flapper.
+constexpr double kAccelBiasSd_m_s2 = 0.2;
+constexpr double kGyroBiasDrift_rad_s_sqrt_s = 1e-4, kAccelBiasDrift_m_s2_sqrt_s = 0.01;
+constexpr double kVelocitySd_m_s = 3;
+/// Without samples the motion within the beat goes on unseen: about these rates and accelerations, for about this long
+/// in one direction.
+constexpr double kUnseenRate_rad_s = 5, kUnseenAcceleration_m_s2 = 30, kUnseenFor_s = 0.01;
+/// Noise below which a filter in double would see nothing but rounding, where a header declares none.
+constexpr double kLeastAngle_rad = 1e-6, kLeastPosition_m = 1e-7, kLeastRate_rad_s = 1e-5, kLeastForce_m_s2 = 1e-4;
+constexpr double kSame_s = 1e-9;
+/// Bound of the frames lost in a row.
+constexpr double kLongestUnseenFrames = 4;
+
+Matrix3d cross_matrix(const Vector3d& v) {
+  Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+/// Share of a new value in the low-pass that, after the mean over an interval, passes 1/sqrt(2) at the bandwidth; 1
+/// where the mean alone does.
+double low_pass_share(const ImuHeader& h) {
+  const double x = kPi * h.bandwidth_hz / h.rate_hz;
+  if (x >= kPi) return 1;
+  const auto passes = [&](double share) {
+    const double past = 1 - share;
+    return std::sin(x) / x * share / std::sqrt(1 - 2 * past * std::cos(2 * x) + past * past);
+  };
+  constexpr double kWhole = 0.98;  // a header in round numbers
+  if (passes(1) <= std::numbers::sqrt2 / 2 / kWhole) return 1;
+  double low = 1e-4, high = 1;
+  for (int i = 0; i < 60; ++i) (passes((low + high) / 2) > std::numbers::sqrt2 / 2 ? high : low) = (low + high) / 2;
+  return (low + high) / 2;
+}
+
+/// Index of the last of `t_s` not after a time; 0 before the first.
+std::size_t index_before(const std::vector<double>& t_s, double at_s) {
+  const auto after = std::ranges::upper_bound(t_s, at_s);
+  return after == t_s.begin() ? 0 : static_cast<std::size_t>(after - t_s.begin()) - 1;
+}
+
+}  // namespace
+
+/// Spectral densities and variances.
+struct Track::Noise {
+  double angle_rad2_s, velocity_m2_s3;
+  double pose_angle_rad2, pose_position_m2;
+  Vector3d gyro_bias_rad2_s2;
+
+  explicit Noise(const FlightHeader& h) {
+    const auto density = [&](double sd, double least) {
+      return std::max(sd, least) * std::max(sd, least) / h.imu.rate_hz;
+    };
+    const auto variance = [](double sd, double least) { return std::max(sd, least) * std::max(sd, least); };
+    angle_rad2_s = density(h.imu.gyro_noise_rad_s, kLeastRate_rad_s);
+    velocity_m2_s3 = density(h.imu.accel_noise_m_s2, kLeastForce_m_s2);
+    pose_angle_rad2 = variance(h.mocap.attitude_noise_rad, kLeastAngle_rad);
+    pose_position_m2 = variance(h.mocap.position_noise_m, kLeastPosition_m);
+    for (int i = 0; i < 3; ++i)
+      gyro_bias_rad2_s2[i] = variance(h.imu.gyro_bias_sd_rad_s[static_cast<std::size_t>(i)], kLeastRate_rad_s);
+  }
+};
+
+/// What the IMU says of a piece of one of its intervals. Velocity is gained in B as it is in the middle of the whole
+/// interval: a mean knows no other frame.
+struct Track::Reading {
+  double duration_s, to_middle_s;
+  Vector3d turn_rad, turn_to_middle_rad, gained_m_s, moved_m;
+  bool gap;
+};
+
+struct Track::Pose {
+  double t_s;
+  Vector3d position_m;
+  Quaterniond attitude;
+};
+
+Track::Track(const FlightLog& log, const std::filesystem::path& folder)
+    : gravity_m_s2_(log.header.gravity_m_s2),
+      longest_unseen_s_(kLongestUnseenFrames / log.header.mocap.rate_hz),
+      arm_m_(log.header.imu.position_m.data()) {
+  read_imu(log);
+  const std::vector<Pose> poses = read_poses(log);
+  if (poses.size() < 2)
+    throw io::InputError(folder.string() + ": motion capture and IMU, less their latencies, share " +
+                         std::to_string(poses.size()) + " poses; accepted: streams that overlap");
+  lay_nodes(poses);
+  const Noise noise(log.header);
+  smooth(filter(poses, noise), noise);
+}
+
+void Track::read_imu(const FlightLog& log) {
+  const ImuHeader& h = log.header.imu;
+  const ImuStream& s = log.imu;
+  const std::size_t n = s.t_s.size();
+  const double interval_s = 1 / h.rate_hz, share = low_pass_share(h);
+  const double late_s = h.latency_s + 1 / (2 * kPi * h.bandwidth_hz) - (1 - share) / share * interval_s;
+  const auto follows = [&](std::size_t i) { return s.t_s[i] - s.t_s[i - 1] < 1.5 * interval_s; };
+  std::vector<Vector3d> gyro, accel;
+  const auto add = [&](double from_s, const Vector3d& rate, const Vector3d& force, bool gap) {
+    bounds_s_.push_back(from_s);
+    gyro.push_back(rate);
+    accel.push_back(force);
+    gap_.push_back(gap ? 1 : 0);
+  };
+  Vector3d rate_before, force_before;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vector3d rate(s.gyro_x_rad_s[i], s.gyro_y_rad_s[i], s.gyro_z_rad_s[i]);
+    const Vector3d force(s.accel_x_m_s2[i], s.accel_y_m_s2[i], s.accel_z_m_s2[i]);
+    const double centre_s = s.t_s[i] - late_s;
+    const bool begins = i == 0 || !follows(i);
+    if (i > 0 && begins)
+      add(s.t_s[i - 1] - late_s + interval_s / 2, (gyro.back() + rate) / 2, (accel.back() + force) / 2, true);
+    const double from_s = begins ? centre_s - interval_s / 2 : (s.t_s[i - 1] + s.t_s[i]) / 2 - late_s;
+    if (begins) rate_before = rate, force_before = force;
+    add(from_s, (rate - (1 - share) * rate_before) / share, (force - (1 - share) * force_before) / share, false);
+    rate_before = rate;
+    force_before = force;
+  }
+  bounds_s_.push_back(s.t_s.back() - late_s + interval_s / 2);
+  gyro_ = MeanSpline(bounds_s_, std::move(gyro));
+  accel_ = MeanSpline(bounds_s_, std::move(accel));
+}
+
+auto Track::read_poses(const FlightLog& log) const -> std::vector<Pose> {
+  const MocapStream& m = log.mocap;
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
+    const double t_s = m.t_s[i] - log.header.mocap.latency_s;
+    const auto same = [&](const Column& c) { return c[i] == c[i - 1]; };
+    const bool repeated =
+        i > 0 && same(m.x_m) && same(m.y_m) && same(m.z_m) && same(m.qw) && same(m.qx) && same(m.qy) && same(m.qz);
+    if (t_s < bounds_s_.front() || t_s >= bounds_s_.back() - kSame_s ||
+        (repeated && log.header.mocap.position_noise_m > 0))
+      continue;
+    poses.push_back({t_s, {m.x_m[i], m.y_m[i], m.z_m[i]}, Quaterniond(m.qw[i], m.qx[i], m.qy[i], m.qz[i])});
+  }
+  return poses;
+}
+
+void Track::lay_nodes(const std::vector<Pose>& poses) {
+  std::size_t next_pose = 0;
+  for (std::size_t k = index_before(bounds_s_, poses.front().t_s); next_pose < poses.size(); ++k) {
+    if (next_pose > 0 && bounds_s_[k] > nodes_.back().t_s + kSame_s) nodes_.push_back({bounds_s_[k], k, {}});
+    for (; next_pose < poses.size() && poses[next_pose].t_s < bounds_s_[k + 1] - kSame_s; ++next_pose) {
+      const double t_s = poses[next_pose].t_s;
+      if (nodes_.empty() || t_s > nodes_.back().t_s + kSame_s) nodes_.push_back({t_s, k, {}});
+      pose_s_.push_back(t_s);
+      pose_node_.push_back(nodes_.size() - 1);
+    }
+  }
+}
+
+auto Track::reading(std::size_t interval, double from_s, double to_s) const -> Reading {
+  const double length = bounds_s_[interval + 1] - bounds_s_[interval];
+  const double u = (from_s - bounds_s_[interval]) / length, v = (to_s - bounds_s_[interval]) / length;
+  return {to_s - from_s,
+          (0.5 - u) * length,
+          length * gyro_.integral(interval, u, v),
+          length * (gyro_.integral(interval, 0, 1) / 2 - gyro_.integral(interval, 0, u)),
+          length * accel_.integral(interval, u, v),
+          length * length * accel_.second_integral(interval, u, v),
+          gap_[interval] != 0};
+}
+
+Quaterniond Track::to_middle(const State& x, const Reading& r) {
+  return x.attitude * exponential(r.turn_to_middle_rad - r.to_middle_s * x.gyro_bias);
+}
+
+auto Track::moved(const State& x, const Reading& r) const -> State {
+  const Vector3d turn = r.turn_rad - r.duration_s * x.gyro_bias;
+  const double dt = r.duration_s;
+  const Quaterniond middle = to_middle(x, r);
+  const Vector3d down(0, 0, -gravity_m_s2_);
+  State y = x;
+  // not half of what was gained: the beat's acceleration A would leave A dt^2/12 in the position, some 0.01 mm
+  y.position_m += dt * x.velocity_m_s + middle * (r.moved_m - dt * dt / 2 * x.accel_bias) + dt * dt / 2 * down;
+  y.velocity_m_s += middle * (r.gained_m_s - dt * x.accel_bias) + dt * down;
+  y.attitude = (x.attitude * exponential(turn)).normalized();
+  return y;
+}
+
+auto Track::transition(const State& x, const Reading& r) const -> Covariance {
+  const double dt = r.duration_s;
+  const Vector3d turn = r.turn_rad - dt * x.gyro_bias;
+  const Matrix3d half = to_middle(x, r).toRotationMatrix();
+  const Matrix3d leans = -half * cross_matrix(r.gained_m_s - dt * x.accel_bias);  // velocity for an angle
+  Covariance f = Covariance::Identity();
+  f.block<3, 3>(0, 0) = exponential(-turn).toRotationMatrix();
+  f.block<3, 3>(0, 9).diagonal().setConstant(-dt);
+  f.block<3, 3>(3, 6).diagonal().setConstant(dt);
+  f.block<3, 3>(6, 0) = leans;
+  f.block<3, 3>(6, 12) = -dt * half;
+  f.block<3, 3>(3, 0) = dt / 2 * leans;
+  f.block<3, 3>(3, 12) = -dt * dt / 2 * half;
+  return f;
+}
+
+void Track::add_noise(Covariance& p, const Reading& r, const Noise& noise) const {
+  const double dt = r.duration_s;
+  const double angle = noise.angle_rad2_s + (r.gap ? kUnseenRate_rad_s * kUnseenRate_rad_s * kUnseenFor_s : 0);
+  const double velocity =
+      noise.velocity_m2_s3 + (r.gap ? kUnseenAcceleration_m_s2 * kUnseenAcceleration_m_s2 * kUnseenFor_s : 0);
+  for (int i = 0; i < 3; ++i) {
+    p(i, i) += dt * angle;
+    p(3 + i, 3 + i) += dt * dt * dt / 3 * velocity;
+    p(3 + i, 6 + i) += dt * dt / 2 * velocity;
+    p(6 + i, 3 + i) += dt * dt / 2 * velocity;
+    p(6 + i, 6 + i) += dt * velocity;
+    p(9 + i, 9 + i) += dt * kGyroBiasDrift_rad_s_sqrt_s * kGyroBiasDrift_rad_s_sqrt_s;
+    p(12 + i, 12 + i) += dt * kAccelBiasDrift_m_s2_sqrt_s * kAccelBiasDrift_m_s2_sqrt_s;
+  }
+}
+
+void Track::displace(State& x, const Eigen::Matrix<double, 15, 1>& error) {
+  x.attitude = (x.attitude * exponential(error.segment<3>(0))).normalized();
+  x.position_m += error.segment<3>(3);
+  x.velocity_m_s += error.segment<3>(6);
+  x.gyro_bias += error.segment<3>(9);
+  x.accel_bias += error.segment<3>(12);
+}
+
+void Track::correct(State& x, Covariance& p, const Pose& z, const Noise& noise) {
+  const Matrix3d R = x.attitude.toRotationMatrix();
+  Eigen::Matrix<double, 6, 15> h = Eigen::Matrix<double, 6, 15>::Zero();
+  h.block<3, 3>(0, 0).setIdentity();
+  h.block<3, 3>(3, 0) = R * cross_matrix(arm_m_);
+  h.block<3, 3>(3, 3).setIdentity();
+  Eigen::Matrix<double, 6, 1> off, variance;
+  off << logarithm(x.attitude.conjugate() * z.attitude), z.position_m - (x.position_m - R * arm_m_);
+  variance << Vector3d::Constant(noise.pose_angle_rad2), Vector3d::Constant(noise.pose_position_m2);
+  const Eigen::Matrix<double, 15, 6> ph = p * h.transpose();
+  Eigen::Matrix<double, 6, 6> s = h * ph;
+  s.diagonal() += variance;
+  surprise_[0] += off.head<3>().dot(s.topLeftCorner<3, 3>().llt().solve(off.head<3>())) / 3;
+  surprise_[1] += off.tail<3>().dot(s.bottomRightCorner<3, 3>().llt().solve(off.tail<3>())) / 3;
+  const Eigen::Matrix<double, 15, 6> gain = s.llt().solve(ph.transpose()).transpose();
+  displace(x, gain * off);
+  p -= gain * ph.transpose();
+  p = (0.5 * (p + p.transpose())).eval();
+}
+
+auto Track::filter(const std::vector<Pose>& poses, const Noise& noise) -> std::vector<Covariance> {
+  Covariance p = Covariance::Zero();
+  p.diagonal() << Vector3d::Constant(noise.pose_angle_rad2), Vector3d::Constant(noise.pose_position_m2),
+      Vector3d::Constant(kVelocitySd_m_s * kVelocitySd_m_s), noise.gyro_bias_rad2_s2,
+      Vector3d::Constant(kAccelBiasSd_m_s2 * kAccelBiasSd_m_s2);
+  const Pose& first = poses.front();
+  // the arm turns the first pose's error of angle into one of the IMU's position
+  Covariance from_pose = Covariance::Identity();
+  from_pose.block<3, 3>(3, 0) = -first.attitude.toRotationMatrix() * cross_matrix(arm_m_);
+  p = (from_pose * p * from_pose.transpose()).eval();
+  State x{first.attitude, first.position_m + first.attitude * arm_m_, Vector3d::Zero(), Vector3d::Zero(),
+          Vector3d::Zero()};
+  std::vector<Covariance> list;
+  list.reserve(nodes_.size());
+  std::size_t next_pose = 1;  // the first is the start
+  double corrections = 0;
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (i > 0) {
+      const Reading r = reading(nodes_[i - 1].interval, nodes_[i - 1].t_s, nodes_[i].t_s);
+      const Covariance f = transition(x, r);
+      p = (f * p * f.transpose()).eval();
+      add_noise(p, r, noise);
+      x = moved(x, r);
+    }
+    for (; next_pose < poses.size() && pose_node_[next_pose] == i; ++next_pose, ++corrections)
+      correct(x, p, poses[next_pose], noise);
+    nodes_[i].state = x;
+    list.push_back(p);
+  }
+  for (int k = 0; k < 2; ++k) surprise_[k] /= std::max(corrections, 1.0);
+  return list;
+}
+
+void Track::smooth(std::vector<Covariance> covariance, const Noise& noise) {
+  std::vector<Covariance>& p = covariance;
+  for (std::size_t i = nodes_.size() - 1; i-- > 0;) {
+    const Reading r = reading(nodes_[i].interval, nodes_[i].t_s, nodes_[i + 1].t_s);
+    State& x = nodes_[i].state;
+    const State after = moved(x, r), &better = nodes_[i + 1].state;
+    const Covariance f = transition(x, r);
+    const Covariance fp = f * p[i];
+    Covariance ahead = fp * f.transpose();
+    add_noise(ahead, r, noise);
+    const Covariance gain = ahead.llt().solve(fp).transpose();
+    Eigen::Matrix<double, 15, 1> off;
+    off << logarithm(after.attitude.conjugate() * better.attitude), better.position_m - after.position_m,
+        better.velocity_m_s - after.velocity_m_s, better.gyro_bias - after.gyro_bias,
+        better.accel_bias - after.accel_bias;
+    displace(x, gain * off);
+    p[i] += gain * (p[i + 1] - ahead) * gain.transpose();
+  }
+  const State& first = nodes_.front().state;
+  surprise_[2] = std::max((first.gyro_bias.array().square() / noise.gyro_bias_rad2_s2.array()).mean(),
+                          first.accel_bias.squaredNorm() / (3 * kAccelBiasSd_m_s2 * kAccelBiasSd_m_s2));
+  for (const std::size_t node : pose_node_) covariance_.push_back(p[node]);
+}
+
+std::size_t Track::node_before(double t_s) const {
+  if (!(t_s >= begin_s() - kSame_s && t_s <= end_s() + kSame_s))
+    throw std::out_of_range("no motion at " + std::to_string(t_s) + " s");
+  const auto after = std::ranges::upper_bound(nodes_, t_s, {}, &Node::t_s);
+  return after == nodes_.begin() ? 0 : static_cast<std::size_t>(after - nodes_.begin()) - 1;
+}
+
+double Track::imu_bound_s(double t_s) const {
+  const std::size_t k = index_before(bounds_s_, t_s);
+  return k + 1 < bounds_s_.size() && bounds_s_[k + 1] - t_s < t_s - bounds_s_[k] ? bounds_s_[k + 1] : bounds_s_[k];
+}
+
+Vector3d Track::mean(const MeanSpline& signal, double from_s, double to_s) const {
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t k = index_before(bounds_s_, from_s); k + 1 < bounds_s_.size() && bounds_s_[k] < to_s; ++k) {
+    const double length = bounds_s_[k + 1] - bounds_s_[k];
+    const double u = std::max(0.0, (from_s - bounds_s_[k]) / length), v = std::min(1.0, (to_s - bounds_s_[k]) / length);
+    if (v > u) sum += length * signal.integral(k, u, v);
+  }
+  return sum / (to_s - from_s);
+}
+
+TorsoMotion Track::at(double t_s) const {
+  const Node& node = nodes_[node_before(t_s)];
+  const State x = moved(node.state, reading(node.interval, node.t_s, t_s));
+  const double from_s = bounds_s_[node.interval], to_s = bounds_s_[node.interval + 1];
+  const Vector3d rate = gyro_.value(node.interval, (t_s - from_s) / (to_s - from_s)) - x.gyro_bias;
+  return {x.position_m - x.attitude * arm_m_, x.attitude, x.velocity_m_s - x.attitude * rate.cross(arm_m_), rate};
+}
+
+bool Track::covers(double from_s, double to_s) const {
+  if (from_s < begin_s() || to_s > end_s()) return false;
+  for (std::size_t k = index_before(bounds_s_, from_s); k < gap_.size() && bounds_s_[k] < to_s; ++k)
+    if (gap_[k]) return false;
+  for (std::size_t i = index_before(pose_s_, from_s); i + 1 < pose_s_.size() && pose_s_[i] < to_s; ++i)
+    if (pose_s_[i + 1] - pose_s_[i] > longest_unseen_s_) return false;
+  return true;
+}
+
+sim::VoltageScript motor_voltages(const FlightLog& log) {
+  const CommandStream& c = log.command;
+  sim::VoltageScript script{c.t_s, c.left_voltage_V, c.right_voltage_V};
+  if (!log.power) return script;
+  const Column& t = log.power->t_s;
+  const double late_s = log.header.power->latency_s, nominal_V = log.header.power->battery_nominal_V;
+  for (std::size_t i = 0; i < script.t_s.size(); ++i) {
+    const double at_s = script.t_s[i] + late_s;
+    const std::size_t k = std::min(index_before(t, at_s), t.size() - 2);
+    const double share = std::clamp((at_s - t[k]) / (t[k + 1] - t[k]), 0.0, 1.0);
+    const Column& v = log.power->battery_V;
+    const double scale = (v[k] + share * (v[k + 1] - v[k])) / nominal_V;
+    script.left_V[i] *= scale;
+    script.right_V[i] *= scale;
+  }
+  return script;
+}
+
+std::array<double, 2> strokes_at(const WingsStream& wings, double rate_hz, double t_s) {
+  const Column& t = wings.t_s;
+  const std::size_t k = index_before(t, t_s);
+  if (k < 1 || k + 2 >= t.size() || t[k + 2] - t[k - 1] > 3.5 / rate_hz) return {std::nan(""), std::nan("")};
+  std::array<double, 2> stroke = {0, 0};
+  for (std::size_t i = k - 1; i <= k + 2; ++i) {
+    double weight = 1;
+    for (std::size_t j = k - 1; j <= k + 2; ++j)
+      if (j != i) weight *= (t_s - t[j]) / (t[i] - t[j]);
+    stroke[0] += weight * wings.left_stroke_rad[i];
+    stroke[1] += weight * wings.right_stroke_rad[i];
+  }
+  return stroke;
+}
+
+}  // namespace flappy::flightlog

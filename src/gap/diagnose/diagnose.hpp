@@ -1,0 +1,61 @@
+// From flight logs to what is missing in the model: fits the uncertain parameters, then every effect of the catalogue
+// beside them, and weighs what is left.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "gap/evidence/fit.hpp"
+
+namespace flappy::gap {
+
+/// What no entry explains: a smooth function of the regime, in a channel and a harmonic of the beat, or in all of them.
+struct Term {
+  int channel = kAll, harmonic = kAll;
+  int function = 0;  ///< of the basis
+  double times = 0;  ///< how much larger it may be than what every model gets wrong
+  double gain = 0;   ///< nats
+  static constexpr int kAll = -1;
+  bool has(int group) const {
+    return (channel == kAll || group / kCoefficients == channel) &&
+           (harmonic == kAll || (group % kCoefficients + 1) / 2 == harmonic);
+  }
+};
+
+/// What explains the flights, one of several answers that exclude each other.
+struct Answer {
+  enum class Kind { none, parameters, effect, unknown } kind = Kind::parameters;
+  std::vector<std::string> effects;
+  double log_evidence = 0;  ///< of all flights
+  double probability = 0;
+  std::vector<Term> terms;          ///< of an unknown cause
+  std::vector<std::string> beside;  ///< of an unknown cause: effects that its terms are beside
+  /// Of effects and parameters. An effect that would gain nothing is weighed as far as a linear model sees: no residual, and
+  /// its size is what flights that tell nothing of it leave probable.
+  Fit fit;
+  Signature left;  ///< of an effect that was fitted: in each flight what is left with the fit to the others
+  bool fitted() const { return !fit.point.residual.empty(); }
+};
+
+struct DiagnoseOptions {
+  int threads = 0;
+  int finalists = 8;  ///< effects that are fitted in full
+  int most_effects = 3;
+  std::vector<std::string> withheld;                                    ///< entries that the catalogue is to lack
+  std::function<bool(double share, const std::string& what)> progress;  ///< false: no further effect is fitted
+};
+
+struct Diagnosis {
+  bool complete = true;          ///< false: progress had it stop before every effect was weighed
+  std::vector<Answer> answers;   ///< most probable first
+  Fit parameters;                ///< without any effect
+  Signature nominal;             ///< what is left of the measurement with the vehicle's file
+  Signature refit;               ///< with parameters alone: in each flight what is left with the fit to the others
+  std::vector<double> noise_sd;  ///< [group] of the rows of noise alone, as found
+};
+
+Diagnosis diagnose(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
+                   const DiagnoseOptions& options);
+
+}  // namespace flappy::gap

@@ -1,0 +1,181 @@
+#include "gap/diagnose/diagnose_command.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+#include "flappy/vehicle_file.hpp"
+#include "gap/diagnose/diagnosis_files.hpp"
+#include "gap/diagnose/summary.hpp"
+#include "io/config.hpp"
+#include "io/files.hpp"
+#include "io/progress.hpp"
+#include "model/effects/registry.hpp"
+#include "model/posterior.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Probability of the second answer from which on a flight is looked for that tells it from the first.
+constexpr double kLeastRival = 0.01;
+
+struct Logs {
+  std::vector<flightlog::FlightLog> logs;
+  std::vector<flightlog::DataFault> faults;
+};
+
+Logs read_logs(const DiagnoseCommand& command) {
+  Logs r;
+  for (const std::string& folder : command.flights) {
+    r.logs.push_back(flightlog::read_flight_log(folder));
+    const std::vector<flightlog::DataFault> own = data_faults(r.logs.back(), folder);
+    r.faults.insert(r.faults.end(), own.begin(), own.end());
+  }
+  return r;
+}
+
+Diagnosis diagnose_visibly(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
+                           const std::vector<std::string>& withheld, int threads) {
+  DiagnoseOptions options;
+  options.threads = threads;
+  options.withheld = withheld;
+  io::ProgressLine line("diagnosing");
+  options.progress = [&](double share, const std::string& what) {
+    line.show(share, what);
+    return !io::interrupted();
+  };
+  return diagnose(flights, uncertain, options);
+}
+
+/// The vehicle with what was concluded, and what remains uncertain of it.
+model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Diagnosis& d, const Conclusion& conclusion,
+                                 const sim::Randomisation& uncertain) {
+  const Answer& best = d.answers[conclusion.answer];
+  const Hypothesis h(uncertain, best.effects);
+  const Fit& fit = best.kind == Answer::Kind::effect ? best.fit : d.parameters;
+  model::Vehicle corrected = vehicle;
+  if (best.kind != Answer::Kind::none) {
+    const Eigen::VectorXd mean = h.bounded(fit.mean());
+    const Eigen::MatrixXd covariance = fit.covariance();
+    std::vector<std::vector<double>> rows;
+    for (const auto& row : covariance.rowwise()) rows.emplace_back(row.begin(), row.end());
+    corrected = h.candidate(mean).vehicle;
+    corrected.posterior = model::posterior_of(
+        [&](const std::vector<double>& at) {
+          return h.candidate(h.bounded(Eigen::Map<const Eigen::VectorXd>(at.data(), h.size()))).vehicle;
+        },
+        {mean.begin(), mean.end()}, rows);
+  }
+  corrected.name = vehicle.name + "_corrected";
+  return corrected;
+}
+
+/// The files of a diagnosis.
+constexpr const char *kJson = "diagnosis.json", *kVehicle = "vehicle_corrected.toml";
+constexpr const char* kFiles[] = {
+    kJson, kVehicle, "residuals.csv", "candidates.csv", "unexplained.csv", "residuals.svg", "probabilities.svg"};
+
+/// All but diagnosis.json, which is that too until what lies ahead is known; the names of the others.
+std::string write_all(const std::filesystem::path& out, const Report& report,
+                      const std::optional<model::Vehicle>& corrected) {
+  io::write_atomically(out / kJson, diagnosis_json(report).dump(2) + "\n");
+  if (corrected)
+    io::write_atomically(out / kVehicle, "# Corrected by flappy-gap diagnose.\n" + model::vehicle_text(*corrected));
+  write_tables(out, report);
+  std::string names;
+  try {
+    write_figures(out, report);
+  } catch (const io::InputError& e) {
+    std::fprintf(stderr, "warning: %s\n", e.what());
+  }
+  for (const char* name : kFiles)
+    if (name != kJson && std::filesystem::exists(out / name)) names += std::string(", ") + name;
+  return names;
+}
+
+/// What is asked beside the diagnosis, read before the work.
+struct Asked {
+  model::Vehicle vehicle;
+  sim::Randomisation uncertain;
+  rollout::FlyConfig pilot;
+  std::vector<Manoeuvre> manoeuvres;
+  std::vector<std::string> withheld;
+};
+
+Asked read_asked(const DiagnoseCommand& command) {
+  const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kStep_s);
+  if (!vehicle.effects.empty())
+    io::Config::load(command.vehicle)
+        .root()
+        .fail("effects", "what is missing is asked of the vehicle as it was believed", "a vehicle without effects");
+  std::vector<std::string> withheld;
+  for (const std::string& id : command.withheld) {
+    if (model::effect_index(id.c_str()) < 0)
+      throw io::InputError("command line: --withhold: no effect \"" + id +
+                           "\"; accepted: identifiers of docs/effects.md");
+    for (std::string& member : model::whole_group(id)) withheld.push_back(std::move(member));
+  }
+  flightlog::check_each_once(command.flights);
+  return {vehicle, sim::read_randomisation(vehicle, io::Config::load(command.priors).root()),
+          rollout::read_fly_config(command.manoeuvre.empty() ? FLAPPY_CONFIGS "/fly/hover.toml" : command.manoeuvre),
+          read_manoeuvres(FLAPPY_CONFIGS "/gap/experiments"), withheld};
+}
+
+/// In closed loop, and what to fly next; each left out after Ctrl-C.
+void look_ahead(const DiagnoseCommand& command, const Asked& asked, const std::vector<CarriedFlight>& flights,
+                const Diagnosis& d, const model::Vehicle& corrected, Report& report) {
+  io::ProgressLine line("looking ahead");
+  if (io::interrupted()) return;
+  line.show(0, "flying in closed loop");
+  ClosedLoopOptions closed;
+  closed.own_path = !command.manoeuvre.empty();
+  closed.threads = command.threads;
+  report.closed_loop = predict_closed_loop(flights, asked.vehicle, corrected, asked.pilot, closed);
+  if (io::interrupted() || d.answers.size() < 2 || d.answers[1].probability < kLeastRival) return;
+  line.show(0.5, "weighing what to fly next");
+  NextOptions next;
+  next.threads = command.threads;
+  const auto ranked = rank_experiments(d, asked.uncertain, asked.manoeuvres, next);
+  if (!ranked.empty()) report.next = ranked.front();
+}
+
+}  // namespace
+
+Json run_diagnose(const DiagnoseCommand& command) {
+  const Asked asked = read_asked(command);
+  const std::filesystem::path out = command.out;
+  if (!out.empty()) {
+    io::make_folder(out);
+    io::check_output(out / kJson);
+  }
+  io::stop_on_interrupt();
+  Logs read = read_logs(command);
+  const bool faulty = !read.faults.empty();
+  std::vector<CarriedFlight> flights;
+  for (std::size_t f = 0; !faulty && f < read.logs.size(); ++f)
+    flights.emplace_back(Recording(command.flights[f], std::move(read.logs[f]), asked.vehicle));
+  const Diagnosis d =
+      faulty ? Diagnosis() : diagnose_visibly(flights, asked.uncertain, asked.withheld, command.threads);
+  // of an earlier diagnosis nothing stays beside this one
+  for (const char* name : kFiles)
+    if (std::error_code error; !out.empty()) std::filesystem::remove(out / name, error);
+  Report report = faulty ? report_of(command.flights, std::move(read.faults))
+                         : report_of(command.flights, flights, asked.uncertain, d);
+  std::string written = kJson;
+  if (!faulty) {
+    std::optional<model::Vehicle> corrected;
+    if (d.complete) corrected = corrected_vehicle(asked.vehicle, d, report.conclusion, asked.uncertain);
+    if (!out.empty()) written += write_all(out, report, corrected);
+    if (corrected) look_ahead(command, asked, flights, d, *corrected, report);
+  }
+  Json json = diagnosis_json(report);
+  for (const std::string& line : summary_of(report, command.out)) std::printf("%s\n", line.c_str());
+  if (out.empty()) return json;
+  io::write_atomically(out / kJson, json.dump(2) + "\n");
+  std::printf("written to %s: %s\n", command.out.c_str(), written.c_str());
+  return json;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,171 @@
+#include "gap/diagnose/next_experiment.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <exception>
+
+#include "rollout/simulated_flight.hpp"
+
+namespace flappy::gap {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// An answer where the flights so far leave it.
+struct Rival {
+  std::string name;
+  double probability;
+  Hypothesis hypothesis;
+  VectorXd at;
+  Directions directions;
+  MatrixXd covariance;  ///< along the directions
+  Candidate candidate() const { return hypothesis.candidate(at); }
+};
+
+std::string name_of(const Answer& a) {
+  if (a.kind == Answer::Kind::none) return "none";
+  if (a.kind == Answer::Kind::parameters) return "parameters";
+  std::string name;
+  for (const std::string& e : a.effects) name += (name.empty() ? "" : "+") + e;
+  return name;
+}
+
+std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncertain, std::size_t most) {
+  std::vector<Rival> rivals;
+  for (const Answer& a : d.answers) {
+    if (rivals.size() == most) break;
+    if (a.kind == Answer::Kind::unknown) continue;
+    const Hypothesis h(uncertain, a.effects);
+    if (a.kind == Answer::Kind::none) {
+      rivals.push_back({name_of(a), a.probability, h, h.start(), {MatrixXd(h.size(), 0), VectorXd(0)}, MatrixXd(0, 0)});
+      continue;
+    }
+    const Fit& fit = a.kind == Answer::Kind::parameters ? d.parameters : a.fit;
+    rivals.push_back(
+        {name_of(a), a.probability, h, h.bounded(fit.mean()), fit.point.directions, fit.posterior.covariance});
+  }
+  return rivals;
+}
+
+/// What a rival expects of a flight that was flown.
+struct Expected {
+  Statistics residual;
+  std::vector<Smooth> uncertain;  ///< changes for one standard deviation each, independent of each other
+  Smooth form;                    ///< what its effects' equations get wrong
+};
+
+/// Nothing where its vehicle comes apart.
+std::optional<Expected> expect(const Rival& rival, const Fitter& fitter) {
+  const Linearised l = fitter.linearise(rival.hypothesis, rival.at, rival.directions);
+  if (l.residual.empty()) return {};
+  Expected e{l.statistics, {}, fitter.form_error(rival.hypothesis, l)};
+  const Index k = rival.covariance.rows();
+  if (k == 0) return e;  // without a gap nothing is uncertain
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(rival.covariance);
+  for (Index i = 0; i < k; ++i) {
+    Smooth sum = Smooth::Zero(e.form.rows(), e.form.cols());
+    for (Index d = 0; d < k; ++d) {
+      const Smooth& column = l.columns[static_cast<std::size_t>(d)];
+      if (column.size() > 0) sum += eigen.eigenvectors()(d, i) * column;
+    }
+    e.uncertain.emplace_back(std::sqrt(std::max(0.0, eigen.eigenvalues()[i])) * sum);
+  }
+  return e;
+}
+
+/// For a over b where a is true.
+double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
+  Statistics difference = b.residual;
+  for (std::size_t f = 0; f < difference.sums.size(); ++f)
+    for (std::size_t g = 0; g < difference.sums[f].size(); ++g) difference.sums[f][g] -= a.residual.sums[f][g];
+  std::vector<const Smooth*> columns;
+  std::vector<int> chosen;
+  for (const Smooth& column : b.uncertain) {
+    chosen.push_back(static_cast<int>(columns.size()));
+    columns.push_back(&column);
+  }
+  const Smooth sd = (evidence.floor().array().square() + a.form.array().square() + b.form.array().square()).sqrt();
+  Reduced reduced = evidence.reduce(difference, columns, {1}, sd);
+  const VectorXd prior_mean = VectorXd::Zero(static_cast<Index>(columns.size()));
+  const double with = Evidence::posterior(reduced, chosen, prior_mean).log_evidence;
+  reduced.sums.rightCols(1).setZero();
+  reduced.sums.bottomRows(1).setZero();
+  return Evidence::posterior(reduced, chosen, prior_mean).log_evidence - with;
+}
+
+std::optional<NextExperiment> judge(const Manoeuvre& m, const std::vector<Rival>& rivals) {
+  std::vector<rollout::SimulatedFlight> flown;
+  for (const Rival& r : rivals) {
+    flown.push_back(std::move(simulate(m.config, r.candidate().vehicle, 1, m.config.settle_s)[0]));
+    if (flown.back().lost || !flown.back().log) return {};
+  }
+  const std::vector<CarriedFlight> flight = [&] {
+    std::vector<CarriedFlight> list;
+    list.emplace_back(Recording(m.name, std::move(*flown.front().log), rivals.front().candidate().vehicle));
+    return list;
+  }();
+  const Evidence evidence(flight, 1);
+  const Fitter fitter(flight, evidence, 1);
+  std::vector<Expected> expected;
+  for (const Rival& r : rivals) {
+    std::optional<Expected> e = expect(r, fitter);
+    if (!e) return {};
+    expected.push_back(std::move(*e));
+  }
+  NextExperiment result{m.name, {}, 0};
+  double weights = 0, most = -1;
+  for (std::size_t a = 0; a < rivals.size(); ++a)
+    for (std::size_t b = a + 1; b < rivals.size(); ++b) {
+      const double weight = std::max(rivals[a].probability * rivals[b].probability, 1e-300);
+      const double both = 0.5 * (nats(evidence, expected[a], expected[b]) + nats(evidence, expected[b], expected[a]));
+      result.expected_nats += weight * both;
+      weights += weight;
+      if (weight * both > most) most = weight * both, result.separates = {rivals[a].name, rivals[b].name};
+    }
+  result.expected_nats /= weights;
+  return result;
+}
+
+}  // namespace
+
+std::vector<Manoeuvre> read_manoeuvres(const fs::path& folder) {
+  std::vector<Manoeuvre> list;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error))
+    if (entry.path().extension() == ".toml")
+      list.push_back({entry.path().stem().string(), rollout::read_fly_config(entry.path())});
+  if (list.empty())
+    throw io::InputError(folder.string() + ": holds no manoeuvre; accepted: a folder of configurations of flappy-fly");
+  std::ranges::sort(list, {}, &Manoeuvre::name);
+  return list;
+}
+
+std::vector<NextExperiment> rank_experiments(const Diagnosis& diagnosis, const sim::Randomisation& uncertain,
+                                             const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options) {
+  const std::vector<Rival> rivals = rivals_of(diagnosis, uncertain, options.most_rivals);
+  if (rivals.size() < 2) return {};
+  std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
+  std::exception_ptr failed;
+  const auto n = static_cast<std::ptrdiff_t>(manoeuvres.size());
+#pragma omp parallel for schedule(dynamic) num_threads(options.threads > 0 ? options.threads : omp_get_num_procs())
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    try {
+      found[static_cast<std::size_t>(i)] = judge(manoeuvres[static_cast<std::size_t>(i)], rivals);
+    } catch (...) {  // nothing may leave a parallel loop
+#pragma omp critical
+      failed = std::current_exception();
+    }
+  }
+  if (failed) std::rethrow_exception(failed);
+  std::vector<NextExperiment> list;
+  for (std::optional<NextExperiment>& e : found)
+    if (e) list.push_back(std::move(*e));
+  std::ranges::stable_sort(list, std::greater{}, &NextExperiment::expected_nats);
+  return list;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,218 @@
+#include "gap/diagnose/report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace flappy::gap {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kHalf90 = 1.645;
+constexpr std::size_t kMostPlaces = 20;
+
+std::vector<Moved> moved_by(const Fit& fit, const Hypothesis& hypothesis) {
+  std::vector<Moved> moved;
+  const Eigen::VectorXd mean = fit.mean();
+  for (Eigen::Index i = 0; i < hypothesis.shared(); ++i)
+    moved.push_back({hypothesis.unknowns()[static_cast<std::size_t>(i)].name, mean[i]});
+  std::ranges::stable_sort(moved, std::greater{}, [](const Moved& m) { return std::abs(m.prior_sd); });
+  return moved;
+}
+
+/// Of what the channel's table has for all beats.
+std::vector<double> over_noise(const std::vector<Place>& places, const std::string& stage) {
+  std::vector<double> ratio(kChannels, 0);
+  for (const Place& p : places)
+    if (p.stage == stage && p.test == "channel" && p.noise_floor > 0)
+      ratio[static_cast<std::size_t>(p.channel)] = p.gap / p.noise_floor;
+  return ratio;
+}
+
+/// The most probable one.
+const Answer* best_fitted(const Diagnosis& d) {
+  const auto best = std::ranges::find_if(d.answers, &Answer::fitted);
+  return best == d.answers.end() ? nullptr : &*best;
+}
+
+Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+}  // namespace
+
+std::vector<Size> sizes_of(const Answer& a, const sim::Randomisation& uncertain) {
+  std::vector<Size> sizes;
+  if (a.fit.point.at.size() == 0) return sizes;
+  const Hypothesis h(uncertain, a.effects);
+  const Eigen::VectorXd mean = a.fit.mean();
+  const Eigen::MatrixXd covariance = a.fit.covariance();
+  for (Eigen::Index i = h.shared(); i < h.size(); ++i) {
+    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+    const double reach = kHalf90 * std::sqrt(covariance(i, i));
+    sizes.push_back({u.effect + "." + u.name, u.value(mean[i]), u.value(mean[i] - reach), u.value(mean[i] + reach),
+                     unit_of(u.name)});
+  }
+  return sizes;
+}
+
+std::string unit_of(const std::string& name) {
+  static const std::pair<const char*, const char*> kUnits[] = {
+      {"m", "m"},    {"s", "s"},    {"V", "V"},   {"K", "K"},       {"W", "W"},     {"ohm", "ohm"},
+      {"C", "C"},    {"N", "N"},    {"Nm", "Nm"}, {"kg", "kg"},     {"rad", "rad"}, {"m2", "m^2"},
+      {"m3", "m^3"}, {"s2", "s^2"}, {"A", "A"},   {"rad2", "rad^2"}};
+  // words from the end, as long as they are units: the first of them over the others
+  std::vector<std::string> units;
+  std::string rest = name;
+  while (true) {
+    const std::size_t cut = rest.rfind('_');
+    const std::string word = cut == std::string::npos ? rest : rest.substr(cut + 1);
+    const auto unit = std::ranges::find_if(kUnits, [&](const auto& u) { return u.first == word; });
+    if (cut == std::string::npos) {
+      if (word == "per" && !units.empty()) units.insert(units.begin(), "1");
+      break;
+    }
+    if (unit == std::end(kUnits)) break;
+    units.insert(units.begin(), unit->second);
+    rest = rest.substr(0, cut);
+  }
+  std::string text;
+  for (std::size_t i = 0; i < units.size(); ++i) text += (i == 0 ? "" : "/") + units[i];
+  return text;
+}
+
+Report answers_of(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain, const Diagnosis& d) {
+  Report r;
+  r.complete = d.complete;
+  r.conclusion = conclude(d.answers);
+  const Surroundings around = surroundings_of(flights, d.noise_sd);
+  r.noise_floor = huber_floor();
+  const Losses refit = losses_of(around, d.refit);
+  r.nominal = losses_of(around, d.nominal).mean();
+  r.refit = refit.mean();
+  std::vector<Reported> others;
+  for (const Answer& a : d.answers) {
+    const bool effect = a.kind == Answer::Kind::effect;
+    Reported c;
+    c.kind = a.kind;
+    c.effects = a.effects;
+    c.group = effect ? pool_name(a.effects) : kind_name(a.kind);
+    c.probability = a.probability;
+    c.log_evidence = a.log_evidence;
+    if (effect) c.sizes = sizes_of(a, uncertain);
+    if (a.fitted()) {
+      const Losses left = losses_of(around, a.left);
+      c.loss = left.mean();
+      c.gain_sd = sd_of_difference(refit, left);
+      c.closure = closure_of(refit, left, r.noise_floor);
+      if (&a == best_fitted(d)) {
+        r.effect = c.loss;
+        r.closure = c.closure;
+      }
+    }
+    if (a.kind == Answer::Kind::unknown) {
+      const RegimeBasis basis(flights);
+      for (const Term& t : a.terms)
+        r.unexplained.push_back({t.channel == Term::kAll ? "all" : channel_name(t.channel),
+                                 t.harmonic == Term::kAll ? "all" : std::to_string(t.harmonic), basis.name(t.function),
+                                 t.times, t.gain});
+      r.beside = a.beside;
+    }
+    (effect ? r.candidates : others).push_back(std::move(c));
+  }
+  r.candidates.insert(r.candidates.end(), others.begin(), others.end());
+  const Answer& concluded = d.answers[r.conclusion.answer];
+  if (concluded.kind == Answer::Kind::effect)
+    r.moved = moved_by(concluded.fit, Hypothesis(uncertain, concluded.effects));
+  else r.moved = moved_by(d.parameters, Hypothesis(uncertain, {}));
+  return r;
+}
+
+Report report_of(const std::vector<std::string>& names, const std::vector<CarriedFlight>& flights,
+                 const sim::Randomisation& uncertain, const Diagnosis& d) {
+  Report r = answers_of(flights, uncertain, d);
+  r.flights = names;
+  const Surroundings around = surroundings_of(flights, d.noise_sd);
+  const Answer* best = best_fitted(d);
+  const Signature* stages[] = {&d.nominal, &d.refit, best != nullptr ? &best->left : nullptr};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (stages[i] != nullptr) {
+      const std::vector<Place> places = locate(around, *stages[i], kStages[i]);
+      r.places.insert(r.places.end(), places.begin(), places.end());
+    }
+    r.over_noise[i] = over_noise(r.places, kStages[i]);
+  }
+  return r;
+}
+
+Report report_of(const std::vector<std::string>& names, std::vector<flightlog::DataFault> faults) {
+  Report r;
+  r.flights = names;
+  r.faults = std::move(faults);
+  r.conclusion.kind = Conclusion::Kind::data;
+  r.conclusion.probability = 1;
+  return r;
+}
+
+Json diagnosis_json(const Report& r) {
+  Json faults = Json::array(), where = Json::array(), candidates = Json::array(), closed_loop = Json::array(),
+       unexplained = Json::array();
+  for (const Unexplained& u : r.unexplained)
+    unexplained.push_back({{"channel", u.channel},
+                           {"harmonic", u.harmonic},
+                           {"function", u.function},
+                           {"times_usual", u.times},
+                           {"gain_nats", u.gain}});
+  const auto finite = [](double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); };
+  for (const ClosedLoop& c : r.closed_loop)
+    closed_loop.push_back({{"flight", c.flight},
+                           {"quantity", c.quantity},
+                           {"recorded", finite(c.recorded)},
+                           {"nominal", finite(c.nominal)},
+                           {"corrected", finite(c.corrected)}});
+  for (const flightlog::DataFault& f : r.faults)
+    faults.push_back({{"file", f.file}, {"line", f.line}, {"what", f.what}});
+  for (const Place& p : largest_discoveries(r.places, "refit", kMostPlaces))
+    where.push_back({{"channel", channel_name(p.channel)},
+                     {"regime", p.regime},
+                     {"gap", p.gap},
+                     {"noise_floor", p.noise_floor},
+                     {"p_value", p.p_value}});
+  for (const Reported& c : r.candidates) {
+    Json parameters = Json::object();
+    for (const Size& s : c.sizes)
+      parameters[s.name] = {{"value", s.value}, {"low", s.low}, {"high", s.high}, {"unit", s.unit}};
+    candidates.push_back({{"effects", c.effects},
+                          {"group", c.group},
+                          {"probability", c.probability},
+                          {"parameters", parameters},
+                          {"closure", c.closure ? Json(c.closure->value) : Json(nullptr)}});
+  }
+  const auto closure = [&](double Closure::*part) { return r.closure ? Json((*r.closure).*part) : Json(nullptr); };
+  Json json = {{"schema", 1},
+               {"flights", r.flights},
+               {"data_faults", faults},
+               {"verdict",
+                {{"kind", kind_name(r.conclusion.kind)},
+                 {"effects", r.conclusion.effects},
+                 {"probability", r.conclusion.probability}}},
+               {"where", where},
+               {"candidates", candidates},
+               {"unexplained", {{"beside", r.beside}, {"terms", unexplained}}},
+               {"gap",
+                {{"nominal", number(r.nominal)},
+                 {"refit", number(r.refit)},
+                 {"effect", number(r.effect)},
+                 {"noise_floor", r.noise_floor},
+                 {"closure", closure(&Closure::value)},
+                 {"closure_low", closure(&Closure::low)},
+                 {"closure_high", closure(&Closure::high)}}},
+               {"closed_loop", closed_loop},
+               {"next_experiment", r.next ? Json({{"manoeuvre", r.next->manoeuvre},
+                                                  {"separates", r.next->separates},
+                                                  {"expected_nats", r.next->expected_nats}})
+                                          : Json(nullptr)}};
+  if (!r.complete) json["complete"] = false;
+  return json;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,177 @@
+#include "gap/diagnose/summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "flightlog/check/check_parts.hpp"
+
+namespace flappy::gap {
+namespace {
+
+constexpr std::size_t kSizes = 12, kRunnersUp = 3, kMoved = 4, kTerms = 3;
+
+std::string listed(const std::vector<std::string>& words, const char* last) {
+  std::string all;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    all += (i == 0 ? "" : i + 1 == words.size() ? std::string(" ") + last + " " : ", ") + words[i];
+  return all;
+}
+
+std::string place_of(const Unexplained& u) {
+  if (u.harmonic == "all") return u.channel == "all" ? "all channels" : u.channel;
+  return (u.channel == "all" ? "all channels, " : u.channel + ", ") +
+         (u.harmonic == "0" ? "mean" : "harmonic " + u.harmonic);
+}
+
+std::string verdict_line(const Conclusion& c) {
+  const double p = c.probability;
+  switch (c.kind) {
+    case Conclusion::Kind::effect:
+      return flightlog::format("Missing in the model: %s (probability %.2f%s)", listed(c.effects, "and").c_str(), p,
+                               p < 0.5 ? ", no more than a guess" : "");
+    case Conclusion::Kind::group:
+      return flightlog::format("Missing in the model: one of %s, which these flights cannot tell apart (together %.2f)",
+                               listed(c.effects, "or").c_str(), p);
+    case Conclusion::Kind::parameters:
+      return flightlog::format("Nothing is missing in the model, its parameters are off (probability %.2f)", p);
+    case Conclusion::Kind::none:
+      return flightlog::format("No gap beyond noise: the vehicle's file explains the flights (probability %.2f)", p);
+    case Conclusion::Kind::unknown:
+      return flightlog::format(
+          "Something is missing in the model that no entry of the catalogue explains (probability %.2f)", p);
+    case Conclusion::Kind::data:
+      return "The data are at fault; nothing was diagnosed";
+  }
+  return "";
+}
+
+std::string next_line(const Conclusion& c, const std::string& out) {
+  const std::string vehicle =
+      (out.empty() ? "DIR" : std::filesystem::absolute(out).lexically_normal().string()) + "/vehicle_corrected.toml";
+  switch (c.kind) {
+    case Conclusion::Kind::effect:
+    case Conclusion::Kind::parameters:
+      return "next: train or fly on what was found, as with flappy-train CONFIG --set vehicle=" + vehicle;
+    case Conclusion::Kind::group:
+      return "next: fly so that these differ, and diagnose old and new flights together";
+    case Conclusion::Kind::none:
+      return "next: nothing to correct; fly harder manoeuvres to look further";
+    case Conclusion::Kind::unknown:
+      return "next: see what the residuals depend on; where that is no help, fly harder manoeuvres there";
+    case Conclusion::Kind::data:
+      return "next: mend the logs, until flappy-gap check finds no fault";
+  }
+  return "";
+}
+
+/// What stands out most in the stroke, in what the vehicle did and in frequency.
+std::vector<Place> one_of_each_test(const Report& r) {
+  std::vector<Place> list;
+  for (const char* test : {"phase", "regime", "frequency"})
+    for (const Place& p : largest_discoveries(r.places, "refit", r.places.size()))
+      if (p.test == test) {
+        list.push_back(p);
+        break;
+      }
+  return list;
+}
+
+/// Where the correction tells most: by the change of the error over its size.
+const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
+  const ClosedLoop* most = nullptr;
+  double largest = 0;
+  for (const ClosedLoop& c : list) {
+    const double before = std::abs(c.nominal - c.recorded), after = std::abs(c.corrected - c.recorded);
+    const double share = (before - after) / (std::abs(c.recorded) + 1e-9);
+    if (share > largest) largest = share, most = &c;
+  }
+  return most;
+}
+
+std::string name_of(const Reported& c) {
+  return c.kind == Answer::Kind::effect ? listed(c.effects, "and") : "(" + c.group + ")";
+}
+
+}  // namespace
+
+std::vector<std::string> summary_of(const Report& r, const std::string& out) {
+  std::vector<std::string> lines = {
+      r.complete ? verdict_line(r.conclusion)
+                 : "Stopped before every effect was weighed: this is no verdict, only what was weighed until then"};
+  if (r.conclusion.kind == Conclusion::Kind::data) {
+    for (std::size_t i = 0; i < r.faults.size() && i + 3 < kSummaryLines; ++i)
+      lines.push_back(
+          flightlog::format("  %s:%zu: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
+    lines.push_back(next_line(r.conclusion, out));
+    return lines;
+  }
+  std::vector<const Reported*> ranked;
+  for (const Reported& c : r.candidates) ranked.push_back(&c);
+  std::ranges::stable_sort(ranked, std::greater{}, &Reported::probability);
+  const bool named = r.conclusion.kind == Conclusion::Kind::effect || r.conclusion.kind == Conclusion::Kind::group;
+  // its sizes: of the most probable one
+  const Reported* concluded = nullptr;
+  for (const Reported* c : ranked)
+    if (concluded == nullptr && named && c->kind == Answer::Kind::effect &&
+        std::ranges::all_of(c->effects,
+                            [&](const std::string& e) { return std::ranges::count(r.conclusion.effects, e) > 0; }))
+      concluded = c;
+  if (concluded != nullptr) {
+    lines.push_back("size, with its 90 % interval:");
+    for (std::size_t i = 0; i < concluded->sizes.size() && i < kSizes; ++i) {
+      const Size& s = concluded->sizes[i];
+      lines.push_back(flightlog::format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
+                                        s.unit.empty() ? "" : " ", s.unit.c_str()));
+    }
+  }
+  if (r.conclusion.kind == Conclusion::Kind::unknown && !r.unexplained.empty()) {
+    lines.push_back(r.beside.empty() ? "what is left depends on:"
+                                     : "what is left, with " + listed(r.beside, "and") + " in force, depends on:");
+    for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
+      lines.push_back(flightlog::format("  %s on %s, %.0f times what models usually get wrong (%.0f nats)",
+                                        place_of(r.unexplained[i]).c_str(), r.unexplained[i].function.c_str(),
+                                        r.unexplained[i].times, r.unexplained[i].gain));
+  }
+  std::string others;
+  std::size_t shown = 0;
+  for (const Reported* c : ranked) {
+    const bool is = named ? c == concluded : kind_name(c->kind) == std::string(kind_name(r.conclusion.kind));
+    if (is || shown == kRunnersUp) continue;
+    others += flightlog::format("%s%s %.2g", shown == 0 ? "" : ", ", name_of(*c).c_str(), c->probability);
+    ++shown;
+  }
+  lines.push_back("runners-up: " + others);
+  const std::vector<Place> places = one_of_each_test(r);
+  lines.push_back(places.empty() ? "with parameters refitted nothing stands out of the noise"
+                                 : "where the gap lies, with parameters refitted (rms, that of noise):");
+  for (const Place& p : places)
+    lines.push_back(flightlog::format("  %-12s %-34s %8.3g, noise %.3g %s (p %.1g)", channel_name(p.channel),
+                                      p.regime.c_str(), p.gap, p.noise_floor, channel_unit(p.channel), p.p_value));
+  const auto loss = [](const std::optional<double>& e) { return e ? flightlog::format("%.3g", *e) : std::string("-"); };
+  lines.push_back("mean loss in flights held out: vehicle's file " + loss(r.nominal) + ", parameters refitted " +
+                  loss(r.refit) + ", with the best effect " + loss(r.effect) + ", noise alone " + loss(r.noise_floor));
+  if (r.closure)
+    lines.push_back(
+        flightlog::format("the best effect closes %.0f %% of what refitting leaves (90 %%: %.0f to %.0f %%)",
+                          100 * r.closure->value, 100 * r.closure->low, 100 * r.closure->high));
+  else lines.push_back("how much of that an effect closes cannot be told from noise");
+  if (!r.moved.empty() && r.conclusion.kind != Conclusion::Kind::none) {
+    lines.push_back("parameters that moved most, in standard deviations of what was believed:");
+    for (std::size_t i = 0; i < r.moved.size() && i < kMoved; ++i)
+      lines.push_back(flightlog::format("  %-36s %+10.2f", r.moved[i].name.c_str(), r.moved[i].prior_sd));
+  }
+  if (const ClosedLoop* c = most_corrected(r.closed_loop))
+    lines.push_back(
+        flightlog::format("in closed loop, %s: %s recorded %.3g, by the vehicle's file %.3g, by the corrected one %.3g",
+                          std::filesystem::path(c->flight).filename().c_str(), c->quantity.c_str(), c->recorded,
+                          c->nominal, c->corrected));
+  if (r.next)
+    lines.push_back(flightlog::format("%s and %s differ most in configs/gap/experiments/%s.toml (%.3g nats expected)",
+                                      r.next->separates.front().c_str(), r.next->separates.back().c_str(),
+                                      r.next->manoeuvre.c_str(), r.next->expected_nats));
+  lines.push_back(r.complete ? next_line(r.conclusion, out) : "next: the same command again, to its end");
+  return lines;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,126 @@
+#include "gap/diagnose/verdict.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "model/effects/registry.hpp"
+
+namespace flappy::gap {
+namespace {
+
+/// One set is named when it holds so much of everything, or of its pool.
+constexpr double kOfAll = 0.5, kOfPool = 0.8;
+/// Of its pool, what is worth a name in a group.
+constexpr double kLeastShare = 0.05;
+
+/// Of refuted().
+constexpr double kWorse = 0.3;
+/// By how much the figures of an effect are farther off than rows and floors alone let expect, and how far a size is off because
+/// the robot's effect has another form than the entry, as a share of itself.
+constexpr double kWider = 1.4, kSizeError = 0.1;
+
+/// Of what speaks for entries: how often it is a cause that no entry has and that looks like one, and how often it is another
+/// entry, whose equation is so far off that a rival's describes it better.
+constexpr double kMimicked = 0.06, kConfused = 0.06;
+
+}  // namespace
+
+const char* kind_name(Conclusion::Kind kind) {
+  static const char* const kNames[] = {"effect", "group", "parameters", "none", "unknown", "data"};
+  return kNames[static_cast<int>(kind)];
+}
+
+const char* kind_name(Answer::Kind kind) {
+  static const char* const kNames[] = {"none", "parameters", "effect", "unknown"};
+  return kNames[static_cast<int>(kind)];
+}
+
+std::string pool_name(const std::vector<std::string>& effects) {
+  std::vector<std::string> groups;
+  for (const std::string& e : effects) groups.push_back(model::group_of(e));
+  std::ranges::sort(groups);
+  std::string name;
+  for (const std::string& g : groups) name += (name.empty() ? "" : "+") + g;
+  return name;
+}
+
+bool refuted(const Losses& parameters, const Losses& effects) {
+  const auto before = parameters.mean(), after = effects.mean();
+  return before && after && *after - *before > kWorse * (*before - huber_floor());
+}
+
+void widen(Fit& fit, const Hypothesis& hypothesis) {
+  const Eigen::VectorXd mean = fit.mean();
+  Eigen::MatrixXd& covariance = fit.posterior.covariance;
+  for (Eigen::Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
+    covariance.row(i) *= kWider;
+    covariance.col(i) *= kWider;
+    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].size) covariance(i, i) += std::pow(kSizeError * mean[i], 2);
+  }
+}
+
+void set_probabilities(std::vector<Answer>& answers) {
+  std::ranges::sort(answers, std::greater{}, &Answer::log_evidence);
+  const double most = answers.empty() ? 0 : answers.front().log_evidence;
+  double sum = 0, of_effects = 0, effects = 0;
+  for (Answer& a : answers) sum += a.probability = std::exp(a.log_evidence - most);
+  for (Answer& a : answers) {
+    a.probability /= sum;
+    if (a.kind == Answer::Kind::effect) of_effects += a.probability, effects += 1;
+  }
+  for (Answer& a : answers) {
+    if (a.kind == Answer::Kind::unknown) a.probability += kMimicked * of_effects;
+    if (a.kind == Answer::Kind::effect)
+      a.probability += kConfused * of_effects / effects - (kMimicked + kConfused) * a.probability;
+  }
+  std::ranges::stable_sort(answers, std::greater{}, &Answer::probability);
+}
+
+Conclusion conclude(const std::vector<Answer>& answers) {
+  struct Pool {
+    double mass = 0;
+    std::size_t best = 0;
+  };
+  std::map<std::string, Pool> pools;  // no effect has the name of another kind
+  const auto key = [](const Answer& a) {
+    return a.kind == Answer::Kind::effect ? pool_name(a.effects) : "/" + std::string(kind_name(a.kind));
+  };
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const auto [at, fresh] = pools.try_emplace(key(answers[i]), Pool{0, i});
+    at->second.mass += answers[i].probability;
+    if (answers[i].probability > answers[at->second.best].probability) at->second.best = i;
+  }
+  Conclusion c;
+  if (pools.empty()) return c;
+  const auto& [name, pool] = *std::ranges::max_element(pools, {}, [](const auto& named) { return named.second.mass; });
+  const Answer& best = answers[pool.best];
+  c.answer = pool.best;
+  c.probability = best.probability;
+  c.effects = best.effects;
+  switch (best.kind) {
+    case Answer::Kind::none:
+      c.kind = Conclusion::Kind::none;
+      return c;
+    case Answer::Kind::parameters:
+      c.kind = Conclusion::Kind::parameters;
+      return c;
+    case Answer::Kind::unknown:
+      c.kind = Conclusion::Kind::unknown;
+      return c;
+    case Answer::Kind::effect:
+      break;
+  }
+  c.kind = Conclusion::Kind::effect;
+  if (best.probability >= kOfAll || best.probability >= kOfPool * pool.mass) return c;
+  c.kind = Conclusion::Kind::group;
+  c.probability = pool.mass;
+  for (const Answer& a : answers) {
+    if (key(a) != name || a.probability < kLeastShare * pool.mass) continue;
+    for (const std::string& e : a.effects)
+      if (!std::ranges::count(c.effects, e)) c.effects.push_back(e);
+  }
+  return c;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,39 @@
+// What a diagnosis may claim: which fits stand, how wide their intervals are, what probabilities come to.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gap/diagnose/diagnose.hpp"
+#include "gap/localise/closure.hpp"
+
+namespace flappy::gap {
+
+/// Whether effects, wherever models may be mistaken, leave more in all than the parameters alone: by more than a share of the gap
+/// that these leave.
+bool refuted(const Losses& parameters, const Losses& effects);
+
+/// Makes the figures of the effects of a fit, along whose coordinates its directions are, as uncertain as they are.
+void widen(Fit& fit, const Hypothesis& hypothesis);
+
+/// Of every answer, from its log evidence; the most probable first. Of what speaks for entries a little goes to an unknown cause,
+/// which may look like one, and to all entries alike.
+void set_probabilities(std::vector<Answer>& answers);
+
+/// The largest mass, rivals that such flights often cannot separate (EffectInfo::group) pooled: a set of effects pools with those whose
+/// effects are of the same groups. Of a pool the most probable set is named where it holds half of everything or four fifths of its
+/// pool; otherwise the pool is, and its verdict is `group`.
+struct Conclusion {
+  enum class Kind { effect, group, parameters, none, unknown, data } kind = Kind::unknown;
+  std::vector<std::string> effects;  ///< of a group: of its sets that hold a twentieth of it
+  double probability = 0;            ///< of a group: all of it
+  std::size_t answer = 0;            ///< the most probable one of what is concluded
+};
+Conclusion conclude(const std::vector<Answer>& answers);
+const char* kind_name(Conclusion::Kind kind);
+const char* kind_name(Answer::Kind kind);
+
+/// Groups of the effects, an effect without one being its own: "drive_lag", "body_drag+world_force".
+std::string pool_name(const std::vector<std::string>& effects);
+
+}  // namespace flappy::gap

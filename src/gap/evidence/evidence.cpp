@@ -1,0 +1,315 @@
+#include "gap/evidence/evidence.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace flappy::gap {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Degrees of freedom of the noise's Student t.
+constexpr double kTail = 4;
+/// Of the whole basis when it is only to take structure out of the noise.
+constexpr double kLooseRidge = 1e-6;
+constexpr double kMostPast = 0.95;
+
+std::size_t row_of(std::size_t beat, int group) { return beat * kRowsPerBeat + static_cast<std::size_t>(group); }
+
+/// A group with eta integrated out: sums a' b over its rows become a' b - of(a)' of(b).
+struct WithoutEta {
+  WithoutEta(const MatrixXd& normal, VectorXd eta_sd) : sd(std::move(eta_sd)) {
+    MatrixXd precision = sd.asDiagonal() * normal * sd.asDiagonal();
+    precision.diagonal().array() += 1;
+    llt.compute(precision);
+    half = of(normal);
+  }
+  /// Of sums basis x a.
+  MatrixXd of(const MatrixXd& sums) const { return llt.matrixL().solve(sd.asDiagonal() * sums); }
+
+  VectorXd sd;
+  Eigen::LLT<MatrixXd> llt;  ///< of eta's precision given the rest, in units of its prior's sd
+  MatrixXd half;             ///< of the basis
+};
+
+double median(std::vector<double> v) {
+  if (v.empty()) return 0;
+  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
+  std::ranges::nth_element(v, middle);
+  return *middle;
+}
+
+}  // namespace
+
+Evidence::Evidence(const std::vector<CarriedFlight>& flights, int threads)
+    : flights_(flights), threads_(threads), basis_(flights), groups_(kGroups) {
+  for (const CarriedFlight& f : flights) weights_.emplace_back(f.beats() * kRowsPerBeat, 1.0);
+  for (int channel = 0; channel < kChannels; ++channel) {
+    double all = 0;
+    for (int c = 0; c < kCoefficients; ++c) {
+      const int g = channel * kCoefficients + c;
+      double sum = 0, n = 0;
+      for (const CarriedFlight& f : flights)
+        for (std::size_t j = 0; j < f.beats(); ++j)
+          if (f.covers(j, channel)) sum += f.signal()[row_of(j, g)] * f.signal()[row_of(j, g)], n += 1;
+      groups_[static_cast<std::size_t>(g)].signal = n > 0 ? sum / n : 0;
+      all += groups_[static_cast<std::size_t>(g)].signal / kCoefficients;
+    }
+    // half its own, half that of its channel: an error of shape moves power between harmonics
+    for (int c = 0; c < kCoefficients; ++c) {
+      double& s = groups_[static_cast<std::size_t>(channel) * kCoefficients + static_cast<std::size_t>(c)].signal;
+      s = std::sqrt((s + all) / 2);
+    }
+  }
+  Signature declared;
+  for (std::size_t f = 0; f < flights.size(); ++f) declared.push_back(flights[f].declared_noise(f + 1));
+  const Index q = basis_.size();
+  for (int channel = 0; channel < kChannels; ++channel) {
+    MatrixXd normal = MatrixXd::Identity(q, q) * 1e-12;
+    double n = 0;
+    for (std::size_t f = 0; f < flights.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool) {
+        const auto b = basis_.values(f).row(static_cast<Index>(j));
+        normal.noalias() += b.transpose() * b;
+        n += 1;
+      });
+    normal.diagonal().array() += kLooseRidge * n;
+    plain_inverse_.push_back(normal.inverse());
+  }
+  find_noise(declared, Find::declared);
+  sum_basis();
+}
+
+void Evidence::learn_weights(const Signature& residual) {
+  find_noise(residual, Find::weights);
+  sum_basis();
+}
+
+void Evidence::learn_noise(const Signature& residual) {
+  find_noise(residual, Find::noise);
+  sum_basis();
+}
+
+/// Calls use(beat, whether the one before it counts) for the beats of a flight that a channel covers.
+template <class Use>
+void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
+  const CarriedFlight& f = flights_[flight];
+  bool before = false;
+  for (std::size_t j = 0; j < f.beats(); ++j) {
+    const bool now = f.covers(j, channel);
+    if (now) use(j, before);
+    before = now;
+  }
+}
+
+void Evidence::find_noise(const Signature& residual, Find what) {
+  const Index q = basis_.size();
+#pragma omp parallel for schedule(dynamic) num_threads(threads_)
+  for (int g = 0; g < kGroups; ++g) {
+    const int channel = g / kCoefficients;
+    if (!has_rows(channel, g % kCoefficients)) continue;
+    VectorXd right = VectorXd::Zero(q);
+    double n = 0;
+    for (std::size_t f = 0; f < flights_.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool) {
+        right += residual[f][row_of(j, g)] * basis_.values(f).row(static_cast<Index>(j)).transpose();
+        n += 1;
+      });
+    if (n == 0) continue;
+    const VectorXd eta = plain_inverse_[static_cast<std::size_t>(channel)] * right;
+    const auto left = [&](std::size_t f, std::size_t j) {
+      return residual[f][row_of(j, g)] - basis_.values(f).row(static_cast<Index>(j)).dot(eta);
+    };
+    std::vector<double> sizes;
+    for (std::size_t f = 0; f < flights_.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool) { sizes.push_back(std::abs(left(f, j))); });
+    const double clip = 3 * 1.4826 * median(sizes);
+    double product = 0, square = 0;
+    for (std::size_t f = 0; f < flights_.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool before) {
+        if (!before) return;
+        const double a = std::clamp(left(f, j - 1), -clip, clip), b = std::clamp(left(f, j), -clip, clip);
+        product += a * b;
+        square += (a * a + b * b) / 2;
+      });
+    Group& known = groups_[static_cast<std::size_t>(g)];
+    Group group = known;
+    group.past = square > 0 ? std::clamp(product / square, -kMostPast, kMostPast) : 0;
+    std::vector<double> steps;
+    const auto innovation = [&](std::size_t f, std::size_t j, bool before) {
+      return before ? left(f, j) - group.past * left(f, j - 1) : left(f, j) * std::sqrt(1 - group.past * group.past);
+    };
+    for (std::size_t f = 0; f < flights_.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool before) { steps.push_back(std::abs(innovation(f, j, before))); });
+    group.sd = std::max({1.4826 * median(steps), group.least_sd, 1e-9});
+    if (what == Find::declared) group.least_sd = group.sd;
+    if (what != Find::weights) known = group;
+    if (what == Find::declared) continue;  // of what is declared, no row is too far off
+    for (std::size_t f = 0; f < flights_.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool before) {
+        const double t = innovation(f, j, before) / group.sd;
+        weights_[f][row_of(j, g)] = std::min(1.0, (kTail + 1) / (kTail + t * t));
+      });
+  }
+}
+
+/// Calls use(beat, row of the basis, its share of the beat before, whitened) in a group.
+template <class Use>
+void Evidence::for_whitened(std::size_t flight, int group, const Use& use) const {
+  const Group& g = groups_[static_cast<std::size_t>(group)];
+  for_rows(flight, group / kCoefficients, [&](std::size_t j, bool before) {
+    const double scale = std::sqrt(weights_[flight][row_of(j, group)]) / g.sd;
+    if (before) use(j, scale, scale * g.past);
+    else use(j, scale * std::sqrt(1 - g.past * g.past), 0.0);
+  });
+}
+
+void Evidence::sum_basis() {
+  const Index q = basis_.size();
+  normal_.assign(flights_.size(), std::vector<MatrixXd>(kGroups, MatrixXd::Zero(q, q)));
+  for (std::size_t f = 0; f < flights_.size(); ++f) {
+    const MatrixXd& basis = basis_.values(f);
+    for (int g = 0; g < kGroups; ++g) {
+      if (!has_rows(g / kCoefficients, g % kCoefficients)) continue;
+      MatrixXd rows(static_cast<Index>(flights_[f].beats()), q);
+      Index n = 0;
+      for_whitened(f, g, [&](std::size_t j, double now, double past) {
+        const auto i = static_cast<Index>(j);
+        if (past != 0) rows.row(n) = now * basis.row(i) - past * basis.row(i - 1);
+        else rows.row(n) = now * basis.row(i);
+        ++n;
+      });
+      if (n == 0) continue;
+      const auto used = rows.topRows(n);
+      normal_[f][static_cast<std::size_t>(g)].selfadjointView<Eigen::Lower>().rankUpdate(used.transpose());
+      normal_[f][static_cast<std::size_t>(g)] =
+          MatrixXd(normal_[f][static_cast<std::size_t>(g)].selfadjointView<Eigen::Lower>());
+    }
+  }
+}
+
+Smooth Evidence::smooth(const Signature& rows) const {
+  const Index q = basis_.size();
+  Smooth result = Smooth::Zero(kGroups, q);
+  for (int channel = 0; channel < kChannels; ++channel) {
+    MatrixXd right = MatrixXd::Zero(q, kCoefficients);
+    for (std::size_t f = 0; f < flights_.size(); ++f)
+      for_rows(f, channel, [&](std::size_t j, bool) {
+        const Eigen::Map<const Eigen::RowVectorXd> y(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
+        right.noalias() += basis_.values(f).row(static_cast<Index>(j)).transpose() * y;
+      });
+    result.middleRows(Index{channel} * kCoefficients, kCoefficients) =
+        (plain_inverse_[static_cast<std::size_t>(channel)] * right).transpose();
+  }
+  return result;
+}
+
+Statistics Evidence::statistics(const Signature& residual) const {
+  const Index q = basis_.size();
+  Statistics s{{flights_.size(), std::vector<VectorXd>(kGroups, VectorXd::Zero(q))}};
+  for (std::size_t f = 0; f < flights_.size(); ++f) {
+    const MatrixXd& basis = basis_.values(f);
+    for (int g = 0; g < kGroups; ++g) {
+      if (!has_rows(g / kCoefficients, g % kCoefficients)) continue;
+      VectorXd& sum = s.sums[f][static_cast<std::size_t>(g)];
+      for_whitened(f, g, [&](std::size_t j, double now, double past) {
+        const auto i = static_cast<Index>(j);
+        const double y = now * residual[f][row_of(j, g)] - (past != 0 ? past * residual[f][row_of(j - 1, g)] : 0);
+        sum += (now * y) * basis.row(i).transpose();
+        if (past != 0) sum -= (past * y) * basis.row(i - 1).transpose();
+      });
+    }
+  }
+  return s;
+}
+
+void Evidence::add(double share, const Smooth& change, Statistics& to) const {
+  for (std::size_t f = 0; f < flights_.size(); ++f)
+    for (int g = 0; g < kGroups; ++g)
+      to.sums[f][static_cast<std::size_t>(g)] +=
+          share * (normal_[f][static_cast<std::size_t>(g)] * change.row(g).transpose());
+}
+
+double Evidence::noise_sd(int group) const {
+  const Group& g = groups_[static_cast<std::size_t>(group)];
+  return g.sd / std::sqrt(1 - g.past * g.past);
+}
+
+Smooth Evidence::floor() const {
+  Smooth sd(kGroups, basis_.size());
+  for (int g = 0; g < kGroups; ++g)
+    for (int i = 0; i < basis_.size(); ++i) sd(g, i) = groups_[static_cast<std::size_t>(g)].signal * basis_.floor(g, i);
+  return sd;
+}
+
+/// Of a group over the chosen flights: basis x basis, and basis x residual.
+std::pair<MatrixXd, VectorXd> Evidence::sums_of(const Statistics& residual, const std::vector<char>& use,
+                                                int group) const {
+  const auto g = static_cast<std::size_t>(group);
+  std::pair<MatrixXd, VectorXd> sums{MatrixXd::Zero(basis_.size(), basis_.size()), VectorXd::Zero(basis_.size())};
+  for (std::size_t f = 0; f < use.size(); ++f) {
+    if (!use[f]) continue;
+    sums.first += normal_[f][g];
+    sums.second += residual.sums[f][g];
+  }
+  return sums;
+}
+
+Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smooth*>& columns,
+                         const std::vector<char>& use, const Smooth& eta_sd) const {
+  const Index q = basis_.size(), k = static_cast<Index>(columns.size());
+  Reduced result{MatrixXd::Zero(k + 1, k + 1), 0};
+  MatrixXd change(q, k), weighed(q, k);
+  for (int g = 0; g < kGroups; ++g) {
+    const auto [normal, right] = sums_of(residual, use, g);
+    if (normal(0, 0) == 0) continue;  // nothing was seen
+    for (Index i = 0; i < k; ++i) change.col(i) = columns[static_cast<std::size_t>(i)]->row(g).transpose();
+    const WithoutEta without(normal, eta_sd.row(g).transpose());
+    weighed.noalias() = (normal - without.half.transpose() * without.half) * change;
+    result.sums.topLeftCorner(k, k).triangularView<Eigen::Lower>() += change.transpose() * weighed;
+    const VectorXd half_right = without.of(right);
+    result.sums.row(k).head(k) += (right - without.half.transpose() * half_right).transpose() * change;
+    MatrixXd ridge = normal;
+    ridge.diagonal().array() += kLooseRidge * normal(0, 0);
+    result.sums(k, k) += ridge.ldlt().solve(right).dot(right) - half_right.squaredNorm();
+    result.log_scale -= without.llt.matrixLLT().diagonal().array().log().sum();
+  }
+  result.sums = MatrixXd(result.sums.selfadjointView<Eigen::Lower>());
+  return result;
+}
+
+Smooth Evidence::local_gains(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd,
+                             const Smooth& more_sd) const {
+  Smooth gains = Smooth::Zero(kGroups, basis_.size());
+  for (int g = 0; g < kGroups; ++g) {
+    const auto [normal, right] = sums_of(residual, use, g);
+    if (normal(0, 0) == 0) continue;
+    const WithoutEta without(normal, eta_sd.row(g).transpose());
+    // one more coefficient, beside those that were there
+    const VectorXd known = normal.diagonal() - without.half.colwise().squaredNorm().transpose();
+    const VectorXd left = right - without.half.transpose() * without.of(right);
+    const Eigen::ArrayXd more = more_sd.row(g).transpose().array();
+    const Eigen::ArrayXd information = more.square() * known.array(), score = more * left.array();
+    gains.row(g) = (0.5 * (score.square() / (1 + information) - information.log1p())).transpose();
+  }
+  return gains;
+}
+
+Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& columns, const VectorXd& prior_mean) {
+  const Index k = static_cast<Index>(columns.size()), last = reduced.sums.rows() - 1;
+  MatrixXd precision = reduced.sums(columns, columns);
+  VectorXd right = reduced.sums(columns, last);
+  precision.diagonal().array() += 1;
+  right += prior_mean;
+  const Eigen::LLT<MatrixXd> llt(precision);
+  Posterior p;
+  p.mean = llt.solve(right);
+  p.covariance = llt.solve(MatrixXd::Identity(k, k));
+  p.log_evidence = reduced.log_scale - 0.5 * (reduced.sums(last, last) + prior_mean.squaredNorm() - right.dot(p.mean)) -
+                   llt.matrixLLT().diagonal().array().log().sum();
+  return p;
+}
+
+}  // namespace flappy::gap

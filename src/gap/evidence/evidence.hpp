@@ -1,0 +1,121 @@
+// How probable residuals are under a hypothesis, in closed form.
+//
+// Rows (gap/beat_rows.hpp) fall into groups: one channel, one coefficient. In a group, over the beats of a flight,
+//   residual = columns theta + basis eta + noise
+//   theta    what the hypothesis leaves free, standard normal a priori: shared by all groups
+//   eta      what every model of a flapping wing gets wrong: a smooth function of input and motion (RegimeBasis) in every
+//            group, N(0, (its floor x size of the signal)^2). An effect must explain more than this.
+//   noise    first-order autoregressive from beat to beat, with a scale and an autocorrelation of its own in every group,
+//            found from what even the whole basis does not explain; heavy-tailed: rows far off count less (Student t)
+// theta and eta are integrated out (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 2.7), so
+//   log p(residual) = -1/2 r^T K^-1 r - 1/2 log det K + const
+#pragma once
+
+#include <Eigen/Dense>
+#include <utility>
+#include <vector>
+
+#include "gap/evidence/model_error.hpp"
+
+namespace flappy::gap {
+
+/// Rows of all flights.
+using Signature = std::vector<Rows>;
+
+inline constexpr int kGroups = kChannels * kCoefficients;
+
+/// Smooth functions of what a beat did, over all flights of mean 0 and rms 1 but for the constant.
+class RegimeBasis {
+ public:
+  explicit RegimeBasis(const std::vector<CarriedFlight>& flights);
+  int size() const { return static_cast<int>(names_.size()); }
+  const std::string& name(int i) const { return names_[static_cast<std::size_t>(i)]; }
+  /// How large its coefficient is in every model, as a share of the signal of a group.
+  double floor(int group, int i) const;
+  /// [beat][size()].
+  const Eigen::MatrixXd& values(std::size_t flight) const { return values_[flight]; }
+
+ private:
+  std::vector<std::string> names_;
+  std::vector<Function> kinds_;
+  std::vector<Eigen::MatrixXd> values_;
+};
+
+/// The part of rows that is a smooth function of the regime: coefficients of the basis, [group][basis].
+using Smooth = Eigen::MatrixXd;
+
+/// All that the rows of flights say of smooth residuals: sums over the whitened rows of a group, basis x
+/// residual, [flight][group].
+struct Statistics {
+  std::vector<std::vector<Eigen::VectorXd>> sums;
+};
+
+/// Columns and residual with eta integrated out.
+struct Reduced {
+  Eigen::MatrixXd sums;  ///< columns, then the residual: square
+  double log_scale = 0;  ///< of what was integrated out
+};
+
+struct Posterior {
+  double log_evidence = 0;
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+};
+
+class Evidence {
+ public:
+  Evidence(const std::vector<CarriedFlight>& flights, int threads);
+
+  const RegimeBasis& basis() const { return basis_; }
+  /// Noise is as the headers declare it, until it is learnt from what a good fit leaves: its scale, its autocorrelation, and
+  /// which rows count less. The weights alone are for residuals that are no noise yet.
+  void learn_weights(const Signature& residual);
+  void learn_noise(const Signature& residual);
+  /// By least squares. Differences of simulations are rough: where in its step a wing meets its stop decides on more than
+  /// the parameter that was moved. What is no smooth function of the regime is noise, whatever the hypothesis.
+  Smooth smooth(const Signature& rows) const;
+  Statistics statistics(const Signature& residual) const;
+  /// Adds to a residual `share` times a smooth one.
+  void add(double share, const Smooth& change, Statistics& to) const;
+  /// Sd of eta that every model of a wing has.
+  Smooth floor() const;
+  /// `use`: which flights. `eta_sd`: of eta's coefficients.
+  Reduced reduce(const Statistics& residual, const std::vector<const Smooth*>& columns, const std::vector<char>& use,
+                 const Smooth& eta_sd) const;
+  /// What log p gains when a coefficient of eta, each for itself, may be as large as `more_sd` besides, while the columns
+  /// stay as they are.
+  Smooth local_gains(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd,
+                     const Smooth& more_sd) const;
+  /// Of the chosen columns, whose theta has the given prior means and sd 1.
+  static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns,
+                             const Eigen::VectorXd& prior_mean);
+
+  /// Sd of a row of noise alone.
+  double noise_sd(int group) const;
+  double signal(int group) const { return groups_[static_cast<std::size_t>(group)].signal; }
+
+ private:
+  struct Group {
+    double sd = 1, past = 0, signal = 0;
+    double least_sd = 0;  ///< as declared
+  };
+  void sum_basis();
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> sums_of(const Statistics& residual, const std::vector<char>& use,
+                                                      int group) const;
+  enum class Find { declared, weights, noise };
+  void find_noise(const Signature& residual, Find what);
+  template <class Use>
+  void for_rows(std::size_t flight, int channel, const Use& use) const;
+  template <class Use>
+  void for_whitened(std::size_t flight, int group, const Use& use) const;
+
+  const std::vector<CarriedFlight>& flights_;
+  int threads_;
+  RegimeBasis basis_;
+  std::vector<Group> groups_;
+  Signature weights_;
+  std::vector<Eigen::MatrixXd> plain_inverse_;        ///< of basis x basis, by channel
+  std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< basis x basis of the whitened rows, [flight][group]
+};
+
+}  // namespace flappy::gap

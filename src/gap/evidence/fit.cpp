@@ -1,0 +1,298 @@
+#include "gap/evidence/fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <map>
+
+#include "gap/replay/sensor_correction.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Reach of the first differences, and bounds of the later ones: so many standard deviations of what is known then, for a
+/// step has to be long where little is known and short where much is.
+constexpr double kFirstReach = 0.3, kLeastReach = 0.1, kMostReach = 1, kReachSd = 3;
+/// Points around another, and their share of the reach of its differences.
+constexpr int kAround = 8;
+constexpr double kAroundReach = 0.2;
+constexpr double kConverged = 0.02;
+/// Nats that another linearisation has to bring.
+constexpr double kWorthwhile = 0.05;
+
+}  // namespace
+
+VectorXd Columns::mean() const {
+  return Eigen::Map<const VectorXd>(prior_mean.data(), static_cast<Index>(prior_mean.size()));
+}
+
+void Columns::add(const Smooth& column, double mean) {
+  chosen.push_back(static_cast<int>(columns.size()));
+  columns.push_back(&column);
+  prior_mean.push_back(mean);
+}
+
+std::vector<Signature> residuals(const std::vector<CarriedFlight>& flights, const std::vector<Candidate>& candidates,
+                                 int threads) {
+  // candidates whose sensors agree share a log
+  std::map<EffectValues, std::vector<std::size_t>> by_sensors;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    by_sensors[sensor_effects(candidates[i].vehicle.effects)].push_back(i);
+  std::vector<Signature> list(candidates.size());
+  const auto compare = [&](const std::vector<CarriedFlight>& seen, const std::vector<std::size_t>& which, int at_once) {
+    std::vector<Candidate> group;
+    for (const std::size_t i : which) group.push_back(candidates[i]);
+    std::vector<Signature> predicted = predict_all(seen, group, at_once);
+    for (std::size_t g = 0; g < which.size(); ++g) {
+      Signature& s = predicted[g];
+      const bool whole = std::ranges::none_of(s, [](const Rows& rows) { return rows.empty(); });
+      for (std::size_t f = 0; whole && f < seen.size(); ++f)
+        for (std::size_t i = 0; i < s[f].size(); ++i) s[f][i] = seen[f].measured()[i] - s[f][i];
+      if (whole) list[which[g]] = std::move(s);
+    }
+  };
+  std::vector<std::pair<EffectValues, std::vector<std::size_t>>> corrected;
+  for (auto& [sensors, which] : by_sensors) {
+    if (sensors.empty()) compare(flights, which, threads);
+    else corrected.emplace_back(sensors, which);
+  }
+  std::exception_ptr failed;
+#pragma omp parallel for schedule(dynamic) num_threads(threads)
+  for (std::size_t k = 0; k < corrected.size(); ++k) {
+    try {
+      std::vector<CarriedFlight> seen;
+      for (const CarriedFlight& f : flights) seen.push_back(f.with_log(without(corrected[k].first, f.recording().log)));
+      compare(seen, corrected[k].second, 1);
+    } catch (...) {  // nothing may leave a parallel loop
+#pragma omp critical
+      failed = std::current_exception();
+    }
+  }
+  if (failed) std::rethrow_exception(failed);
+  return list;
+}
+
+Directions Fitter::axes(const Hypothesis& hypothesis) {
+  return {MatrixXd::Identity(hypothesis.size(), hypothesis.size()), VectorXd::Constant(hypothesis.size(), kFirstReach)};
+}
+
+Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions,
+                             const std::vector<Smooth>& known) const {
+  std::vector<Candidate> candidates = {hypothesis.candidate(at)};
+  std::vector<double> spans;
+  const auto first = static_cast<Index>(known.size());
+  for (Index d = first; d < directions.reach.size(); ++d) {
+    const VectorXd axis = directions.axes.col(d);
+    const VectorXd up = hypothesis.bounded(at + directions.reach[d] * axis);
+    const VectorXd down = hypothesis.bounded(at - directions.reach[d] * axis);
+    spans.push_back((up - down).dot(axis));
+    candidates.push_back(hypothesis.candidate(up));
+    candidates.push_back(hypothesis.candidate(down));
+  }
+  std::vector<Signature> rows = residuals(flights_, candidates, threads_);
+  Linearised l{at, std::move(directions), std::move(rows[0]), {}, known};
+  for (std::size_t d = 0; d < spans.size(); ++d) {
+    Signature &up = rows[1 + 2 * d], &down = rows[2 + 2 * d];
+    l.columns.emplace_back();
+    if (up.empty() || down.empty() || !(spans[d] > 0)) continue;
+    for (std::size_t f = 0; f < up.size(); ++f)
+      for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / spans[d];
+    l.columns.back() = evidence_.smooth(up);
+  }
+  if (l.residual.empty()) return l;
+  l.statistics = evidence_.statistics(l.residual);
+  average(hypothesis, l);
+  return l;
+}
+
+/// The residual at a point is as rough as the columns were: its mean over points around, each brought back by the columns,
+/// is less so.
+void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
+  const Index k = std::min(l.directions.reach.size(), hypothesis.shared());
+  if (k == 0) return;
+  std::vector<VectorXd> shifts;
+  std::vector<Candidate> candidates;
+  for (int i = 0; i < kAround; ++i) {
+    VectorXd shift = VectorXd::Zero(k);
+    for (Index d = 0; d < k; ++d) {
+      if (l.columns[static_cast<std::size_t>(d)].size() == 0) continue;
+      // columns of a Hadamard matrix but its first: every direction goes as often up as down, and of any seven that follow one
+      // another no two together
+      const int sign = __builtin_popcount(static_cast<unsigned>((d % (kAround - 1) + 1) & i)) % 2 ? -1 : 1;
+      shift[d] = kAroundReach * sign * l.directions.reach[d];
+    }
+    const VectorXd there = hypothesis.bounded(l.at + l.directions.axes.leftCols(k) * shift);
+    shifts.push_back(l.directions.axes.leftCols(k).transpose() * (there - l.at));
+    candidates.push_back(hypothesis.candidate(there));
+  }
+  const std::vector<Signature> rows = residuals(flights_, candidates, threads_);
+  double n = 1;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (rows[i].empty()) continue;
+    Statistics there = evidence_.statistics(rows[i]);
+    for (Index d = 0; d < k; ++d)
+      if (shifts[i][d] != 0 && l.columns[static_cast<std::size_t>(d)].size() > 0)
+        evidence_.add(shifts[i][d], l.columns[static_cast<std::size_t>(d)], there);
+    for (std::size_t f = 0; f < there.sums.size(); ++f)
+      for (std::size_t g = 0; g < there.sums[f].size(); ++g) l.statistics.sums[f][g] += there.sums[f][g];
+    n += 1;
+  }
+  for (auto& flight : l.statistics.sums)
+    for (VectorXd& sum : flight) sum /= n;
+}
+
+Columns Fitter::columns_of(const Linearised& point) const {
+  Columns c;
+  for (std::size_t d = 0; d < point.columns.size(); ++d)
+    if (point.columns[d].size() > 0)
+      c.add(point.columns[d], -point.directions.axes.col(static_cast<Index>(d)).dot(point.at));
+  for (const Smooth& b : background_) c.add(b, 0);
+  return c;
+}
+
+Smooth Fitter::form_error(const Hypothesis& hypothesis, const Linearised& point) const {
+  std::map<std::string, Smooth> whole;
+  for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
+    const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(i)];
+    const Smooth& column = point.columns[static_cast<std::size_t>(i)];
+    if (!u.size || column.size() == 0) continue;
+    Smooth& own = whole[u.effect];
+    if (own.size() == 0) own = Smooth::Zero(column.rows(), column.cols());
+    own += point.at[i] * column;
+  }
+  Smooth squares = Smooth::Zero(kGroups, evidence_.basis().size());
+  for (const auto& [effect, own] : whole) squares += (kFormError * own).cwiseAbs2();
+  return squares.cwiseSqrt();
+}
+
+Reduced Fitter::reduce(const Linearised& point, const Columns& columns) const {
+  return evidence_.reduce(point.statistics, columns.columns, all_flights(), evidence_.floor());
+}
+
+Posterior Fitter::solve(const Linearised& point, const Columns& columns, Reduced reduced, double damping) const {
+  std::vector<Index> seen;
+  for (std::size_t d = 0; d < point.columns.size(); ++d)
+    if (point.columns[d].size() > 0) seen.push_back(static_cast<Index>(d));
+  const auto own = static_cast<Index>(seen.size()), k = static_cast<Index>(point.columns.size());
+  reduced.sums.diagonal().head(own).array() += damping;
+  const Posterior p = Evidence::posterior(reduced, columns.chosen, columns.mean());
+  Posterior all{p.log_evidence, VectorXd::Zero(k), MatrixXd::Identity(k, k)};
+  all.mean(seen) = p.mean.head(own);
+  all.covariance(seen, seen) = p.covariance.topLeftCorner(own, own);
+  return all;
+}
+
+VectorXd Fit::mean() const { return point.at + point.directions.axes * posterior.mean; }
+MatrixXd Fit::covariance() const {
+  return point.directions.axes * posterior.covariance * point.directions.axes.transpose();
+}
+
+double Fitter::cost(const Statistics& residual, const VectorXd& at) const {
+  Columns c;
+  for (const Smooth& b : background_) c.add(b, 0);
+  const Reduced reduced = evidence_.reduce(residual, c.columns, all_flights(), evidence_.floor());
+  return 0.5 * at.squaredNorm() - Evidence::posterior(reduced, c.chosen, c.mean()).log_evidence;
+}
+
+/// Those of the parameters' fit, and the effects' own.
+Directions Fitter::beside(const Hypothesis& hypothesis, const Fit& parameters) {
+  Directions d = axes(hypothesis);
+  const Index shared = hypothesis.shared();
+  d.axes.topLeftCorner(shared, shared) = parameters.point.directions.axes.topLeftCorner(shared, shared);
+  d.reach.head(shared) = parameters.point.directions.reach.head(shared);
+  return d;
+}
+
+std::vector<Smooth> Fitter::known(const Hypothesis& hypothesis, const Fit& parameters) {
+  const auto& columns = parameters.point.columns;
+  return {columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(hypothesis.shared())};
+}
+
+/// The axes of what is known: parameters turned among themselves, effects as they are.
+Directions Fitter::principal(const Hypothesis& hypothesis, const Fit& fit) {
+  const Index shared = hypothesis.shared(), size = hypothesis.size();
+  const MatrixXd covariance = fit.covariance();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance.topLeftCorner(shared, shared));
+  Directions d = axes(hypothesis);
+  d.axes.topLeftCorner(shared, shared) = eigen.eigenvectors();
+  for (Index i = 0; i < size; ++i) {
+    const double variance = i < shared ? eigen.eigenvalues()[i] : covariance(i, i);
+    d.reach[i] = std::clamp(kReachSd * std::sqrt(variance), kLeastReach, kMostReach);
+  }
+  return d;
+}
+
+Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int iterations) const {
+  Fit result;
+  result.point = linearise(hypothesis, hypothesis.bounded(std::move(start)), axes(hypothesis));
+  return improve(hypothesis, std::move(result), iterations, nullptr);
+}
+
+Fit Fitter::fit(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters, int iterations) const {
+  Fit result;
+  result.point =
+      linearise(hypothesis, hypothesis.bounded(start), beside(hypothesis, parameters), known(hypothesis, parameters));
+  return improve(hypothesis, std::move(result), iterations, &parameters);
+}
+
+Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters, const std::vector<Smooth>& own) const {
+  Fit result;
+  Linearised& l = result.point;
+  l = parameters.point;
+  l.residual.clear();
+  l.at = hypothesis.start();
+  l.at.head(hypothesis.shared()) = parameters.point.at;
+  l.directions = beside(hypothesis, parameters);
+  l.columns.insert(l.columns.end(), own.begin(), own.end());
+  const Columns columns = columns_of(l);
+  result.posterior = solve(l, columns, reduce(l, columns));
+  return result;
+}
+
+Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const {
+  Fit result;
+  result.point = linearise(hypothesis, before.point.at, principal(hypothesis, before));
+  return improve(hypothesis, std::move(result), iterations, nullptr);
+}
+
+Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const {
+  if (fit.point.residual.empty()) return fit;  // comes apart
+  for (int n = 1;; ++n) {
+    const Linearised& l = fit.point;
+    const Columns columns = columns_of(l);
+    const Reduced reduced = reduce(l, columns);
+    fit.posterior = solve(l, columns, reduced);
+    if (n >= iterations) return fit;
+    const VectorXd step = l.directions.axes * fit.posterior.mean;
+    if (step.cwiseAbs().maxCoeff() < kConverged) return fit;
+    // shares of the step, and steps that go less far where little is known; all tried at once
+    constexpr double kShares[] = {1, 0.5, 0.25, 0.1, 0.03}, kDampings[] = {1, 10, 100};
+    std::vector<VectorXd> tries;
+    for (const double share : kShares) tries.push_back(hypothesis.bounded(l.at + share * step));
+    for (const double damping : kDampings)
+      tries.push_back(hypothesis.bounded(l.at + l.directions.axes * solve(l, columns, reduced, damping).mean));
+    std::vector<Candidate> candidates;
+    for (const VectorXd& at : tries) candidates.push_back(hypothesis.candidate(at));
+    const std::vector<Signature> left = residuals(flights_, candidates, threads_);
+    const double before = cost(evidence_.statistics(l.residual), l.at);
+    std::size_t best = tries.size();
+    double best_cost = before;
+    for (std::size_t i = 0; i < tries.size(); ++i) {
+      if (left[i].empty()) continue;
+      const double c = cost(evidence_.statistics(left[i]), tries[i]);
+      if (c < best_cost) best = i, best_cost = c;
+    }
+    if (best == tries.size() || before - best_cost < kWorthwhile) return fit;
+    Linearised next = parameters == nullptr
+                          ? linearise(hypothesis, tries[best], principal(hypothesis, fit))
+                          : linearise(hypothesis, tries[best], l.directions, known(hypothesis, *parameters));
+    if (next.residual.empty()) return fit;
+    fit.point = std::move(next);
+  }
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,92 @@
+// Finds the most probable unknowns of a hypothesis: Gauss-Newton on the rows of whole flights, whose derivatives are
+// differences between vehicles that fly side by side as lanes.
+#pragma once
+
+#include "gap/evidence/evidence.hpp"
+#include "gap/evidence/hypothesis.hpp"
+
+namespace flappy::gap {
+
+/// Orthonormal directions through the coordinates, and how far a difference goes along each.
+struct Directions {
+  Eigen::MatrixXd axes;  ///< a column each
+  Eigen::VectorXd reach;
+};
+
+/// A hypothesis at given coordinates, linearised: what is left of the measurement, and how it changes.
+struct Linearised {
+  Eigen::VectorXd at;
+  Directions directions;
+  Signature residual;     ///< empty: the vehicle comes apart
+  Statistics statistics;  ///< of the residual, less rough
+  std::vector<Smooth>
+      columns;  ///< change of the prediction for a unit along each direction; empty: it comes apart there
+};
+
+struct Fit {
+  Linearised point;
+  Posterior posterior;  ///< along the directions, relative to `point.at`
+  /// Of the coordinates.
+  Eigen::VectorXd mean() const;
+  Eigen::MatrixXd covariance() const;
+};
+
+/// Columns beside each other, and the prior means of their coefficients.
+struct Columns {
+  std::vector<const Smooth*> columns;
+  std::vector<int> chosen;  ///< all of them
+  std::vector<double> prior_mean;
+  Eigen::VectorXd mean() const;
+  void add(const Smooth& column, double mean);
+};
+
+/// Residuals under many candidates; empty signatures for vehicles that come apart.
+std::vector<Signature> residuals(const std::vector<CarriedFlight>& flights, const std::vector<Candidate>& candidates,
+                                 int threads);
+
+class Fitter {
+ public:
+  Fitter(const std::vector<CarriedFlight>& flights, const Evidence& evidence, int threads)
+      : flights_(flights), evidence_(evidence), threads_(threads) {}
+
+  /// Columns that may take what they can beside every hypothesis, with standard normal coefficients.
+  void set_background(std::vector<Smooth> columns) { background_ = std::move(columns); }
+  std::vector<char> all_flights() const { return std::vector<char>(flights_.size(), 1); }
+  /// The columns of a point that do not come apart, then the background's.
+  Columns columns_of(const Linearised& point) const;
+  /// What the equations of its effects get wrong of themselves: shares of all that the sizes of each change.
+  Smooth form_error(const Hypothesis& hypothesis, const Linearised& point) const;
+
+  /// `known`: columns of the first directions, which need not be found again.
+  Linearised linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
+                       const std::vector<Smooth>& known = {}) const;
+  /// Every coordinate.
+  static Directions axes(const Hypothesis& hypothesis);
+  /// From `start` on, at most `iterations` linearisations; empty residual where the vehicle comes apart at once.
+  Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int iterations) const;
+  /// From `start` on, beside another fit: its parameters keep their directions and derivatives.
+  Fit fit(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters, int iterations) const;
+  /// The same, from where another fit ended, along its directions.
+  Fit refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const;
+  /// Without any effect's size, taken as linear in the hypothesis' own unknowns, whose columns are given (empty: unseen), beside
+  /// a fit of the parameters. No residual.
+  Fit linear(const Hypothesis& hypothesis, const Fit& parameters, const std::vector<Smooth>& own) const;
+
+ private:
+  static Directions beside(const Hypothesis& hypothesis, const Fit& parameters);
+  static std::vector<Smooth> known(const Hypothesis& hypothesis, const Fit& parameters);
+  static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
+  Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const;
+  void average(const Hypothesis& hypothesis, Linearised& l) const;
+  Reduced reduce(const Linearised& point, const Columns& columns) const;
+  /// Along all directions. `damping`: of the steps, as so much more precision around the point itself (Levenberg).
+  Posterior solve(const Linearised& point, const Columns& columns, Reduced reduced, double damping = 0) const;
+  double cost(const Statistics& residual, const Eigen::VectorXd& at) const;
+
+  const std::vector<CarriedFlight>& flights_;
+  const Evidence& evidence_;
+  int threads_;
+  std::vector<Smooth> background_;
+};
+
+}  // namespace flappy::gap

@@ -1,0 +1,65 @@
+#include "gap/evidence/hypothesis.hpp"
+
+#include <algorithm>
+
+#include "model/effects/registry.hpp"
+
+namespace flappy::gap {
+namespace {
+
+/// How well a header's latency and bandwidth say when a sample was taken.
+constexpr double kImuLagSd_s = 1e-4;
+/// Draws farther out are none of nature's.
+constexpr double kFarthest = 4;
+/// Half of 90 % of a normal distribution, in standard deviations; all of 90 % of one that has one side only.
+constexpr double kHalf90 = 1.645;
+
+}  // namespace
+
+double Unknown::value(double coordinate) const { return std::clamp(centre + scale * coordinate, low, high); }
+
+std::vector<Unknown> unknowns_of(const std::string& effect) {
+  const int index = model::effect_index(effect.c_str());
+  const model::EffectEntry& entry = model::effects()[static_cast<std::size_t>(index)];
+  std::vector<Unknown> list;
+  for (std::size_t k = 0; k < entry.parameters.size(); ++k) {
+    const model::EffectParameter& p = entry.parameters[k];
+    Unknown u{effect, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < entry.info.sizes};
+    if (u.size) u.scale = std::max(-p.prior_low, p.prior_high) / kHalf90;
+    else u.centre = p.typical, u.scale = (p.prior_high - p.prior_low) / (2 * kHalf90);
+    list.push_back(std::move(u));
+  }
+  return list;
+}
+
+Hypothesis::Hypothesis(const sim::Randomisation& uncertain, std::vector<std::string> effects)
+    : uncertain_(&uncertain), effects_(std::move(effects)) {
+  for (std::size_t d = 0; d < uncertain.draws(); ++d)
+    unknowns_.push_back({"", uncertain.name(d), 0, 1, uncertain.is_uniform(d) ? -1.0 : -kFarthest,
+                         uncertain.is_uniform(d) ? 1.0 : kFarthest, false});
+  unknowns_.push_back({"", "imu.latency_s", 0, kImuLagSd_s, -20 * kImuLagSd_s, 20 * kImuLagSd_s, false});
+  for (const std::string& e : effects_)
+    for (Unknown& u : unknowns_of(e)) unknowns_.push_back(std::move(u));
+}
+
+Eigen::VectorXd Hypothesis::bounded(Eigen::VectorXd coordinates) const {
+  for (Eigen::Index i = 0; i < size(); ++i) {
+    const Unknown& u = unknowns_[static_cast<std::size_t>(i)];
+    coordinates[i] = u.coordinate(u.value(coordinates[i]));
+  }
+  return coordinates;
+}
+
+Candidate Hypothesis::candidate(const Eigen::VectorXd& coordinates) const {
+  std::vector<double> variates(static_cast<std::size_t>(parameters()));
+  for (std::size_t d = 0; d < variates.size(); ++d)
+    variates[d] = unknowns_[d].value(coordinates[static_cast<Eigen::Index>(d)]);
+  Candidate c{uncertain_->at(variates), unknowns_[static_cast<std::size_t>(lag())].value(coordinates[lag()])};
+  for (Eigen::Index i = shared(); i < size(); ++i) {
+    const Unknown& u = unknowns_[static_cast<std::size_t>(i)];
+    c.vehicle.effects[u.effect][u.name] = u.value(coordinates[i]);
+  }
+  return c;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,53 @@
+// What a hypothesis leaves free, as coordinates that are standard normal a priori: the uncertain parameters of the vehicle,
+// how late the IMU is, and the sizes and shapes of the effects it assumes.
+#pragma once
+
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+#include "gap/replay/carry.hpp"
+#include "sim/randomise.hpp"
+
+namespace flappy::gap {
+
+/// One coordinate: value = centre + scale x coordinate.
+struct Unknown {
+  std::string effect;  ///< empty for a parameter of the vehicle
+  std::string name;    ///< path of the parameter, or name of the effect's
+  double centre = 0, scale = 1;
+  double low = -1e30, high = 1e30;  ///< of the value
+  bool size = false;                ///< the effect vanishes where all of its sizes are 0
+  double value(double coordinate) const;
+  double coordinate(double of_value) const { return (of_value - centre) / scale; }
+};
+
+class Hypothesis {
+ public:
+  /// `effects`: identifiers, in order.
+  Hypothesis(const sim::Randomisation& uncertain, std::vector<std::string> effects);
+
+  const std::vector<std::string>& effects() const { return effects_; }
+  const std::vector<Unknown>& unknowns() const { return unknowns_; }
+  Eigen::Index size() const { return static_cast<Eigen::Index>(unknowns_.size()); }
+  /// Of these, the first are the vehicle's parameters, the same for every hypothesis; then the IMU's lag.
+  Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->draws()); }
+  Eigen::Index lag() const { return parameters(); }
+  Eigen::Index shared() const { return parameters() + 1; }
+  /// Sizes start at 0, shapes in the middle of their range.
+  Eigen::VectorXd start() const { return Eigen::VectorXd::Zero(size()); }
+  /// Into the accepted ranges.
+  Eigen::VectorXd bounded(Eigen::VectorXd coordinates) const;
+
+  Candidate candidate(const Eigen::VectorXd& coordinates) const;
+
+ private:
+  const sim::Randomisation* uncertain_;
+  std::vector<std::string> effects_;
+  std::vector<Unknown> unknowns_;
+};
+
+/// What an effect of the catalogue leaves free: its sizes first.
+std::vector<Unknown> unknowns_of(const std::string& effect);
+
+}  // namespace flappy::gap

@@ -1,0 +1,91 @@
+#include <cmath>
+
+#include "gap/evidence/evidence.hpp"
+#include "gap/evidence/model_error.hpp"
+
+namespace flappy::gap {
+namespace {
+
+/// How far what is near a surface reaches: a wing's length.
+constexpr double kReach_m = 0.07;
+/// Where some of the plain functions stand, when a set of flights has them all.
+constexpr int kAmplitude = 1, kDifference = 2, kBias = 3, kSplitCycle = 4, kVelocityX = 5, kVelocityZ = 7, kPlain = 11;
+
+}  // namespace
+
+double RegimeBasis::floor(int group, int i) const {
+  return mistaken_share(group / kCoefficients, (group % kCoefficients + 1) / 2, kinds_[static_cast<std::size_t>(i)]);
+}
+
+RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
+  values_.resize(flights.size());
+  // centred and of rms 1, but for the constant; what never changes is the constant
+  const auto append = [&](const std::string& name, Function kind, std::vector<Eigen::VectorXd> column) {
+    double sum = 0, squares = 0, n = 0;
+    for (const Eigen::VectorXd& v : column)
+      sum += v.sum(), squares += v.squaredNorm(), n += static_cast<double>(v.size());
+    const bool constant = names_.empty();
+    const double mean = constant ? 0 : sum / n;
+    const double sd = constant ? 1 : std::sqrt(std::max(0.0, squares / n - mean * mean));
+    if (!(sd > 1e-9 * (std::abs(mean) + 1e-3))) return;
+    for (std::size_t f = 0; f < flights.size(); ++f) {
+      values_[f].conservativeResize(column[f].size(), values_[f].cols() + 1);
+      values_[f].rightCols(1) = (column[f].array() - mean) / sd;
+    }
+    names_.push_back(name);
+    kinds_.push_back(kind);
+  };
+  const auto add = [&](const char* name, Function kind, auto&& value) {
+    std::vector<Eigen::VectorXd> column;
+    for (const CarriedFlight& f : flights) {
+      column.emplace_back(static_cast<Eigen::Index>(f.beats()));
+      for (std::size_t j = 0; j < f.beats(); ++j)
+        column.back()[static_cast<Eigen::Index>(j)] = value(f.recording(), f.recording().regimes[j]);
+    }
+    append(name, kind, std::move(column));
+  };
+  using R = const Recording&;
+  using S = const Regime&;
+  add("1", Function::constant, [](R, S) { return 1.0; });
+  add("amplitude", Function::input, [](R, S s) { return s.amplitude_V; });
+  add("difference", Function::input, [](R, S s) { return s.difference_V; });
+  add("bias", Function::input, [](R, S s) { return s.bias_V; });
+  add("split_cycle", Function::input, [](R, S s) { return s.split_cycle; });
+  add("velocity_x", Function::velocity_x, [](R, S s) { return s.velocity_B_m_s.x(); });
+  add("velocity_y", Function::velocity_y, [](R, S s) { return s.velocity_B_m_s.y(); });
+  add("velocity_z", Function::velocity_z, [](R, S s) { return s.velocity_B_m_s.z(); });
+  add("rate_x", Function::rate, [](R, S s) { return s.rate_rad_s.x(); });
+  add("rate_y", Function::rate, [](R, S s) { return s.rate_rad_s.y(); });
+  add("rate_z", Function::rate, [](R, S s) { return s.rate_rad_s.z(); });
+  // of what is already centred, so that a product says what its factors do not
+  const auto multiply = [&](int a, int b) {
+    std::vector<Eigen::VectorXd> column;
+    for (const Eigen::MatrixXd& v : values_) column.emplace_back(v.col(a).cwiseProduct(v.col(b)));
+    append(name(a) + " " + name(b), Function::product, std::move(column));
+  };
+  if (size() == kPlain)
+    for (const int b : {kAmplitude, kDifference, kBias, kSplitCycle, kVelocityX, kVelocityZ}) multiply(kAmplitude, b);
+  add("|velocity| velocity_x", Function::square_x,
+      [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.x(); });
+  add("|velocity| velocity_y", Function::square_y,
+      [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.y(); });
+  add("|velocity| velocity_z", Function::square_z,
+      [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.z(); });
+  add("near ground", Function::place,
+      [](R r, S s) { return std::exp(-std::max(0.0, s.position_m.z() - r.world.ground_z_m) / kReach_m); });
+  add("near ceiling", Function::place,
+      [](R r, S s) { return std::exp(-std::max(0.0, r.world.ceiling_z_m - s.position_m.z()) / kReach_m); });
+  add("near wall", Function::place, [](R r, S s) {
+    double near = 0;
+    for (const sim::Wall& w : r.world.walls)
+      near += std::exp(
+          -std::max(0.0, w.normal_x * (s.position_m.x() - w.x_m) + w.normal_y * (s.position_m.y() - w.y_m)) / kReach_m);
+    return near;
+  });
+  add("height", Function::place, [](R, S s) { return s.position_m.z(); });
+  add("cos heading", Function::place, [](R, S s) { return std::cos(s.heading_rad); });
+  add("sin heading", Function::place, [](R, S s) { return std::sin(s.heading_rad); });
+  add("time", Function::place, [](R r, S s) { return s.t_s - r.begin_s; });
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,37 @@
+// What every effect of the catalogue would explain beside a fit, as far as a linear model sees.
+#pragma once
+
+#include "gap/evidence/fit.hpp"
+
+namespace flappy::gap {
+
+/// A size of an effect a step of kSizeReach away from 0, with all else as it was.
+struct SizeStep {
+  std::string effect;
+  Eigen::Index unknown;  ///< of the effect's
+  Candidate candidate;
+};
+inline constexpr double kSizeReach = 0.4;
+
+/// Of every entry of the catalogue but `withheld`, beside other effects at the given coordinates; shapes are in the middle.
+std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const std::vector<std::string>& beside,
+                                 const Eigen::VectorXd& at, const std::vector<std::string>& withheld);
+
+/// What a size changes for a unit of its coordinate.
+struct SizeColumn {
+  std::string effect;
+  Eigen::Index unknown;
+  Smooth change;
+};
+
+struct Screened {
+  std::string effect;
+  double gain = 0;              ///< nats
+  Eigen::VectorXd coordinates;  ///< of its unknowns
+};
+
+/// Every effect that has columns, those that follow one another; the largest gain first.
+std::vector<Screened> screen(const Evidence& evidence, const Fitter& fitter, const Fit& fit,
+                             const std::vector<SizeColumn>& columns);
+
+}  // namespace flappy::gap

@@ -1,0 +1,297 @@
+#include "gap/localise/where.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "gap/localise/significance.hpp"
+
+namespace flappy::gap {
+namespace {
+
+/// Half a second of a flapper at 34 Hz: longer than the memory of what noise usually is.
+constexpr int kBlock = 16;
+/// For whiteness: short, yet longer than the hats of beats.
+constexpr int kShortBlock = 8;
+constexpr double kMostMemory = 0.95;
+/// Ends of all bands but the highest.
+constexpr double kBandEnds_Hz[] = {0.5, 1, 2, 4, 8};
+
+/// A coefficient's part in the mean square of its waveform.
+double share_of(int coefficient) { return coefficient == 0 ? 1 : 0.5; }
+
+/// How much of the variance of noise that remembers the beat before lies below a frequency, as a share of half the beats': the
+/// integral of (1 - past^2) / |1 - past exp(i pi f)|^2.
+double share_below(double frequency, double past) {
+  if (frequency >= 1) return 1;
+  return 2 / std::numbers::pi * std::atan((1 + past) / (1 - past) * std::tan(std::numbers::pi / 2 * frequency));
+}
+
+std::string in_short(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+struct Beat {
+  std::size_t flight, beat;
+};
+
+/// The rows of one channel.
+class ChannelRows {
+ public:
+  ChannelRows(const Surroundings& around, const Signature& residual, int channel, const std::string& stage)
+      : around_(around), channel_(channel), stage_(stage) {
+    const std::vector<int> all = blocks_of(around.beats, kBlock), fine = blocks_of(around.beats, kShortBlock);
+    std::size_t i = 0;
+    for (std::size_t f = 0; f < around.beats.size(); ++f)
+      for (std::size_t j = 0; j < around.beats[f]; ++j, ++i)
+        if (!residual[f].empty() && around.covers(f, j, channel)) {
+          beats_.push_back({f, j});
+          block_.push_back(all[i]);
+          short_block_.push_back(fine[i]);
+        }
+    for (int c = 0; c < kCoefficients; ++c) {
+      rows_.emplace_back();
+      for (const Beat& b : beats_)
+        rows_.back().push_back(residual[b.flight][b.beat * kRowsPerBeat + group_of(channel, c)]);
+    }
+  }
+
+  void test_all(std::vector<Place>& places) const {
+    if (beats_.empty()) return;
+    const std::vector<double> all(beats_.size(), 1);
+    add_cell("channel", "all", all, 0, kCoefficients, places);
+    for (const Quantity& q : around_.regimes) test_thirds(q, places);
+    if (has_rows(channel_, 1))
+      for (int h = 0; h <= kHarmonics; ++h)
+        add_cell("phase", h == 0 ? "mean of the beat" : "harmonic " + std::to_string(h) + " of the beat", all,
+                 h == 0 ? 0 : 2 * h - 1, h == 0 ? 1 : 2 * h + 1, places);
+    test_bands(places);
+    for (const Quantity& q : around_.inputs) test_input(q, places);
+    test_whiteness(places);
+  }
+
+ private:
+  double noise_sd(int coefficient) const { return around_.noise_sd[group_of(channel_, coefficient)]; }
+  void add(const char* test, const std::string& regime, double gap, double floor, double p,
+           std::vector<Place>& places) const {
+    places.push_back({stage_, test, channel_, regime, gap, floor, p, false});
+  }
+
+  /// Coefficients from `first` to before `last`, in the beats where `in` is 1.
+  void add_cell(const char* test, const std::string& regime, const std::vector<double>& in, int first, int last,
+                std::vector<Place>& places) const {
+    double squares = 0, noise = 0, n = 0, least_p = 1;
+    int tests = 0;
+    for (const double i : in) n += i;
+    for (int c = first; c < last; ++c) {
+      if (!has_rows(channel_, c)) continue;
+      const std::vector<double>& y = rows_[static_cast<std::size_t>(c)];
+      for (std::size_t i = 0; i < y.size(); ++i) squares += share_of(c) * in[i] * y[i] * y[i] / n;
+      noise += share_of(c) * noise_sd(c) * noise_sd(c);
+      const auto slope = slope_test(in, y, block_);
+      if (!slope) return;
+      least_p = std::min(least_p, slope->p_value);
+      ++tests;
+    }
+    add(test, regime, std::sqrt(squares), std::sqrt(noise), std::min(1.0, tests * least_p), places);
+  }
+
+  std::vector<double> of(const Quantity& q) const {
+    std::vector<double> x;
+    for (const Beat& b : beats_) x.push_back(q.values[b.flight][b.beat]);
+    return x;
+  }
+
+  void test_thirds(const Quantity& q, std::vector<Place>& places) const {
+    const std::vector<double> x = of(q);
+    std::vector<double> sorted = x;
+    std::ranges::sort(sorted);
+    const double low = sorted[sorted.size() / 3], high = sorted[2 * sorted.size() / 3];
+    if (!(sorted.front() < low && low < high && high < sorted.back())) return;
+    const std::string unit = q.unit.empty() ? "" : " " + q.unit;
+    const std::string names[] = {q.name + " below " + in_short(low) + unit,
+                                 q.name + " " + in_short(low) + " to " + in_short(high) + unit,
+                                 q.name + " above " + in_short(high) + unit};
+    for (int third = 0; third < 3; ++third) {
+      std::vector<double> in;
+      for (const double v : x) in.push_back((v < low ? 0 : v < high ? 1 : 2) == third ? 1 : 0);
+      add_cell("regime", names[third], in, 0, kCoefficients, places);
+    }
+  }
+
+  /// Of noise that remembers the beat before, from neighbours within blocks, whose means are taken off: what is slow is no noise. A mean
+  /// of so few takes some of the memory along (Kendall 1954).
+  double memory() const {
+    std::vector<double> sums(1, 0), counts(1, 0);
+    const std::vector<double>& y = rows_[0];
+    std::vector<std::size_t> index;
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      if (i > 0 && block_[i] != block_[i - 1]) sums.push_back(0), counts.push_back(0);
+      sums.back() += y[i], counts.back() += 1;
+      index.push_back(sums.size() - 1);
+    }
+    const auto off = [&](std::size_t i) { return y[i] - sums[index[i]] / counts[index[i]]; };
+    double products = 0, squares = 0;
+    for (std::size_t i = 1; i < y.size(); ++i) {
+      if (index[i] != index[i - 1] || beats_[i].beat != beats_[i - 1].beat + 1) continue;
+      products += off(i) * off(i - 1);
+      squares += (off(i) * off(i) + off(i - 1) * off(i - 1)) / 2;
+    }
+    if (!(squares > 0)) return 0;
+    return std::clamp((products / squares + 1.0 / kBlock) / (1 - 3.0 / kBlock), -kMostMemory, kMostMemory);
+  }
+
+  void test_bands(std::vector<Place>& places) const {
+    std::vector<double> ends(std::begin(kBandEnds_Hz), std::end(kBandEnds_Hz));
+    ends.push_back(*std::ranges::max_element(around_.beats_Hz) / 2);
+    const double past = memory();
+    Bands left;
+    std::vector<double> noise(ends.size(), 0);  // mean square of noise of variance 1, by band
+    for (std::size_t f = 0; f < around_.beats.size(); ++f) {
+      std::vector<double> y(around_.beats[f], 0);
+      double covered = 0;
+      for (const Beat& b : beats_)
+        if (b.flight == f) y[b.beat] = rows_[0][static_cast<std::size_t>(&b - beats_.data())], covered += 1;
+      if (covered == 0) continue;
+      add_bands(y, around_.beats_Hz[f], ends, left);
+      double from = 0;
+      for (std::size_t b = 0; b < ends.size(); ++b) {
+        const double to = std::min(1.0, 2 * ends[b] / around_.beats_Hz[f]);
+        noise[b] += (share_below(to, past) - share_below(from, past)) * covered / static_cast<double>(beats_.size());
+        from = to;
+      }
+    }
+    const std::size_t highest = ends.size() - 1;
+    if (!(left.power[highest] > 0)) return;
+    const double scale = left.power[highest] / noise[highest];
+    for (std::size_t b = 0; b < highest; ++b)
+      if (left.bins[b] > 0)
+        add("frequency", (b == 0 ? "0" : in_short(ends[b - 1])) + " to " + in_short(ends[b]) + " Hz",
+            std::sqrt(left.power[b] / static_cast<double>(beats_.size())), noise_sd(0) * std::sqrt(noise[b]),
+            f_tail(left.power[b] / noise[b] / scale, 2 * static_cast<double>(left.bins[b]),
+                   2 * static_cast<double>(left.bins[highest])),
+            places);
+  }
+
+  void test_input(const Quantity& q, std::vector<Place>& places) const {
+    std::vector<double> x = of(q);
+    const double n = static_cast<double>(x.size());
+    double mean = 0, square = 0;
+    for (const double v : x) mean += v / n;
+    for (double& v : x) v -= mean, square += v * v / n;
+    if (!(square > 1e-18 * mean * mean)) return;
+    double explained = 0, noise = 0, least_p = 1;
+    int tests = 0;
+    for (int c = 0; c < kCoefficients; ++c) {
+      if (!has_rows(channel_, c)) continue;
+      std::vector<double> y = rows_[static_cast<std::size_t>(c)];
+      double offset = 0;
+      for (const double v : y) offset += v / n;
+      for (double& v : y) v -= offset;
+      const auto slope = slope_test(x, y, block_);
+      if (!slope) return;
+      explained += share_of(c) * slope->slope * slope->slope * square;
+      noise += share_of(c) * noise_sd(c) * noise_sd(c) / n;
+      least_p = std::min(least_p, slope->p_value);
+      ++tests;
+    }
+    add("input", q.name, std::sqrt(explained), std::sqrt(noise), std::min(1.0, tests * least_p), places);
+  }
+
+  void test_whiteness(std::vector<Place>& places) const {
+    if (channel_ >= kPathX) return;
+    if (const auto w = whiteness_test(rows_[0], short_block_))
+      add("whiteness", "means of " + std::to_string(kShortBlock) + " beats", w->rms,
+          noise_sd(0) / std::sqrt(double{kShortBlock}), w->p_value, places);
+  }
+
+  const Surroundings& around_;
+  int channel_;
+  const std::string& stage_;
+  std::vector<Beat> beats_;
+  std::vector<int> block_, short_block_;
+  std::vector<std::vector<double>> rows_;  ///< [coefficient][beat]
+};
+
+}  // namespace
+
+const char* channel_unit(int channel) {
+  if (channel < kForceX) return "rad/s^2";
+  if (channel < kStrokeLeft) return "m/s^2";
+  if (channel < kBattery) return "rad";
+  if (channel < kPathX) return channel == kBattery ? "V" : "A";
+  return channel < kTurnX ? "m/s^2" : "rad/s";
+}
+
+Surroundings surroundings_of(const std::vector<CarriedFlight>& flights, std::vector<double> noise_sd) {
+  Surroundings s;
+  s.noise_sd = std::move(noise_sd);
+  const auto quantity = [&](const char* name, const char* unit, auto&& value) {
+    Quantity q{name, unit, {}};
+    for (const CarriedFlight& f : flights) {
+      q.values.emplace_back();
+      for (const Regime& r : f.recording().regimes) q.values.back().push_back(value(f.recording(), r));
+    }
+    return q;
+  };
+  for (const CarriedFlight& f : flights) {
+    s.beats.push_back(f.beats());
+    s.beats_Hz.push_back(f.recording().log.header.flapping_Hz);
+    s.covered.emplace_back();
+    for (std::size_t j = 0; j < f.beats(); ++j)
+      for (int channel = 0; channel < kChannels; ++channel) s.covered.back().push_back(f.covers(j, channel) ? 1 : 0);
+  }
+  using R = const Recording&;
+  using B = const Regime&;
+  s.regimes = {
+      quantity("height", "m", [](R r, B b) { return b.position_m.z() - r.world.ground_z_m; }),
+      quantity("speed", "m/s", [](R, B b) { return b.velocity_B_m_s.norm(); }),
+      quantity("amplitude", "V", [](R, B b) { return b.amplitude_V; }),
+      quantity("body rate", "rad/s", [](R, B b) { return b.rate_rad_s.norm(); }),
+      quantity("time", "s", [](R r, B b) { return b.t_s - r.begin_s; }),
+      quantity("heading", "rad", [](R, B b) { return b.heading_rad; }),
+  };
+  if (std::ranges::all_of(flights, [](const CarriedFlight& f) { return f.recording().log.power.has_value(); }))
+    s.regimes.push_back(quantity("battery", "V", [](R r, B b) {
+      // the mean over the beat, or of what is nearest
+      const flightlog::PowerStream& p = *r.log.power;
+      const double late_s = r.log.header.power->latency_s, half_s = 0.5 / r.log.header.flapping_Hz;
+      const auto index = [&](double t_s) { return std::ranges::lower_bound(p.t_s, t_s + late_s) - p.t_s.begin(); };
+      const auto last = static_cast<std::ptrdiff_t>(p.t_s.size());
+      const auto first = std::min(index(b.t_s - half_s), last - 1);
+      const auto end = std::max(index(b.t_s + half_s), first + 1);
+      double sum = 0;
+      for (auto i = first; i < end; ++i) sum += p.battery_V[static_cast<std::size_t>(i)];
+      return sum / static_cast<double>(end - first);
+    }));
+  s.inputs = {quantity("amplitude", "V", [](R, B b) { return b.amplitude_V; }),
+              quantity("difference", "V", [](R, B b) { return b.difference_V; }),
+              quantity("bias", "V", [](R, B b) { return b.bias_V; }),
+              quantity("split cycle", "", [](R, B b) { return b.split_cycle; })};
+  return s;
+}
+
+std::vector<Place> locate(const Surroundings& around, const Signature& residual, const std::string& stage) {
+  std::vector<Place> places;
+  for (int channel = 0; channel < kChannels; ++channel) ChannelRows(around, residual, channel, stage).test_all(places);
+  std::vector<double> p_values;
+  for (const Place& p : places) p_values.push_back(p.p_value);
+  const std::vector<char> found = discoveries(p_values, kFalseDiscoveries);
+  for (std::size_t i = 0; i < places.size(); ++i) places[i].discovered = found[i] != 0;
+  return places;
+}
+
+std::vector<Place> largest_discoveries(const std::vector<Place>& places, const std::string& stage, std::size_t most) {
+  std::vector<Place> list;
+  for (const Place& p : places)
+    if (p.stage == stage && p.discovered && p.test != "input" && p.test != "whiteness") list.push_back(p);
+  std::ranges::stable_sort(list, std::greater{},
+                           [](const Place& p) { return p.gap / std::max(p.noise_floor, 1e-300); });
+  if (list.size() > most) list.resize(most);
+  return list;
+}
+
+}  // namespace flappy::gap

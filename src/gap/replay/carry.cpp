@@ -1,0 +1,324 @@
+#include "gap/replay/carry.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <random>
+
+#include "gap/replay/stream_rows.hpp"
+#include "sim/storage.hpp"
+
+namespace flappy::gap {
+inline namespace scalar {
+extern const CarryBlock carry_block_kernel;
+}
+inline namespace v2 {
+extern const CarryBlock carry_block_kernel;
+}
+inline namespace v3 {
+extern const CarryBlock carry_block_kernel;
+}
+inline namespace v4 {
+extern const CarryBlock carry_block_kernel;
+}
+
+CarryBlock carry_kernel(const char* instruction_set) {
+  const std::string name = *instruction_set ? instruction_set : sim::best_instruction_set();
+  if (name == "x86-64-v4") return v4::carry_block_kernel;
+  if (name == "x86-64-v3") return v3::carry_block_kernel;
+  if (name == "x86-64-v2") return v2::carry_block_kernel;
+  return scalar::carry_block_kernel;
+}
+
+namespace {
+
+constexpr std::size_t kVehicles = sim::kLanes<double>;
+/// Channels of which a vehicle predicts a sample at every interval, and those of the meter.
+constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
+static_assert(kPathX == kSignals + kMetered);
+
+/// Steps by which rounding may put an instant off.
+constexpr double kSameStep = 1e-3;
+/// What two good streams may disagree by for reasons that no entry knows, times the share that models get wrong.
+constexpr double kStreamSignal_m_s2 = 1, kStreamSignal_rad_s = 1;
+
+/// Voltages of steps, some steps later.
+class ShiftedVoltage {
+ public:
+  explicit ShiftedVoltage(double steps)
+      : whole_(static_cast<std::ptrdiff_t>(std::floor(steps))), share_(steps - std::floor(steps)) {}
+  double of(const std::vector<double>& voltage_V, std::size_t step) const {
+    const auto at = [&](std::ptrdiff_t i) {
+      return voltage_V[static_cast<std::size_t>(
+          std::clamp<std::ptrdiff_t>(i, 0, static_cast<std::ptrdiff_t>(voltage_V.size()) - 1))];
+    };
+    const auto i = static_cast<std::ptrdiff_t>(step) - whole_;
+    return share_ == 0 ? at(i) : (1 - share_) * at(i) + share_ * at(i - 1);
+  }
+
+ private:
+  std::ptrdiff_t whole_;
+  double share_;
+};
+
+}  // namespace
+
+const char* channel_name(int channel) {
+  static const char* const kNames[kChannels] = {
+      "torque_x",    "torque_y",     "torque_z", "force_x",      "force_y",       "force_z",
+      "stroke_left", "stroke_right", "battery",  "current_left", "current_right", "path_x",
+      "path_y",      "path_z",       "turn_x",   "turn_y",       "turn_z"};
+  return kNames[channel];
+}
+
+CarriedFlight::CarriedFlight(Recording recording) : recording_(std::move(recording)) {
+  const Recording& r = recording_;
+  const auto first = static_cast<std::size_t>(std::ceil(kSpinUpBeats));
+  imu_ = BeatProjection(r.beat, r.valid, r.beats, first);
+  std::vector<double> samples(r.intervals() * kSignals, 0);
+  std::vector<char> seen(r.valid);
+  has_wings_ = r.log.wings.has_value();
+  for (std::size_t k = 0; k < r.intervals(); ++k) {
+    double* s = &samples[k * kSignals];
+    for (int i = 0; i < 3; ++i) s[kForceX + i] = r.force_m_s2[k][i];
+    if (!has_wings_) continue;
+    const auto strokes = flightlog::strokes_at(*r.log.wings, r.log.header.wings->rate_hz, r.end_s[k]);
+    if (std::isfinite(strokes[0])) s[kStrokeLeft] = strokes[0], s[kStrokeRight] = strokes[1];
+    else seen[k] = 0;
+  }
+  if (has_wings_) wings_ = BeatProjection(r.beat, seen, r.beats, first);
+  lay_power(first);
+  measured_ = rows_of(samples);
+  for (std::size_t k = 0; k < r.intervals(); ++k)
+    for (std::size_t i = 0; i < 3; ++i)
+      samples[k * kSignals + kTorqueX + i] =
+          (r.torso[k + 1].body_rate_rad_s[i] - r.torso[k].body_rate_rad_s[i]) / r.interval_s(k);
+  signal_ = rows_of(samples);
+  if (r.log.power) {
+    const flightlog::PowerStream& p = *r.log.power;
+    std::vector<double> power;
+    for (const std::size_t i : power_sample_)
+      power.insert(power.end(), {p.battery_V[i], p.left_current_A[i], p.right_current_A[i]});
+    put_power(power, measured_);
+    for (std::size_t i = 0; i < power.size(); i += kMetered) power[i] -= r.full * r.log.header.power->battery_nominal_V;
+    put_power(power, signal_);
+  }
+  compare_streams();
+}
+
+/// The samples of power.csv on the grid. A sample and a new voltage may share an instant, and the sample is of the new one:
+/// so it is taken from the first step that begins then or later, and the next.
+void CarriedFlight::lay_power(std::size_t first_beat) {
+  const Recording& r = recording_;
+  if (!r.log.power) return;
+  std::vector<double> beat;
+  std::vector<char> valid;
+  std::size_t step = 0, k = 0;  // the interval, and where it begins
+  for (std::size_t i = 0; i < r.log.power->t_s.size(); ++i) {
+    const double t_s = r.log.power->t_s[i] - r.log.header.power->latency_s;
+    const double begins = (t_s - r.begin_s) / kStep_s, at = std::ceil(begins - kSameStep);
+    if (at < 0) continue;
+    while (k < r.intervals() && at + 1 >= static_cast<double>(step) + r.steps[k])
+      step += static_cast<std::size_t>(r.steps[k++]);
+    if (k == r.intervals()) break;
+    power_sample_.push_back(i);
+    power_step_.push_back(static_cast<std::size_t>(at));
+    power_late_.push_back(at - begins);
+    beat.push_back(r.beat_at(t_s));
+    valid.push_back(r.valid[k]);
+  }
+  power_ = BeatProjection(beat, valid, r.beats, first_beat);
+}
+
+namespace {
+
+/// Of signals side by side, [beat][coefficient][width], those of one lane of `stride`.
+void put_channels(const Rows& together, std::size_t beats, std::size_t signals, std::size_t stride, std::size_t lane,
+                  std::size_t first_channel, Rows& rows) {
+  for (std::size_t j = 0; j < beats; ++j)
+    for (std::size_t c = 0; c < kCoefficients; ++c)
+      for (std::size_t s = 0; s < signals; ++s)
+        rows[j * kRowsPerBeat + (first_channel + s) * kCoefficients + c] =
+            together[((j * kCoefficients + c) * signals + s) * stride + lane];
+}
+
+void put_streams(const std::vector<StreamRow>& streams, Rows& rows) {
+  for (std::size_t j = 0; j < streams.size(); ++j)
+    for (std::size_t i = 0; i < 3; ++i) {
+      rows[j * kRowsPerBeat + (kPathX + i) * kCoefficients] = streams[j].path_m_s2[static_cast<Eigen::Index>(i)];
+      rows[j * kRowsPerBeat + (kTurnX + i) * kCoefficients] = streams[j].turn_rad_s[static_cast<Eigen::Index>(i)];
+    }
+}
+
+}  // namespace
+
+void CarriedFlight::compare_streams() {
+  const std::vector<StreamRow> streams = stream_rows(recording_);
+  put_streams(streams, measured_);
+  for (std::size_t j = 0; j < streams.size(); ++j) compared_.push_back(streams[j].valid && imu_.covers(j) ? 1 : 0);
+  // the size of what moved, for that of what models get wrong of it: as the torso's forces and rates
+  for (std::size_t j = 0; j < recording_.beats; ++j)
+    for (std::size_t i = 0; i < 3; ++i) {
+      signal_[j * kRowsPerBeat + (kPathX + i) * kCoefficients] = kStreamSignal_m_s2;
+      signal_[j * kRowsPerBeat + (kTurnX + i) * kCoefficients] = kStreamSignal_rad_s;
+    }
+}
+
+/// Of samples [interval][channel].
+Rows CarriedFlight::rows_of(const std::vector<double>& samples) const {
+  Rows together(recording_.beats * kCoefficients * kSignals, 0), rows(recording_.beats * kRowsPerBeat, 0);
+  imu_.project(samples.data(), kSignals, together.data());
+  put_channels(together, recording_.beats, kSignals, 1, 0, 0, rows);
+  return rows;
+}
+
+/// Of samples [sample][battery, left, right].
+void CarriedFlight::put_power(const std::vector<double>& samples, Rows& rows) const {
+  Rows together(recording_.beats * kCoefficients * kMetered, 0);
+  power_.project(samples.data(), kMetered, together.data());
+  put_channels(together, recording_.beats, kMetered, 1, 0, kBattery, rows);
+}
+
+Rows CarriedFlight::declared_noise(std::uint64_t seed) const {
+  const flightlog::FlightHeader& h = recording_.log.header;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> samples(recording_.intervals() * kSignals, 0);
+  double before[3] = {0, 0, 0};
+  for (std::size_t k = 0; k < recording_.intervals(); ++k) {
+    double* s = &samples[k * kSignals];
+    for (int i = 0; i < 3; ++i) {
+      // the carried rate holds the noise of the sample before
+      const double rate = h.imu.gyro_noise_rad_s * normal(random);
+      s[kTorqueX + i] = (rate - before[i]) / recording_.interval_s(k);
+      before[i] = rate;
+      s[kForceX + i] = h.imu.accel_noise_m_s2 * normal(random);
+    }
+    for (int i = 0; i < 2; ++i) s[kStrokeLeft + i] = h.wings ? h.wings->noise_rad * normal(random) : 0;
+  }
+  Rows rows = rows_of(samples);
+  if (h.power) {
+    std::vector<double> power;
+    for (std::size_t i = 0; i < power_sample_.size(); ++i)
+      power.insert(power.end(), {h.power->voltage_noise_V * normal(random), h.power->current_noise_A * normal(random),
+                                 h.power->current_noise_A * normal(random)});
+    put_power(power, rows);
+  }
+  put_streams(stream_noise(recording_, seed), rows);
+  return rows;
+}
+
+bool CarriedFlight::covers(std::size_t beat, int channel) const {
+  if (channel >= kPathX) return compared_[beat] != 0;
+  if (channel >= kBattery) return imu_.covers(beat) && beat < power_.beats() && power_.covers(beat);
+  if (channel >= kStrokeLeft) return has_wings_ && imu_.covers(beat) && wings_.covers(beat);
+  return imu_.covers(beat);
+}
+
+std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& candidates) const {
+  const Recording& r = recording_;
+  const CarryBlock carry = carry_kernel("");
+  sim::Batch<double> batch(kVehicles, candidates.front()->vehicle, {kStep_s, 1, r.world, {}});
+  if (r.log.power) batch.storage().keep_effects(0);  // the meter needs their rows
+  std::vector<ShiftedVoltage> shifted;
+  for (std::size_t i = 0; i < kVehicles; ++i) {
+    const Candidate& c = *candidates[std::min(i, candidates.size() - 1)];
+    model::Vehicle vehicle = c.vehicle;
+    vehicle.air_density_kg_m3 *= r.density_ratio;
+    batch.set_vehicle(i, vehicle);
+    batch.reset(i, {});
+    shifted.emplace_back(c.lag_s / kStep_s);
+  }
+  auto& storage = batch.storage();
+  sim::Block<double>& block = storage.blocks[0];
+  sim::StepPlan plan = storage.plan();
+  plan.steps_per_update = 1;
+  CarriedBlock kept;
+  const double* imu_m = r.log.header.imu.position_m.data();
+  carry(block, nullptr, r.torso[0], 1, imu_m, r.world.gravity_m_s2, kept);
+
+  const int longest = *std::ranges::max_element(r.steps);
+  std::vector<double> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
+  std::vector<double> samples(r.intervals() * kSignals * kVehicles, 0);
+  // of the last step before an interval, and its own
+  constexpr std::size_t kMeter = kMetered * kVehicles;
+  std::vector<double> meter(r.log.power ? (static_cast<std::size_t>(longest) + 1) * kMeter : 0);
+  std::vector<double> power;
+  std::size_t step = 0, metered = 0;
+  for (std::size_t k = 0; k < r.intervals(); ++k) {
+    for (int i = 0; i < r.steps[k]; ++i, ++step) {
+      double* to = &voltages_V[static_cast<std::size_t>(i) * 2 * kVehicles];
+      for (std::size_t lane = 0; lane < kVehicles; ++lane) {
+        to[lane] = shifted[lane].of(r.left_V, step);
+        to[kVehicles + lane] = shifted[lane].of(r.right_V, step);
+      }
+    }
+    sim::BlockEffects<double> in_force = storage.effects_of(0);
+    in_force.voltages_V = voltages_V.data();
+    if (r.log.power) in_force.meter = meter.data() + kMeter;
+    storage.kernel(block, in_force, plan, 0, r.steps[k], nullptr);
+    carry(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
+    double* to = &samples[k * kSignals * kVehicles];
+    const double per_interval = 1 / r.interval_s(k);
+    for (std::size_t lane = 0; lane < kVehicles; ++lane) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        to[(kTorqueX + i) * kVehicles + lane] = -per_interval * kept.rows[kTurnRate + i][lane];
+        to[(kForceX + i) * kVehicles + lane] = kept.rows[kForce + i][lane];
+      }
+      to[kStrokeLeft * kVehicles + lane] = kept.rows[kStroke][lane];
+      to[kStrokeRight * kVehicles + lane] = kept.rows[kStroke + 1][lane];
+    }
+    for (; metered < power_step_.size() && power_step_[metered] + 1 < step; ++metered) {
+      const double late = power_late_[metered];
+      const double* now = &meter[(power_step_[metered] + 1 + static_cast<std::size_t>(r.steps[k]) - step) * kMeter];
+      for (std::size_t i = 0; i < kMeter; ++i) {
+        const double sample = now[i] + late * (now[i] - now[i + kMeter]);
+        power.push_back(i < kVehicles ? r.full * r.log.header.power->battery_nominal_V * sample : sample);
+      }
+    }
+    if (r.log.power) std::copy_n(&meter[static_cast<std::size_t>(r.steps[k]) * kMeter], kMeter, meter.data());
+  }
+
+  Rows together(r.beats * kCoefficients * kSignals * kVehicles, 0);
+  imu_.project(samples.data(), kSignals * kVehicles, together.data());
+  Rows metered_together(r.log.power ? r.beats * kCoefficients * kMetered * kVehicles : 0, 0);
+  if (r.log.power) power_.project(power.data(), kMetered * kVehicles, metered_together.data());
+  std::vector<Rows> result(candidates.size());
+  for (std::size_t lane = 0; lane < candidates.size(); ++lane) {
+    if (batch.status(lane) & sim::kFrozen) continue;
+    Rows& rows = result[lane];
+    rows.resize(r.beats * kRowsPerBeat);
+    put_channels(together, r.beats, kSignals, kVehicles, lane, 0, rows);
+    if (r.log.power) put_channels(metered_together, r.beats, kMetered, kVehicles, lane, kBattery, rows);
+  }
+  return result;
+}
+
+std::vector<std::vector<Rows>> predict_all(const std::vector<CarriedFlight>& flights,
+                                           const std::vector<Candidate>& candidates, int threads) {
+  const std::size_t blocks = (candidates.size() + kVehicles - 1) / kVehicles;
+  std::vector<std::vector<Rows>> result(candidates.size(), std::vector<Rows>(flights.size()));
+  std::exception_ptr failed;
+  const auto jobs = static_cast<std::ptrdiff_t>(blocks * flights.size());
+#pragma omp parallel for schedule(dynamic) num_threads(threads > 0 ? threads : omp_get_num_procs())
+  for (std::ptrdiff_t job = 0; job < jobs; ++job) {
+    try {
+      const std::size_t flight = static_cast<std::size_t>(job) % flights.size();
+      const std::size_t first = static_cast<std::size_t>(job) / flights.size() * kVehicles;
+      std::vector<const Candidate*> group;
+      for (std::size_t i = first; i < std::min(first + kVehicles, candidates.size()); ++i)
+        group.push_back(&candidates[i]);
+      std::vector<Rows> rows = flights[flight].predict(group);
+      for (std::size_t i = 0; i < group.size(); ++i) result[first + i][flight] = std::move(rows[i]);
+    } catch (...) {  // nothing may leave a parallel loop
+#pragma omp critical
+      failed = std::current_exception();
+    }
+  }
+  if (failed) std::rethrow_exception(failed);
+  return result;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,68 @@
+#include "gap/replay/carry_kernel.hpp"
+
+#include "flight/sensors.hpp"
+#include "sim/rows.hpp"
+
+namespace flappy::gap {
+inline namespace FLAPPY_ISA {
+namespace {
+
+using namespace model;
+using sim::kWidth;
+using V = Lanes<double, kWidth<double>>;
+
+FLAPPY_INLINE Vec3<V> vector(const double (&v)[3]) { return {V(v[0]), V(v[1]), V(v[2])}; }
+FLAPPY_INLINE Quaternion<V> quaternion(const double (&q)[4]) { return {V(q[0]), V(q[1]), V(q[2]), V(q[3])}; }
+
+FLAPPY_INLINE Vec3<V> load(double (*rows)[sim::kLanes<double>], int first) {
+  return {V::load(rows[0] + first), V::load(rows[1] + first), V::load(rows[2] + first)};
+}
+FLAPPY_INLINE void store(const Vec3<V>& v, double (*rows)[sim::kLanes<double>], int first) {
+  v.x.store(rows[0] + first);
+  v.y.store(rows[1] + first);
+  v.z.store(rows[2] + first);
+}
+
+void carry_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
+                 const double imu_position_m[3], double gravity_m_s2, CarriedBlock& kept) {
+  const V per_interval(1 / interval_s);
+  const Vec3<V> imu{V(imu_position_m[0]), V(imu_position_m[1]), V(imu_position_m[2])};
+  for (int first = 0; first < sim::kLanes<double>; first += kWidth<double>) {
+    const auto p = sim::load_rows<Parameters<V>>(block.parameters, first);
+    auto x = sim::load_rows<State<V>>(block.state, first);
+    if (from != nullptr) {
+      const flight::Truth<V> flown = flight::truth_of(p, x);
+      const Quaternion<V> begin = quaternion(from->attitude);
+      const Vec3<V> turn = flight::rotation_vector(flight::from_to(begin, flown.attitude));
+      Vec3<V> force = per_interval * (flight::point_velocity(flown, imu) - load(kept.imu_velocity_m_s, first));
+      force.z += V(gravity_m_s2);
+      const Matrix3<V> halfway = rotation_matrix(turned(begin, V(0.25) * turn));
+      const Vec3<V> missed =
+          per_interval * flight::rotation_vector(flight::from_to(flown.attitude, quaternion(to.attitude)));
+      store(missed, kept.rows + kTurnRate, first);
+      store(transpose_times(halfway, force), kept.rows + kForce, first);
+      x.left.stroke_rad.store(kept.rows[kStroke] + first);
+      x.right.stroke_rad.store(kept.rows[kStroke + 1] + first);
+      x.body_rate_rad_s = x.body_rate_rad_s + missed;
+    } else {
+      x.body_rate_rad_s = vector(to.body_rate_rad_s);
+    }
+    x.position_m = vector(to.position_m);
+    x.attitude = quaternion(to.attitude);
+    const Matrix3<V> R = rotation_matrix(x.attitude);
+    const auto whole = whole_vehicle<V>(
+        p, {place_wing<+1>(p.left, x.left, x.body_rate_rad_s), place_wing<-1>(p.right, x.right, x.body_rate_rad_s)});
+    const Vec3<V> velocity = vector(to.velocity_m_s);
+    x.com_velocity_m_s = velocity + R * (cross(x.body_rate_rad_s, whole.com) + whole.com_rate);
+    store(velocity + R * cross(x.body_rate_rad_s, imu), kept.imu_velocity_m_s, first);
+    sim::store_rows(x, block.state, first);
+  }
+}
+
+}  // namespace
+
+extern const CarryBlock carry_block_kernel;
+const CarryBlock carry_block_kernel = carry_block;
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::gap

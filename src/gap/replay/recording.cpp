@@ -1,0 +1,236 @@
+#include "gap/replay/recording.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "sim/replay.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Eigen::Vector3d;
+constexpr double kTurn = 2 * std::numbers::pi;
+/// A frequency is looked for this far around the declared one, as a share of it.
+constexpr double kFrequencyReach = 0.02;
+/// At both ends, so that a flight whose clocks are corrected still holds it.
+constexpr double kMargin_s = 0.05;
+/// The battery's first samples, and what in them is more than their noise.
+constexpr std::size_t kFirstSamples = 20;
+constexpr double kFuller = 1.02;
+/// Of the usual interval between commands: a longer one is a gap.
+constexpr double kLongestHold = 5;
+
+TorsoAt torso_at(const flightlog::TorsoMotion& m) {
+  TorsoAt t;
+  for (int i = 0; i < 3; ++i) {
+    t.position_m[i] = m.position_m[i];
+    t.velocity_m_s[i] = m.velocity_m_s[i];
+    t.body_rate_rad_s[i] = m.body_rate_rad_s[i];
+  }
+  t.attitude[0] = m.attitude.w(), t.attitude[1] = m.attitude.x();
+  t.attitude[2] = m.attitude.y(), t.attitude[3] = m.attitude.z();
+  return t;
+}
+
+}  // namespace
+
+Recording::Recording(const std::filesystem::path& folder, flightlog::FlightLog flight_log,
+                     const model::Vehicle& nominal)
+    : name(folder.filename().empty() ? folder.parent_path().filename().string() : folder.filename().string()),
+      least_z_m(flight_log.header.ambient.ground_z_m + nominal.extent.below_m + kLeastClearance_m),
+      density_ratio(flight_log.header.ambient.air_density_kg_m3 / nominal.air_density_kg_m3),
+      log(std::move(flight_log)),
+      track(log, folder),
+      begin_s(std::max(track.begin_s(), log.command.t_s.front()) + kMargin_s),
+      last_s(std::min(track.end_s(), log.command.t_s.back()) - kMargin_s) {
+  prepare(folder.string());
+}
+
+Recording::Recording(const Recording& other, flightlog::FlightLog flight_log)
+    : name(other.name),
+      least_z_m(other.least_z_m),
+      density_ratio(other.density_ratio),
+      log(std::move(flight_log)),
+      track(log, other.name),
+      begin_s(other.begin_s),
+      last_s(other.last_s) {
+  prepare(name);
+}
+
+void Recording::prepare(const std::string& place) {
+  const flightlog::FlightHeader& h = log.header;
+  world = {h.gravity_m_s2, h.ambient.ground_z_m, h.ambient.ceiling_z_m, {}};
+  for (const flightlog::LogWall& w : h.ambient.walls) world.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
+  lay_grid();
+  if (steps.empty()) throw io::InputError(place + ": no interval of the IMU has motion capture around it");
+  read_voltages();
+  find_phase();
+  read_regimes();
+}
+
+void Recording::lay_grid() {
+  const std::vector<double>& bounds = track.bounds_s();
+  const double usual_s = 1 / log.header.imu.rate_hz;
+  const auto first = static_cast<std::size_t>(std::ranges::lower_bound(bounds, begin_s - kStep_s / 2) - bounds.begin());
+  if (first >= bounds.size() || bounds[first] >= last_s) return;
+  begin_s = bounds[first];
+  double now_s = begin_s;
+  torso.push_back(torso_at(track.at(std::max(begin_s, track.begin_s()))));
+  const std::vector<std::pair<double, double>> undriven = undriven_s();
+  for (std::size_t k = first + 1; k < bounds.size() && bounds[k] <= last_s + kStep_s / 2; ++k) {
+    // a gap is flown in pieces, so that the torso stays on its record
+    const int pieces = std::max(1, static_cast<int>(std::lround((bounds[k] - now_s) / usual_s)));
+    for (int i = pieces; i > 0; --i) {
+      const int n = static_cast<int>(std::lround((bounds[k] - now_s) / i / kStep_s));
+      if (n == 0) continue;
+      const double from_s = now_s;
+      now_s += n * kStep_s;
+      const double at_s = std::min(now_s, track.end_s());
+      steps.push_back(n);
+      end_s.push_back(now_s);
+      torso.push_back(torso_at(track.at(at_s)));
+      force_m_s2.push_back(track.mean_force_m_s2(from_s, now_s));
+      const bool flies = torso.back().position_m[2] > least_z_m;
+      const bool driven =
+          std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
+      valid.push_back(flies && driven && track.covers(std::max(from_s, track.begin_s()), at_s) ? 1 : 0);
+    }
+  }
+}
+
+/// Where commands are missing, and until wings have forgotten what they were driven by instead.
+std::vector<std::pair<double, double>> Recording::undriven_s() const {
+  const flightlog::Column& t_s = log.command.t_s;
+  flightlog::Column intervals_s;
+  for (std::size_t i = 1; i < t_s.size(); ++i) intervals_s.push_back(t_s[i] - t_s[i - 1]);
+  const auto middle = intervals_s.begin() + static_cast<std::ptrdiff_t>(intervals_s.size() / 2);
+  std::ranges::nth_element(intervals_s, middle);
+  const double longest_s = kLongestHold * *middle;
+  std::vector<std::pair<double, double>> spans;
+  for (std::size_t i = 1; i < t_s.size(); ++i)
+    if (t_s[i] - t_s[i - 1] > longest_s)
+      spans.emplace_back(t_s[i - 1] + longest_s, t_s[i] + kSpinUpBeats / log.header.flapping_Hz);
+  return spans;
+}
+
+void Recording::read_voltages() {
+  std::size_t total = 0;
+  for (const int n : steps) total += static_cast<std::size_t>(n);
+  sim::step_voltages({log.command.t_s, log.command.left_voltage_V, log.command.right_voltage_V}, begin_s, kStep_s,
+                     total, left_V, right_V);
+  if (!log.power) return;
+  const flightlog::Column& battery_V = log.power->battery_V;
+  const std::size_t n = std::min<std::size_t>(kFirstSamples, battery_V.size());
+  double sum_V = 0;
+  for (std::size_t i = 0; i < n; ++i) sum_V += battery_V[i];
+  full = sum_V / static_cast<double>(n) / log.header.power->battery_nominal_V;
+  if (full < kFuller) full = 1;
+  for (std::vector<double>* side : {&left_V, &right_V})
+    for (double& v : *side) v *= full;
+}
+
+/// The beat's phase as the log has it, or that of the sine that fits the voltages best.
+void Recording::find_phase() {
+  const flightlog::CommandStream& c = log.command;
+  if (c.phase_rad) {
+    double turns = 0;
+    for (std::size_t i = 0; i < c.t_s.size(); ++i) {
+      if (i > 0) turns += std::remainder((*c.phase_rad)[i] - (*c.phase_rad)[i - 1], kTurn) / kTurn;
+      else turns = (*c.phase_rad)[0] / kTurn;
+      phase_t_s_.push_back(c.t_s[i]);
+      phase_beats_.push_back(turns);
+    }
+  } else {
+    double best = -1;
+    const double span_s = c.t_s.back() - c.t_s.front();
+    const double reach = log.header.flapping_Hz * kFrequencyReach, step = 0.1 / std::max(span_s, 1e-3);
+    for (double hz = log.header.flapping_Hz - reach; hz <= log.header.flapping_Hz + reach; hz += step) {
+      double cosine = 0, sine = 0;
+      for (std::size_t i = 0; i < c.t_s.size(); ++i) {
+        const double v = c.left_voltage_V[i] + c.right_voltage_V[i], a = kTurn * hz * (c.t_s[i] - begin_s);
+        cosine += v * std::cos(a);
+        sine += v * std::sin(a);
+      }
+      const double power = cosine * cosine + sine * sine;
+      if (power > best) {
+        best = power;
+        phase_hz_ = hz;
+        phase_offset_ = std::atan2(-sine, cosine) / kTurn;  // V ~ cos(2 pi (hz t + offset))
+      }
+    }
+  }
+  const double first = std::floor(beat_at(begin_s));
+  phase_offset_ -= first;
+  for (double& b : phase_beats_) b -= first;
+  double from_s = begin_s;
+  for (std::size_t k = 0; k < intervals(); ++k) {
+    beat.push_back(beat_at((from_s + end_s[k]) / 2));
+    from_s = end_s[k];
+  }
+  beats = beat.empty() ? 0 : static_cast<std::size_t>(std::max(0.0, std::floor(beat.back())));
+}
+
+double Recording::beat_at(double t_s) const {
+  if (phase_t_s_.empty()) return phase_hz_ * (t_s - begin_s) + phase_offset_;
+  const auto after = std::ranges::upper_bound(phase_t_s_, t_s);
+  const auto i = static_cast<std::size_t>(
+      std::clamp<std::ptrdiff_t>(after - phase_t_s_.begin(), 1, static_cast<std::ptrdiff_t>(phase_t_s_.size()) - 1));
+  const double share = (t_s - phase_t_s_[i - 1]) / (phase_t_s_[i] - phase_t_s_[i - 1]);
+  return phase_beats_[i - 1] + share * (phase_beats_[i] - phase_beats_[i - 1]);
+}
+
+/// Inputs are read off the voltages, so that every log has them: mean, first harmonic and how the halves differ.
+void Recording::read_regimes() {
+  struct Sum {
+    double n = 0, left = 0, right = 0, left_cos = 0, right_cos = 0, left_sin2 = 0, right_sin2 = 0;
+  };
+  std::vector<Sum> sums(beats);
+  regimes.assign(beats, Regime{0, 0, 0, 0, 0, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), 0});
+  std::vector<double> count(beats, 0);
+  std::size_t step = 0;
+  double from_s = begin_s;
+  for (std::size_t k = 0; k < intervals(); ++k) {
+    const double begin = beat_at(from_s), end = beat_at(end_s[k]);
+    for (int i = 0; i < steps[k]; ++i, ++step) {
+      const double b = begin + (end - begin) * (i + 0.5) / steps[k];
+      if (b < 0 || b >= static_cast<double>(beats)) continue;
+      Sum& s = sums[static_cast<std::size_t>(b)];
+      const double c = std::cos(kTurn * b), s2 = std::sin(2 * kTurn * b);
+      s.n += 1;
+      s.left += left_V[step], s.right += right_V[step];
+      s.left_cos += left_V[step] * c, s.right_cos += right_V[step] * c;
+      s.left_sin2 += left_V[step] * s2, s.right_sin2 += right_V[step] * s2;
+    }
+    from_s = end_s[k];
+    if (beat[k] < 0 || beat[k] >= static_cast<double>(beats)) continue;
+    const auto j = static_cast<std::size_t>(beat[k]);
+    const TorsoAt& t = torso[k + 1];
+    const Eigen::Quaterniond q(t.attitude[0], t.attitude[1], t.attitude[2], t.attitude[3]);
+    Regime& r = regimes[j];
+    count[j] += 1;
+    r.t_s += end_s[k];
+    r.velocity_B_m_s += q.conjugate() * Vector3d(t.velocity_m_s);
+    r.rate_rad_s += Vector3d(t.body_rate_rad_s);
+    r.position_m += Vector3d(t.position_m);
+    const Vector3d x = q * Vector3d::UnitX();
+    r.heading_rad = std::atan2(x.y(), x.x());
+  }
+  for (std::size_t j = 0; j < beats; ++j) {
+    const Sum& s = sums[j];
+    Regime& r = regimes[j];
+    if (s.n == 0 || count[j] == 0) continue;
+    r.t_s /= count[j];
+    r.velocity_B_m_s /= count[j];
+    r.rate_rad_s /= count[j];
+    r.position_m /= count[j];
+    const double left = 2 * s.left_cos / s.n, right = 2 * s.right_cos / s.n;
+    r.amplitude_V = (left + right) / 2;
+    r.difference_V = (left - right) / 2;
+    r.bias_V = (s.left + s.right) / (2 * s.n);
+    // a split cycle shows as a second harmonic, of opposite sign on the two sides
+    r.split_cycle = r.amplitude_V != 0 ? (s.left_sin2 - s.right_sin2) / (s.n * r.amplitude_V) : 0;
+  }
+}
+
+}  // namespace flappy::gap

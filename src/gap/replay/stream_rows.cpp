@@ -1,0 +1,148 @@
+#include "gap/replay/stream_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "flightlog/rotation.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr std::size_t kSpan = 3;
+
+/// Where the IMU alone says the torso is, at the bounds of its intervals.
+struct Reckoned {
+  std::vector<double> t_s;
+  std::vector<Vector3d> position_m, velocity_m_s;
+  std::vector<Quaterniond> attitude;
+};
+
+std::size_t before(const std::vector<double>& t_s, double at_s) {
+  const auto after = std::ranges::upper_bound(t_s, at_s);
+  const auto k = std::max<std::ptrdiff_t>(after - t_s.begin() - 1, 0);
+  return static_cast<std::size_t>(std::min(k, static_cast<std::ptrdiff_t>(t_s.size()) - 2));
+}
+
+/// `force`, `turn`: of each interval of the recording, as measured or of noise alone. Forces are turned into W by the
+/// smoothed attitude, which is better than the reckoned one.
+Reckoned reckon(const Recording& r, const std::vector<Vector3d>& force, const std::vector<Vector3d>& turn,
+                double gravity) {
+  Reckoned x;
+  const auto attitude = [&](std::size_t k) {
+    const double* q = r.torso[k].attitude;
+    return Quaterniond(q[0], q[1], q[2], q[3]);
+  };
+  x.t_s.push_back(r.begin_s);
+  x.position_m.emplace_back(r.torso[0].position_m);
+  x.velocity_m_s.emplace_back(r.torso[0].velocity_m_s);
+  x.attitude.push_back(attitude(0));
+  for (std::size_t k = 0; k < r.intervals(); ++k) {
+    const double dt = r.interval_s(k);
+    const Vector3d a = attitude(k).slerp(0.5, attitude(k + 1)) * force[k] - Vector3d(0, 0, gravity);
+    x.position_m.push_back(x.position_m.back() + dt * x.velocity_m_s.back() + dt * dt / 2 * a);
+    x.velocity_m_s.push_back(x.velocity_m_s.back() + dt * a);
+    x.attitude.push_back((x.attitude.back() * flightlog::exponential(turn[k])).normalized());
+    x.t_s.push_back(r.end_s[k]);
+  }
+  return x;
+}
+
+/// Differences of beat means.
+std::vector<StreamRow> differences(const Recording& r, const std::vector<double>& pose_s,
+                                   const std::vector<double>& samples) {
+  std::vector<double> beat;
+  for (const double t_s : pose_s) beat.push_back(r.beat_at(t_s));
+  const BeatProjection projection(beat, std::vector<char>(beat.size(), 1), r.beats, 0);
+  std::vector<double> rows(r.beats * kCoefficients * 6, 0);
+  projection.project(samples.data(), 6, rows.data());
+  const auto mean = [&](std::size_t j, int part) {
+    return Vector3d(&rows[j * kCoefficients * 6 + static_cast<std::size_t>(part)]);
+  };
+  std::vector<StreamRow> list(r.beats);
+  const double span_s = kSpan / r.log.header.flapping_Hz;
+  Vector3d sum = Vector3d::Zero();
+  double n = 0;
+  for (std::size_t j = kSpan; j + kSpan < r.beats; ++j) {
+    bool covered = true;
+    for (std::size_t i = j - kSpan; i <= j + kSpan; ++i) covered = covered && projection.covers(i);
+    if (!covered) continue;
+    StreamRow& row = list[j];
+    row.valid = true;
+    row.path_m_s2 = (mean(j + kSpan, 0) - 2 * mean(j, 0) + mean(j - kSpan, 0)) / (span_s * span_s);
+    // in W, for there what has drifted apart stays as it is while the body turns
+    row.turn_rad_s = r.track.at(r.regimes[j].t_s).attitude.conjugate() *
+                     Vector3d((mean(j + kSpan, 3) - mean(j - kSpan, 3)) / (2 * span_s));
+    sum += row.turn_rad_s;
+    n += 1;
+  }
+  for (StreamRow& row : list)
+    if (row.valid) row.turn_rad_s -= sum / n;
+  return list;
+}
+
+}  // namespace
+
+std::vector<StreamRow> stream_rows(const Recording& r) {
+  const flightlog::MocapStream& m = r.log.mocap;
+  const double late_s = r.log.header.mocap.latency_s;
+  const Vector3d bias = r.track.gyro_bias_rad_s((r.begin_s + r.last_s) / 2);
+  std::vector<Vector3d> turn;
+  double from_s = r.begin_s;
+  for (std::size_t k = 0; k < r.intervals(); ++k) {
+    turn.push_back(r.track.mean_rate_rad_s(from_s, r.end_s[k]) * r.interval_s(k) - bias * r.interval_s(k));
+    from_s = r.end_s[k];
+  }
+  const Reckoned x = reckon(r, r.force_m_s2, turn, r.world.gravity_m_s2);
+  const Vector3d arm(r.log.header.imu.position_m.data());
+  std::vector<double> pose_s, samples;
+  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
+    const double t_s = m.t_s[i] - late_s;
+    if (t_s < x.t_s.front() || t_s >= x.t_s.back()) continue;
+    const std::size_t k = before(x.t_s, t_s);
+    const double dt = t_s - x.t_s[k], share = dt / (x.t_s[k + 1] - x.t_s[k]);
+    const Vector3d a = (x.velocity_m_s[k + 1] - x.velocity_m_s[k]) / (x.t_s[k + 1] - x.t_s[k]);
+    const Quaterniond reckoned = x.attitude[k].slerp(share, x.attitude[k + 1]);
+    const Quaterniond seen(m.qw[i], m.qx[i], m.qy[i], m.qz[i]);
+    const Vector3d path = Vector3d(m.x_m[i], m.y_m[i], m.z_m[i]) + r.track.at(t_s).attitude * arm -
+                          (x.position_m[k] + dt * x.velocity_m_s[k] + dt * dt / 2 * a);
+    const Vector3d off = flightlog::logarithm(seen * reckoned.conjugate());
+    pose_s.push_back(t_s);
+    samples.insert(samples.end(), {path.x(), path.y(), path.z(), off.x(), off.y(), off.z()});
+  }
+  return differences(r, pose_s, samples);
+}
+
+std::vector<StreamRow> stream_noise(const Recording& r, std::uint64_t seed) {
+  const flightlog::FlightHeader& h = r.log.header;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  const auto noise = [&](double sd) { return Vector3d(sd * normal(random), sd * normal(random), sd * normal(random)); };
+  // errors of path and angle that dead reckoning would make
+  std::vector<double> t_s = {r.begin_s};
+  std::vector<Vector3d> path = {Vector3d::Zero()}, angle = {Vector3d::Zero()};
+  Vector3d velocity = Vector3d::Zero();
+  for (std::size_t k = 0; k < r.intervals(); ++k) {
+    const double dt = r.interval_s(k);
+    const Vector3d a = noise(h.imu.accel_noise_m_s2);
+    path.push_back(path.back() + dt * velocity + dt * dt / 2 * a);
+    velocity += dt * a;
+    angle.push_back(angle.back() + dt * noise(h.imu.gyro_noise_rad_s));
+    t_s.push_back(r.end_s[k]);
+  }
+  std::vector<double> pose_s, samples;
+  for (const double seen_s : r.log.mocap.t_s) {
+    const double at_s = seen_s - h.mocap.latency_s;
+    if (at_s < t_s.front() || at_s >= t_s.back()) continue;
+    const std::size_t k = before(t_s, at_s);
+    const Vector3d p = noise(h.mocap.position_noise_m) - path[k], q = noise(h.mocap.attitude_noise_rad) - angle[k];
+    pose_s.push_back(at_s);
+    samples.insert(samples.end(), {p.x(), p.y(), p.z(), q.x(), q.y(), q.z()});
+  }
+  return differences(r, pose_s, samples);
+}
+
+}  // namespace flappy::gap

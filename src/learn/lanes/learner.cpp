@@ -1,0 +1,367 @@
+#include "learn/lanes/learner.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+#include "learn/lanes/update.hpp"
+#include "sim/kernels.hpp"
+#include "sim/random.hpp"
+
+namespace flappy::learn {
+
+#define FLAPPY_DECLARE_UPDATE(isa)                 \
+  inline namespace isa {                           \
+  extern const UpdateKernel<float> update_float;   \
+  extern const UpdateKernel<double> update_double; \
+  }
+FLAPPY_DECLARE_UPDATE(scalar)
+FLAPPY_DECLARE_UPDATE(v2)
+FLAPPY_DECLARE_UPDATE(v3)
+FLAPPY_DECLARE_UPDATE(v4)
+#undef FLAPPY_DECLARE_UPDATE
+
+namespace {
+
+/// Gradients are kept in so many parts at most: chunks beyond it share one.
+constexpr std::size_t kMostParts = 16;
+/// Numbers that a thread steps at a time.
+constexpr std::ptrdiff_t kShard = 2048;
+
+template <class T>
+const UpdateKernel<T>& kernel_for(const std::string& instruction_set) {
+  const std::string_view name = sim::kernel_named(instruction_set).single.instruction_set;
+  const auto pick = [](const UpdateKernel<float>& f, const UpdateKernel<double>& d) -> const UpdateKernel<T>& {
+    if constexpr (sizeof(T) == sizeof(float)) return f;
+    else return d;
+  };
+  if (name == "x86-64-v4") return pick(v4::update_float, v4::update_double);
+  if (name == "x86-64-v3") return pick(v3::update_float, v3::update_double);
+  if (name == "x86-64-v2") return pick(v2::update_float, v2::update_double);
+  return pick(scalar::update_float, scalar::update_double);
+}
+
+/// Numbers that begin with a line of the cache.
+template <class T>
+class Numbers {
+ public:
+  explicit Numbers(std::size_t count) : lines_((count * sizeof(T) + sizeof(Line) - 1) / sizeof(Line)), count_(count) {}
+  T* data() { return reinterpret_cast<T*>(lines_.data()); }
+  const T* data() const { return reinterpret_cast<const T*>(lines_.data()); }
+  std::size_t size() const { return count_; }
+
+ private:
+  struct alignas(64) Line {
+    std::array<T, 64 / sizeof(T)> numbers{};
+  };
+  std::vector<Line> lines_;
+  std::size_t count_;
+};
+
+NetworkShape network_shape(int inputs, const std::vector<int>& hidden, int outputs, policy::Activation activation,
+                           bool bounded) {
+  if (hidden.size() + 1 > policy::kMaxLayers) throw std::invalid_argument("a network has at most 6 layers");
+  std::vector<int> widths = {inputs};
+  widths.insert(widths.end(), hidden.begin(), hidden.end());
+  widths.push_back(outputs);
+  for (const int w : widths)
+    if (w < 1 || w > policy::kMaxWidth) throw std::invalid_argument("a layer is 1 to 256 wide");
+  return {static_cast<int>(widths.size()) - 1, widths.data(), activation, bounded};
+}
+
+/// Calls visit(layer, input or -1 for the bias, output, place of the weight) in the order of an actor's file.
+template <class Visit>
+void each_weight(const NetworkShape& net, const Visit& visit) {
+  for (int l = 0; l < net.layers; ++l)
+    for (int o = 0; o < net.widths[l + 1]; ++o)
+      for (int i = -1; i < net.widths[l]; ++i)
+        visit(l, i, o, net.weights[l] + std::ptrdiff_t{1 + i} * padded(net.widths[l + 1]) + o);
+}
+
+}  // namespace
+
+template <class T>
+struct Learner<T>::Storage {
+  LearnerOptions options;
+  const UpdateKernel<T>* kernel;
+  UpdatePlan<T> plan;
+  std::ptrdiff_t count;  // weights of all networks
+  std::size_t parts;     // of the gradients
+  Numbers<T> input_numbers, numbers, gradients, work;
+  std::vector<ChunkSums<T>> sums;  // of each chunk
+  std::ptrdiff_t work_size;
+  LearnerCounters counters;
+  UpdateMetrics metrics;
+
+  explicit Storage(const LearnerOptions& o, const UpdatePlan<T>& p)
+      : options(o),
+        kernel(&kernel_for<T>(o.instruction_set)),
+        plan(p),
+        count(p.weight_count()),
+        parts(std::min(kMostParts, o.batch / kChunk)),
+        input_numbers(2 * static_cast<std::size_t>(p.actor_input.count + p.critic_input.count)),
+        numbers(static_cast<std::size_t>(4 * count)),
+        gradients(static_cast<std::size_t>(count) * parts),
+        work(static_cast<std::size_t>(o.threads * work_room(p))),
+        sums(o.batch / kChunk),
+        work_size(work_room(p)) {
+    put_input(plan.actor_input, o.actor_input, input_numbers.data());
+    put_input(plan.critic_input, o.shape.critic_observation > 0 ? o.critic_input : o.actor_input,
+              input_numbers.data() + 2 * plan.actor_input.count);
+    plan.weights = numbers.data();
+    plan.targets = numbers.data() + count;
+    for (int c = 0; c < plan.critics; ++c) start(plan.critic, c * plan.critic.weight_count(), 1 + c);
+    start(plan.actor, plan.actor_at(), 0);
+  }
+
+  static std::ptrdiff_t work_room(const UpdatePlan<T>& p) { return (Workplace<T>::count(p) + 15) / 16 * 16; }
+
+  static void put_input(InputView<T>& view, const Normaliser& n, T* to) {
+    std::ranges::transform(n.mean, to, [](double x) { return static_cast<T>(x); });
+    std::ranges::transform(n.scale, to + view.count, [](double x) { return static_cast<T>(x); });
+    view.mean = to, view.scale = to + view.count;
+    view.clip = static_cast<T>(n.clip);
+  }
+
+  T* weights_at(std::ptrdiff_t at, bool target) { return numbers.data() + (target ? count : 0) + at; }
+
+  /// Uniform within +-1/sqrt(inputs), as torch's nn.Linear; no bias.
+  void start(const NetworkShape& net, std::ptrdiff_t at, int network) {
+    each_weight(net, [&](int l, int i, int o, std::ptrdiff_t place) {
+      if (i < 0) return;
+      const sim::RandomKey key{options.seed, static_cast<std::uint32_t>(network), static_cast<std::uint32_t>(l),
+                               sim::Stream::weights};
+      const auto number = static_cast<std::uint32_t>(o * net.widths[l] + i);
+      const sim::UniformPair u = sim::uniform_pair(key, number / 2);
+      const double bound = (l + 1 == net.layers ? options.last_layer_scale : 1) / std::sqrt(net.widths[l]);
+      const double w = bound * (2 * (number % 2 == 0 ? u.first : u.second) - 1);
+      *weights_at(at + place, false) = *weights_at(at + place, true) = static_cast<T>(w);
+    });
+  }
+
+  policy::Actor actor(bool target) {
+    policy::Actor a;
+    a.widths.assign(plan.actor.widths, plan.actor.widths + plan.actor.layers + 1);
+    a.hidden = plan.actor.hidden;
+    a.mean = options.actor_input.mean;
+    a.scale = options.actor_input.scale;
+    a.clip = options.actor_input.clip;
+    const T* from = weights_at(plan.actor_at(), target);
+    each_weight(plan.actor, [&](int, int, int, std::ptrdiff_t place) { a.weights.push_back(from[place]); });
+    return a;
+  }
+
+  /// Gradients of part `part`: of the chunks that share it, one after the other.
+  void work_on(std::size_t part, const Replay& replay) {
+    T* place = work.data() + omp_get_thread_num() * work_size;
+    const std::size_t chunks = sums.size();
+    bool onto = false;
+    for (std::size_t c = part * chunks / parts; c < (part + 1) * chunks / parts; ++c) {
+      std::array<std::uint32_t, kChunk> rows;
+      replay.draw(options.seed, counters.updates, c * kChunk, rows);
+      sums[c] = kernel->chunk(plan, place, replay.row(0), rows.data(), static_cast<std::uint32_t>(c * kChunk),
+                              gradients.data() + static_cast<std::ptrdiff_t>(part) * count, onto);
+      onto = true;
+    }
+  }
+
+  /// A step of Adam for numbers from `at` on, by powers of beta that have counted it already.
+  AdamPlan<T> adam(std::ptrdiff_t at, double rate, double beta1_power, double beta2_power) {
+    AdamPlan<T> p{};
+    p.weights = numbers.data() + at;
+    p.targets = p.weights + count;
+    p.first = p.targets + count;
+    p.second = p.first + count;
+    p.gradients = gradients.data() + at;
+    p.parts = static_cast<std::ptrdiff_t>(parts);
+    p.part_size = count;
+    p.beta1 = static_cast<T>(options.beta1);
+    p.beta2 = static_cast<T>(options.beta2);
+    p.epsilon = static_cast<T>(options.epsilon);
+    p.rate = static_cast<T>(rate / (1 - beta1_power));
+    p.second_root = static_cast<T>(1 / std::sqrt(1 - beta2_power));
+    p.tau = plan.actor_learns ? static_cast<T>(options.tau) : T(0);
+    return p;
+  }
+
+  void measure() {
+    double loss = 0, q = 0, actor_q = 0;
+    for (const ChunkSums<T>& s : sums) loss += s.loss, q += s.q, actor_q += s.actor_q;
+    const auto batch = static_cast<double>(options.batch);
+    metrics.critic_loss = loss / (batch * plan.critics);
+    metrics.mean_q = q / batch;
+    if (plan.actor_learns) metrics.actor_q = actor_q / batch;
+  }
+};
+
+template <class T>
+Learner<T>::Learner(const LearnerOptions& o) {
+  const bool privileged = o.shape.critic_observation > 0;
+  const Normaliser& critic_input = privileged ? o.critic_input : o.actor_input;
+  const int seen = privileged ? o.shape.critic_observation : o.shape.actor_observation;
+  const auto fits = [](const Normaliser& n, int inputs) {
+    return static_cast<int>(n.mean.size()) == inputs && static_cast<int>(n.scale.size()) == inputs && n.clip > 0;
+  };
+  if (!fits(o.actor_input, o.shape.actor_observation) || !fits(critic_input, seen))
+    throw std::invalid_argument("a normaliser has one mean and one scale for each input, and a clip above 0");
+  if (o.batch < kChunk || o.batch % kChunk != 0)
+    throw std::invalid_argument("a batch is a multiple of " + std::to_string(kChunk));
+  if (o.threads < 1 || o.policy_delay < 1) throw std::invalid_argument("threads and policy_delay are at least 1");
+
+  UpdatePlan<T> plan;
+  plan.actor = network_shape(o.shape.actor_observation, o.actor_hidden, o.shape.action, o.actor_activation, true);
+  plan.critic = network_shape(seen + o.shape.action, o.critic_hidden, 1, o.critic_activation, false);
+  plan.critics = o.twin ? 2 : 1;
+  const TransitionLayout layout(o.shape);
+  const auto column = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i); };
+  plan.actor_input.count = o.shape.actor_observation;
+  plan.actor_input.now = column(layout.actor_observation);
+  plan.actor_input.next = column(layout.next_actor_observation);
+  plan.critic_input.count = seen;
+  plan.critic_input.now = column(layout.critic_observation);
+  plan.critic_input.next = column(layout.next_critic_observation);
+  plan.action = column(layout.action);
+  plan.reward = column(layout.reward);
+  plan.discount = column(layout.discount);
+  plan.row = column(layout.row);
+  plan.noise_sd = static_cast<T>(o.noise_sd);
+  plan.noise_clip = static_cast<T>(o.noise_clip);
+  plan.huber = static_cast<T>(o.huber);
+  plan.critic_share = static_cast<T>((o.huber > 0 ? 1.0 : 2.0) / static_cast<double>(o.batch));
+  plan.actor_share = static_cast<T>(1.0 / static_cast<double>(o.batch));
+  plan.seed = o.seed;
+  storage_ = std::make_unique<Storage>(o, plan);
+}
+
+template <class T>
+Learner<T>::~Learner() = default;
+template <class T>
+Learner<T>::Learner(Learner&&) noexcept = default;
+template <class T>
+Learner<T>& Learner<T>::operator=(Learner&&) noexcept = default;
+
+template <class T>
+void Learner<T>::update(const Replay& replay, double actor_rate, double critic_rate, const Companion& beside) {
+  Storage& s = *storage_;
+  const TransitionShape &have = replay.shape(), &want = s.options.shape;
+  if (replay.size() == 0 || have.actor_observation != want.actor_observation ||
+      have.critic_observation != want.critic_observation || have.action != want.action)
+    throw std::invalid_argument("a replay memory that is empty or of another shape");
+  LearnerCounters& n = s.counters;
+  s.plan.update = static_cast<std::uint32_t>(n.updates);
+  s.plan.actor_learns = (n.updates + 1) % static_cast<std::uint64_t>(s.options.policy_delay) == 0;
+  n.critic_beta1 *= s.options.beta1, n.critic_beta2 *= s.options.beta2;
+  if (s.plan.actor_learns) n.actor_beta1 *= s.options.beta1, n.actor_beta2 *= s.options.beta2;
+  const std::ptrdiff_t actor_at = s.plan.actor_at();
+  const AdamPlan<T> critics = s.adam(0, critic_rate, n.critic_beta1, n.critic_beta2);
+  const AdamPlan<T> actor = s.adam(actor_at, actor_rate, n.actor_beta1, n.actor_beta2);
+  const std::ptrdiff_t critic_shards = (actor_at + kShard - 1) / kShard;
+  const std::ptrdiff_t shards = critic_shards + (s.plan.actor_learns ? (s.count - actor_at + kShard - 1) / kShard : 0);
+  const auto parts = static_cast<std::ptrdiff_t>(s.parts);
+  const std::ptrdiff_t items = parts + static_cast<std::ptrdiff_t>(beside.items);
+
+#pragma omp parallel num_threads(s.options.threads)
+  {
+#pragma omp for schedule(dynamic, 1)
+    for (std::ptrdiff_t i = 0; i < items; ++i) {
+      if (i < parts) s.work_on(static_cast<std::size_t>(i), replay);
+      else beside.run(static_cast<std::size_t>(i - parts));
+    }
+#pragma omp for schedule(static)
+    for (std::ptrdiff_t i = 0; i < shards; ++i) {
+      const bool of_actor = i >= critic_shards;
+      const std::ptrdiff_t begin = (of_actor ? i - critic_shards : i) * kShard;
+      const std::ptrdiff_t end = std::min(begin + kShard, of_actor ? s.count - actor_at : actor_at);
+      s.kernel->adam(of_actor ? actor : critics, begin, end);
+    }
+  }
+  ++n.updates;
+  s.measure();
+}
+
+template <class T>
+const LearnerOptions& Learner<T>::options() const {
+  return storage_->options;
+}
+template <class T>
+const UpdateMetrics& Learner<T>::metrics() const {
+  return storage_->metrics;
+}
+template <class T>
+policy::Actor Learner<T>::actor() const {
+  return storage_->actor(false);
+}
+template <class T>
+policy::Actor Learner<T>::target_actor() const {
+  return storage_->actor(true);
+}
+
+template <class T>
+void Learner<T>::set_actor(const policy::Actor& a) {
+  Storage& s = *storage_;
+  const NetworkShape& net = s.plan.actor;
+  if (!std::ranges::equal(a.widths, std::span(net.widths).first(static_cast<std::size_t>(net.layers) + 1)) ||
+      a.hidden != net.hidden || a.weights.size() != policy::weight_count(a.widths))
+    throw std::invalid_argument("the actor's layers are not those of the learner");
+  std::size_t next = 0;
+  each_weight(net, [&](int, int, int, std::ptrdiff_t place) {
+    const std::ptrdiff_t at = s.plan.actor_at() + place;
+    *s.weights_at(at, false) = *s.weights_at(at, true) = static_cast<T>(a.weights[next++]);
+  });
+}
+
+template <class T>
+void Learner<T>::act(const float* observations, std::size_t count, T* actions) const {
+  const Storage& s = *storage_;
+  const auto inputs = static_cast<std::size_t>(s.options.shape.actor_observation);
+  const auto outputs = static_cast<std::size_t>(s.options.shape.action);
+  Numbers<T> work(static_cast<std::size_t>(s.work_size));
+  std::vector<float> in(kChunk * inputs);
+  std::vector<T> out(kChunk * outputs);
+  for (std::size_t first = 0; first < count; first += kChunk) {
+    const std::size_t n = std::min(kChunk, count - first);
+    std::copy_n(observations + first * inputs, n * inputs, in.begin());
+    s.kernel->act(s.plan, work.data(), in.data(), out.data());
+    std::copy_n(out.begin(), n * outputs, actions + first * outputs);
+  }
+}
+
+template <class T>
+std::span<T> Learner<T>::numbers() {
+  return {storage_->numbers.data(), storage_->numbers.size()};
+}
+template <class T>
+std::span<const T> Learner<T>::numbers() const {
+  return {storage_->numbers.data(), storage_->numbers.size()};
+}
+template <class T>
+LearnerCounters& Learner<T>::counters() {
+  return storage_->counters;
+}
+template <class T>
+const LearnerCounters& Learner<T>::counters() const {
+  return storage_->counters;
+}
+
+template <class T>
+std::vector<typename Learner<T>::Layer> Learner<T>::layers(Network network, Kind kind) const {
+  const Storage& s = *storage_;
+  const bool of_actor = network == Network::actor;
+  const NetworkShape& net = of_actor ? s.plan.actor : s.plan.critic;
+  const T* from = s.numbers.data() + static_cast<std::ptrdiff_t>(kind) * s.count;
+  from += of_actor ? s.plan.actor_at() : static_cast<std::ptrdiff_t>(network) * net.weight_count();
+  std::vector<Layer> list;
+  for (int l = 0; l < net.layers; ++l) {
+    const int outputs = net.widths[l + 1];
+    list.push_back({{from + net.weights[l], from + net.weights[l + 1]}, net.widths[l], outputs, padded(outputs)});
+  }
+  return list;
+}
+
+template class Learner<float>;
+template class Learner<double>;
+
+}  // namespace flappy::learn

@@ -1,0 +1,139 @@
+// Multilayer perceptrons, forward and backward, for kChunk samples at once: a row of numbers for each neuron, a sample in
+// each column. Weights of a layer stand as [1 + inputs][padded outputs], the first row being the bias, so that a layer is
+// one product with rows of which the first is all ones. Padded weights are zero, have no gradient, and stay zero.
+#pragma once
+
+#include "learn/lanes/matrix.hpp"
+#include "learn/replay_buffer.hpp"
+#include "policy/actor.hpp"
+
+namespace flappy::learn {
+
+FLAPPY_INLINE constexpr int padded(int width) { return (width + 15) / 16 * 16; }
+
+/// Widths and activations of a network, and where its numbers stand.
+struct NetworkShape {
+  int layers = 0;
+  int widths[policy::kMaxLayers + 1]{};  // inputs, then outputs of each layer
+  policy::Activation hidden = policy::Activation::relu;
+  bool bounded = false;                              // the last layer's outputs: tanh, or as they are
+  std::ptrdiff_t weights[policy::kMaxLayers + 1]{};  // where each layer's begin; then their number
+  std::ptrdiff_t
+      values[policy::kMaxLayers + 1]{};  // where the rows of each layer's inputs begin, ones first; then outputs'
+
+  NetworkShape() = default;
+  NetworkShape(int depth, const int* width, policy::Activation activation, bool is_bounded)
+      : layers(depth), hidden(activation), bounded(is_bounded) {
+    for (int l = 0; l <= depth; ++l) {
+      widths[l] = width[l];
+      if (l == depth) break;
+      weights[l + 1] = weights[l] + std::ptrdiff_t{1 + width[l]} * padded(width[l + 1]);
+      values[l + 1] = values[l] + std::ptrdiff_t{1 + width[l]} * std::ptrdiff_t{kChunk};
+    }
+  }
+  FLAPPY_INLINE std::ptrdiff_t weight_count() const { return weights[layers]; }
+  FLAPPY_INLINE std::ptrdiff_t value_count() const {
+    return values[layers] + std::ptrdiff_t{1 + widths[layers]} * std::ptrdiff_t{kChunk};
+  }
+  FLAPPY_INLINE int widest() const {
+    int w = 0;
+    for (int l = 0; l <= layers; ++l) w = widths[l] > w ? widths[l] : w;
+    return padded(w);
+  }
+};
+
+inline namespace FLAPPY_ISA {
+
+inline constexpr std::ptrdiff_t kRow = kChunk;
+
+template <class T>
+using L = Lanes<T, kWidth<T>>;
+
+/// Calls op(lanes of `count` rows, their place) for all of them.
+template <class T, class Op>
+FLAPPY_INLINE void for_rows(int count, const Op& op) {
+  for (std::ptrdiff_t i = 0; i < count * kRow; i += kWidth<T>) op(i);
+}
+
+/// The rows that layer `l` takes in (of the last layer: gives), without the ones.
+template <class T>
+FLAPPY_INLINE T* rows_of(const NetworkShape& net, T* values, int l) {
+  return values + net.values[l] + kRow;
+}
+
+/// Rows of ones, which no pass changes.
+template <class T>
+FLAPPY_INLINE void put_ones(const NetworkShape& net, T* values) {
+  for (int l = 0; l < net.layers; ++l)
+    for (std::ptrdiff_t i = 0; i < kRow; ++i) values[net.values[l] + i] = 1;
+}
+
+template <class T>
+FLAPPY_INLINE void activate(policy::Activation kind, int rows, T* at) {
+  if (kind == policy::Activation::relu)
+    for_rows<T>(rows, [&](std::ptrdiff_t i) { max(L<T>::load(at + i), L<T>(0)).store(at + i); });
+  else for_rows<T>(rows, [&](std::ptrdiff_t i) { tanh(L<T>::load(at + i)).store(at + i); });
+}
+
+/// Multiplies slopes by the derivative of what gave `out`.
+template <class T>
+FLAPPY_INLINE void deactivate(policy::Activation kind, int rows, const T* out, T* slope) {
+  if (kind == policy::Activation::relu)
+    for_rows<T>(rows, [&](std::ptrdiff_t i) {
+      where(L<T>::load(out + i) > L<T>(0), L<T>::load(slope + i), L<T>(0)).store(slope + i);
+    });
+  else
+    for_rows<T>(rows, [&](std::ptrdiff_t i) {
+      const L<T> y = L<T>::load(out + i);
+      L<T>(L<T>::load(slope + i) * L<T>(L<T>(1) - y * y)).store(slope + i);
+    });
+}
+
+/// From the first rows of `values` to the last.
+template <class T>
+void forward(const NetworkShape& net, const T* weights, T* values) {
+  for (int l = 0; l < net.layers; ++l) {
+    const int out = net.widths[l + 1];
+    T* to = rows_of(net, values, l + 1);
+    multiply<T>(out, kRow, 1 + net.widths[l], {weights + net.weights[l], 1, padded(out)}, values + net.values[l], kRow,
+                to, kRow);
+    if (l + 1 < net.layers) activate(net.hidden, out, to);
+    else if (net.bounded) activate(policy::Activation::tanh, out, to);
+  }
+}
+
+/// What the backward pass works in: slopes of two layers, [widest][kChunk], and one of them turned.
+template <class T>
+struct Slopes {
+  T *now, *next, *turned;
+};
+
+/// Of a sum over samples, given its slopes by the outputs in s.now. Gradients by the weights go to, or onto, `gradient`
+/// unless that is null; slopes by `inputs` of the network's inputs from number `first` go to s.now.
+template <class T>
+void backward(const NetworkShape& net, const T* weights, const T* values, Slopes<T>& s, T* gradient, bool onto,
+              int first, int inputs) {
+  if (net.bounded)
+    deactivate(policy::Activation::tanh, net.widths[net.layers], values + net.values[net.layers] + kRow, s.now);
+  for (int l = net.layers - 1; l >= 0; --l) {
+    const int in = net.widths[l], out = net.widths[l + 1], wide = padded(out);
+    if (gradient != nullptr) {
+      for (std::ptrdiff_t i = out * kRow; i < wide * kRow; ++i) s.now[i] = 0;
+      turn(wide, kRow, s.now, kRow, s.turned, wide);
+      const Strided<T> a{values + net.values[l], kRow, 1};
+      T* to = gradient + net.weights[l];
+      if (onto) multiply<T, true>(1 + in, wide, kRow, a, s.turned, wide, to, wide);
+      else multiply<T>(1 + in, wide, kRow, a, s.turned, wide, to, wide);
+    }
+    const int from = l > 0 ? 0 : first, count = l > 0 ? in : inputs;
+    if (count == 0) continue;
+    multiply<T>(count, kRow, out, {weights + net.weights[l] + std::ptrdiff_t{1 + from} * wide, wide, 1}, s.now, kRow,
+                s.next, kRow);
+    if (l > 0) deactivate(net.hidden, count, values + net.values[l] + kRow, s.next);
+    T* const spare = s.now;
+    s.now = s.next, s.next = spare;
+  }
+}
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::learn

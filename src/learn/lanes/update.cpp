@@ -1,0 +1,203 @@
+// What an update does with one chunk of its batch, and then with the gradients. Compiled once for each instruction set
+// (FLAPPY_ISA); the bits are the same on all of them.
+#include "learn/lanes/update.hpp"
+
+#include "sim/noise.hpp"
+#include "sim/random.hpp"
+
+namespace flappy::learn {
+inline namespace FLAPPY_ISA {
+namespace {
+
+/// Halves are added until one number is left: the same order for any width of register.
+template <class T>
+FLAPPY_INLINE T folded(T* numbers) {
+  for (std::ptrdiff_t half = kRow / 2; half > 0; half /= 2)
+    for (std::ptrdiff_t i = 0; i < half; ++i) numbers[i] += numbers[i + half];
+  return numbers[0];
+}
+
+/// The chunk's transitions, a row of kChunk for each of their numbers.
+template <class T>
+FLAPPY_INLINE void gather(const UpdatePlan<T>& plan, const Workplace<T>& w, const float* memory,
+                          const std::uint32_t* rows) {
+  const std::ptrdiff_t wide = Workplace<T>::row(plan);
+  const auto row = [&](std::ptrdiff_t s) { return memory + static_cast<std::ptrdiff_t>(rows[s]) * plan.row; };
+  for (std::ptrdiff_t s = 0; s < kRow; ++s)
+    for (std::ptrdiff_t i = 0; i < plan.row; i += 16) __builtin_prefetch(row(s) + i);
+  for (std::ptrdiff_t s = 0; s < kRow; ++s) {
+    const float* from = row(s);
+    T* to = w.gathered + s * wide;
+    for (std::ptrdiff_t i = 0; i < plan.row; ++i) to[i] = static_cast<T>(from[i]);
+  }
+  turn(kRow, static_cast<int>(wide), w.gathered, wide, w.columns, kRow);
+}
+
+/// Rows as a network sees them.
+template <class T>
+FLAPPY_INLINE void normalise(const InputView<T>& view, const T* from, T* to) {
+  const L<T> clip(view.clip);
+  for (int i = 0; i < view.count; ++i, from += kRow, to += kRow) {
+    const L<T> mean(view.mean[i]), scale(view.scale[i]);
+    for_rows<T>(1, [&](std::ptrdiff_t s) {
+      clamp(L<T>((L<T>::load(from + s) - mean) * scale), L<T>(-clip), clip).store(to + s);
+    });
+  }
+}
+
+template <class T>
+FLAPPY_INLINE void copy_rows(int count, const T* from, T* to) {
+  for_rows<T>(count, [&](std::ptrdiff_t i) { L<T>::load(from + i).store(to + i); });
+}
+
+/// The action that the target of the critics is taken at: the target actor's, with clipped noise.
+template <class T>
+FLAPPY_INLINE void add_noise(const UpdatePlan<T>& plan, std::uint32_t sample, int actions, T* rows) {
+  std::uint32_t number[kChunk], update[kChunk];
+  for (std::uint32_t s = 0; s < kChunk; ++s) number[s] = sample + s, update[s] = plan.update;
+  const L<T> sd(plan.noise_sd), most(plan.noise_clip), one(1);
+  for (int first = 0; first < actions; first += 4)
+    for (std::ptrdiff_t s = 0; s < kRow; s += kWidth<T>) {
+      const auto noise = sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::target_noise),
+                                            static_cast<std::uint32_t>(first / 4), number + s, update + s);
+      for (int k = 0; k < 4 && first + k < actions; ++k) {
+        T* at = rows + (first + k) * kRow + s;
+        const L<T> step = clamp(L<T>(sd * noise.n[k]), L<T>(-most), most);
+        clamp(L<T>(L<T>::load(at) + step), L<T>(-one), one).store(at);
+      }
+    }
+}
+
+/// What the critics are to predict, into w.goal. A discount of 0 hides what comes next, which the clip has made finite
+/// whatever it was.
+template <class T>
+FLAPPY_INLINE void find_goal(const UpdatePlan<T>& plan, const Workplace<T>& w, std::uint32_t sample) {
+  const int actions = plan.actor.widths[plan.actor.layers];
+  T* critic_in = rows_of(plan.critic, w.critic, 0);
+  T* action = critic_in + plan.critic_input.count * kRow;
+  normalise(plan.actor_input, w.columns + plan.actor_input.next * kRow, rows_of(plan.actor, w.actor, 0));
+  forward(plan.actor, plan.targets + plan.actor_at(), w.actor);
+  copy_rows(actions, rows_of(plan.actor, w.actor, plan.actor.layers), action);
+  if (plan.noise_sd > 0) add_noise(plan, sample, actions, action);
+  normalise(plan.critic_input, w.columns + plan.critic_input.next * kRow, critic_in);
+  const T* q = rows_of(plan.critic, w.critic, plan.critic.layers);
+  for (int c = 0; c < plan.critics; ++c) {
+    forward(plan.critic, plan.targets + c * plan.critic.weight_count(), w.critic);
+    for_rows<T>(1, [&](std::ptrdiff_t s) {
+      const L<T> next = L<T>::load(q + s);
+      (c == 0 ? next : min(L<T>::load(w.goal + s), next)).store(w.goal + s);
+    });
+  }
+  for_rows<T>(1, [&](std::ptrdiff_t s) {
+    const L<T> reward = L<T>::load(w.columns + plan.reward * kRow + s);
+    const L<T> discount = L<T>::load(w.columns + plan.discount * kRow + s);
+    L<T>(discount * L<T>::load(w.goal + s) + reward).store(w.goal + s);
+  });
+}
+
+/// Slopes of the loss by the critic's outputs, into w.slopes.now; returns the sum of the losses.
+template <class T>
+FLAPPY_INLINE T find_error(const UpdatePlan<T>& plan, const Workplace<T>& w, const T* q) {
+  T* loss = w.q;
+  const L<T> share(plan.critic_share), bend(plan.huber);
+  for_rows<T>(1, [&](std::ptrdiff_t s) {
+    const L<T> error = L<T>::load(q + s) - L<T>::load(w.goal + s);
+    if (plan.huber > 0) {
+      const L<T> near = clamp(error, L<T>(-bend), bend);  // |e| <= bend: e^2 / 2, beyond: bend (|e| - bend / 2)
+      L<T>(share * near).store(w.slopes.now + s);
+      L<T>(near * L<T>(error - L<T>(L<T>(0.5) * near))).store(loss + s);
+    } else {
+      L<T>(share * error).store(w.slopes.now + s);
+      L<T>(error * error).store(loss + s);
+    }
+  });
+  return folded(loss);
+}
+
+template <class T>
+FLAPPY_INLINE T sum_of(const Workplace<T>& w, const T* row) {
+  copy_rows(1, row, w.q);
+  return folded(w.q);
+}
+
+template <class T>
+ChunkSums<T> chunk(const UpdatePlan<T>& plan, T* work, const float* memory, const std::uint32_t* rows,
+                   std::uint32_t sample, T* gradient, bool onto) {
+  Workplace<T> w(plan, work);
+  const int actions = plan.actor.widths[plan.actor.layers], seen = plan.critic_input.count;
+  T* critic_in = rows_of(plan.critic, w.critic, 0);
+  const T* q = rows_of(plan.critic, w.critic, plan.critic.layers);
+  ChunkSums<T> sums;
+  put_ones(plan.actor, w.actor);
+  put_ones(plan.critic, w.critic);
+  gather(plan, w, memory, rows);
+
+  find_goal(plan, w, sample);
+
+  normalise(plan.critic_input, w.columns + plan.critic_input.now * kRow, critic_in);
+  copy_rows(actions, w.columns + plan.action * kRow, critic_in + seen * kRow);
+  for (int c = 0; c < plan.critics; ++c) {
+    const std::ptrdiff_t at = c * plan.critic.weight_count();
+    forward(plan.critic, plan.weights + at, w.critic);
+    sums.loss += find_error(plan, w, q);
+    if (c == 0) sums.q = sum_of(w, q);
+    backward<T>(plan.critic, plan.weights + at, w.critic, w.slopes, gradient + at, onto, 0, 0);
+  }
+
+  if (plan.actor_learns) {
+    const T* mine = plan.weights + plan.actor_at();
+    normalise(plan.actor_input, w.columns + plan.actor_input.now * kRow, rows_of(plan.actor, w.actor, 0));
+    forward(plan.actor, mine, w.actor);
+    copy_rows(actions, rows_of(plan.actor, w.actor, plan.actor.layers), critic_in + seen * kRow);
+    forward(plan.critic, plan.weights, w.critic);
+    sums.actor_q = sum_of(w, q);
+    for_rows<T>(1, [&](std::ptrdiff_t s) { L<T>(-plan.actor_share).store(w.slopes.now + s); });
+    backward<T>(plan.critic, plan.weights, w.critic, w.slopes, nullptr, false, seen, actions);
+    backward<T>(plan.actor, mine, w.actor, w.slopes, gradient + plan.actor_at(), onto, 0, 0);
+  }
+  return sums;
+}
+
+template <class T>
+void adam(const AdamPlan<T>& p, std::ptrdiff_t begin, std::ptrdiff_t end) {
+  const L<T> beta1(p.beta1), beta2(p.beta2), rest1(T(1) - p.beta1), rest2(T(1) - p.beta2);
+  const L<T> rate(p.rate), second_root(p.second_root), epsilon(p.epsilon), tau(p.tau);
+  for (std::ptrdiff_t i = begin; i < end; i += kWidth<T>) {
+    L<T> g = L<T>::load(p.gradients + i);
+    for (std::ptrdiff_t k = 1; k < p.parts; ++k) g += L<T>::load(p.gradients + k * p.part_size + i);
+    const L<T> m = rest1 * g + L<T>(beta1 * L<T>::load(p.first + i));
+    const L<T> v = L<T>(rest2 * g) * g + L<T>(beta2 * L<T>::load(p.second + i));
+    m.store(p.first + i);
+    v.store(p.second + i);
+    const L<T> x = L<T>::load(p.weights + i) - rate * L<T>(m / (sqrt(v) * second_root + epsilon));
+    x.store(p.weights + i);
+    if (p.tau > 0) {
+      const L<T> target = L<T>::load(p.targets + i);
+      L<T>(tau * L<T>(x - target) + target).store(p.targets + i);
+    }
+  }
+}
+
+template <class T>
+void act(const UpdatePlan<T>& plan, T* work, const float* observations, T* actions) {
+  const Workplace<T> w(plan, work);
+  const int inputs = plan.actor_input.count, outputs = plan.actor.widths[plan.actor.layers];
+  put_ones(plan.actor, w.actor);
+  for (std::ptrdiff_t s = 0; s < kRow; ++s)
+    for (std::ptrdiff_t i = 0; i < inputs; ++i) w.columns[i * kRow + s] = static_cast<T>(observations[s * inputs + i]);
+  normalise(plan.actor_input, w.columns, rows_of(plan.actor, w.actor, 0));
+  forward(plan.actor, plan.weights + plan.actor_at(), w.actor);
+  const T* out = rows_of(plan.actor, w.actor, plan.actor.layers);
+  for (std::ptrdiff_t s = 0; s < kRow; ++s)
+    for (std::ptrdiff_t o = 0; o < outputs; ++o) actions[s * outputs + o] = out[o * kRow + s];
+}
+
+}  // namespace
+
+extern const UpdateKernel<float> update_float;
+extern const UpdateKernel<double> update_double;
+const UpdateKernel<float> update_float = {chunk<float>, adam<float>, act<float>};
+const UpdateKernel<double> update_double = {chunk<double>, adam<double>, act<double>};
+
+}  // namespace FLAPPY_ISA
+}  // namespace flappy::learn

@@ -1,0 +1,92 @@
+#include "policy/actor_file.hpp"
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "io/files.hpp"
+
+namespace flappy::policy {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& what, const std::string& accepted) {
+  throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
+}
+
+}  // namespace
+
+std::size_t weight_count(const std::vector<int>& widths) {
+  std::size_t n = 0;
+  for (std::size_t i = 0; i + 1 < widths.size(); ++i)
+    n += static_cast<std::size_t>(widths[i] + 1) * static_cast<std::size_t>(widths[i + 1]);
+  return n;
+}
+
+Actor read_actor(const std::filesystem::path& path) {
+  Json json;
+  try {
+    json = Json::parse(io::read_text(path));
+  } catch (const Json::exception& e) {
+    refuse(path, "is no JSON: " + std::string(e.what()), "an actor file");
+  }
+  Actor a;
+  // what the library would convert in silence
+  const auto check = [&](const char* key, bool (Json::*is)() const noexcept, const char* accepted) {
+    for (const Json& x : json.at(key))
+      if (!(x.*is)()) refuse(path, std::string(key) + " has " + x.dump() + " in it", accepted);
+  };
+  try {
+    if (json.at("schema") != 1) refuse(path, "schema is not 1", "schema 1");
+    a.task = json.at("task").get<std::string>();
+    a.observation = json.at("observation").get<std::vector<std::string>>();
+    a.action = json.at("action").get<std::vector<std::string>>();
+    check("widths", &Json::is_number_integer, "whole numbers");
+    for (const char* key : {"mean", "scale", "weights"}) check(key, &Json::is_number, "numbers");
+    for (const auto w : json.at("widths").get<std::vector<std::int64_t>>())
+      if (w < 1 || w > kMaxWidth) refuse(path, "a layer is " + std::to_string(w) + " wide", "1 to 256");
+    a.widths = json.at("widths").get<std::vector<int>>();
+    const auto hidden = json.at("hidden").get<std::string>();
+    if (hidden != "relu" && hidden != "tanh") refuse(path, "hidden is \"" + hidden + "\"", "relu or tanh");
+    a.hidden = hidden == "relu" ? Activation::relu : Activation::tanh;
+    a.mean = json.at("mean").get<std::vector<double>>();
+    a.scale = json.at("scale").get<std::vector<double>>();
+    a.clip = json.at("clip").get<double>();
+    a.weights = json.at("weights").get<std::vector<double>>();
+  } catch (const Json::exception& e) {
+    refuse(path, e.what(), "an actor file");
+  }
+  const auto layers = static_cast<int>(a.widths.size()) - 1;
+  if (layers < 1 || layers > kMaxLayers) refuse(path, "has " + std::to_string(layers) + " layers", "1 to 6");
+  if (!(a.clip > 0 && a.clip <= 1e30))
+    refuse(path, "clip is " + io::shortest_digits(a.clip), "a number above 0, at most 1e30");
+  const auto count = [&](const char* name, std::size_t have, std::size_t want) {
+    if (have != want)
+      refuse(path, std::string(name) + " has " + std::to_string(have) + " entries", std::to_string(want) + " of them");
+  };
+  const auto inputs = static_cast<std::size_t>(a.widths.front());
+  count("observation", a.observation.size(), inputs);
+  count("mean", a.mean.size(), inputs);
+  count("scale", a.scale.size(), inputs);
+  count("action", a.action.size(), policy::kActions);
+  count("widths", static_cast<std::size_t>(a.widths.back()), policy::kActions);
+  count("weights", a.weights.size(), weight_count(a.widths));
+  for (const auto* numbers : {&a.mean, &a.scale, &a.weights})
+    for (const double x : *numbers)
+      if (!(std::abs(x) <= static_cast<double>(std::numeric_limits<float>::max())))
+        refuse(path, "has " + io::shortest_digits(x) + " in it, which single precision does not hold",
+               "numbers up to 3.4e38");
+  return a;
+}
+
+void write_actor(const std::filesystem::path& path, const Actor& a) {
+  const Json json = {
+      {"schema", 1},         {"task", a.task},     {"observation", a.observation},
+      {"action", a.action},  {"widths", a.widths}, {"hidden", a.hidden == Activation::relu ? "relu" : "tanh"},
+      {"mean", a.mean},      {"scale", a.scale},   {"clip", a.clip},
+      {"weights", a.weights}};
+  io::write_atomically(path, json.dump() + "\n");
+}
+
+}  // namespace flappy::policy

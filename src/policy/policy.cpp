@@ -1,0 +1,127 @@
+#include "policy/policy.hpp"
+
+#include <dlfcn.h>
+
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+#include "io/files.hpp"
+#include "io/run_program.hpp"
+#include "io/temporary_folder.hpp"
+#include "policy/torch_script.hpp"
+
+namespace flappy::policy {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Behind the header, so that what it defines may be static, inline or a macro.
+constexpr const char* kWrapper = R"(#if !defined FLAPPY_POLICY_OBS || !defined FLAPPY_POLICY_ACT
+#error FLAPPY_POLICY_OBS or FLAPPY_POLICY_ACT is missing
+#endif
+const int flappy_loaded_observations = FLAPPY_POLICY_OBS, flappy_loaded_actions = FLAPPY_POLICY_ACT;
+void flappy_loaded_step(const float *observation, float *action) { flappy_policy_step(observation, action); }
+int flappy_loaded_selftest(void) { return flappy_policy_selftest(); }
+)";
+
+[[noreturn]] void refuse(const fs::path& header, const std::string& what, const std::string& accepted) {
+  throw io::InputError(header.string() + ": " + what + "; accepted: " + accepted);
+}
+
+/// Compiles; the compiler's complaints, or nothing.
+std::string compile(const fs::path& header, const fs::path& source, const fs::path& library) {
+  try {
+    // what C lets pass with a warning would call another function than the one that is meant
+    const io::Finished finished = io::run({"cc", "-O2", "-shared", "-fPIC", "-Werror=implicit-function-declaration",
+                                           "-Werror=incompatible-pointer-types", "-include", header.string(),
+                                           source.string(), "-o", library.string(), "-lm"});
+    return finished.exit_code == 0 ? "" : finished.err + "\n";
+  } catch (const std::system_error& e) {
+    refuse(header, "cannot be compiled: cc: " + e.code().message(), "a C compiler of this name in PATH");
+  }
+}
+
+/// What a compiler complains about first.
+std::string first_error(const fs::path& header, const std::string& complaints) {
+  constexpr std::string_view kMark = "error: ";
+  const std::size_t mark = complaints.find(kMark);
+  const std::size_t begin = mark == std::string::npos ? 0 : complaints.rfind('\n', mark) + 1;
+  std::string line = complaints.substr(begin, complaints.find('\n', begin) - begin);
+  if (line.starts_with(header.string() + ":")) return line;
+  return header.string() +
+         ": does not compile: " + (mark == std::string::npos ? line : line.substr(mark - begin + kMark.size()));
+}
+
+class Header : public Policy {
+ public:
+  using Step = void (*)(const float*, float*);
+  Header(void* library, int observations, int actions, Step step)
+      : Policy(observations, actions), library_(library), step_(step) {}
+  ~Header() override { dlclose(library_); }
+  Header(const Header&) = delete;
+  Header& operator=(const Header&) = delete;
+
+  void act(std::size_t count, const float* observation, float* action) const override {
+    for (std::size_t i = 0; i < count; ++i)
+      step_(observation + i * static_cast<std::size_t>(observations()),
+            action + i * static_cast<std::size_t>(actions()));
+  }
+
+ private:
+  void* library_;
+  Step step_;
+};
+
+std::unique_ptr<const Policy> load_header(const fs::path& path, int observations, int actions) {
+  io::read_text(path);  // or a complaint that names it
+  const fs::path header = fs::absolute(path);
+  const io::TemporaryFolder folder;
+  const fs::path source = folder / "wrapper.c", library = folder / "policy.so";
+  io::write_atomically(source, kWrapper);
+  const std::string complaints = compile(header, source, library);
+  if (!complaints.empty())
+    throw io::InputError(first_error(header, complaints) + "; accepted: a C header that cc compiles");
+
+  void* loaded = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (loaded == nullptr) {
+    std::string why = dlerror();
+    if (why.starts_with(library.string() + ": ")) why.erase(0, library.string().size() + 2);
+    refuse(header, "cannot be loaded: " + why, "a header that defines all it calls");
+  }
+  const auto number = [&](const char* name) { return *static_cast<const int*>(dlsym(loaded, name)); };
+  auto policy = std::make_unique<Header>(loaded, number("flappy_loaded_observations"), number("flappy_loaded_actions"),
+                                         reinterpret_cast<Header::Step>(dlsym(loaded, "flappy_loaded_step")));
+  if (policy->observations() != observations || policy->actions() != actions)
+    refuse(header,
+           "has " + std::to_string(policy->observations()) + " inputs and " + std::to_string(policy->actions()) +
+               " outputs",
+           std::to_string(observations) + " and " + std::to_string(actions) + ", as the task has");
+  const int failed = reinterpret_cast<int (*)()>(dlsym(loaded, "flappy_loaded_selftest"))();
+  if (failed != 0) refuse(header, "fails its self-test: " + std::to_string(failed), "flappy_policy_selftest() of 0");
+  return policy;
+}
+
+}  // namespace
+
+std::unique_ptr<const Policy> load_policy(const fs::path& path, int observations, int actions) {
+  if (path.extension() == ".pt") return load_torch_script(path, observations, actions);
+  if (path.extension() == ".h") return load_header(path, observations, actions);
+  refuse(path, "is no policy", "a TorchScript file (.pt) or a C header (.h)");
+}
+
+#ifndef FLAPPY_HAVE_TORCH
+bool reads_torch_script() { return false; }
+
+std::string torch_script(const PolicyNetwork&, const std::string&) {
+  throw std::invalid_argument("TorchScript is not written by a build without LibTorch");
+}
+
+std::unique_ptr<const Policy> load_torch_script(const fs::path& path, int, int) {
+  io::read_text(path);
+  refuse(path, "cannot be read by this build, which has no LibTorch",
+         "a C header (.h), or a build with libtorch-dev installed");
+}
+#endif
+
+}  // namespace flappy::policy

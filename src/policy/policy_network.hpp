@@ -1,0 +1,30 @@
+// A trained actor as numbers alone, in the order in which they are used. Plain C++17, for what includes LibTorch.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace flappy::policy {
+
+/// action = middle + half tanh(...(clamp((observation - mean) scale, +-clip)))
+struct PolicyNetwork {
+  std::vector<int> widths;  ///< inputs, then outputs of each layer
+  bool relu = true;         ///< hidden layers; else tanh
+  float clip = 0;
+  std::vector<float> mean, scale;   ///< of each input
+  std::vector<float> weights;       ///< of each layer: for every output its bias, then one weight for each input
+  std::vector<float> middle, half;  ///< of each output, in its unit
+
+  int inputs() const { return widths.front(); }
+  int outputs() const { return widths.back(); }
+};
+
+/// Observations and what is to be done upon them, a row for each: float[rows][inputs], float[rows][outputs].
+struct PolicyVectors {
+  int inputs = 0, outputs = 0;
+  std::vector<float> observation, action;
+
+  std::size_t rows() const { return observation.size() / static_cast<std::size_t>(inputs); }
+};
+
+}  // namespace flappy::policy

@@ -1,0 +1,122 @@
+#include "policy/torch_script.hpp"
+
+#include <ATen/Parallel.h>
+#include <torch/script.h>
+
+#include <algorithm>
+#include <sstream>
+#include <string>
+
+#include "io/files.hpp"
+
+namespace flappy::policy {
+namespace {
+
+/// The line of a LibTorch complaint that says why.
+std::string reason(const std::string& complaint) {
+  const std::size_t mark = complaint.rfind("Error: ");
+  const std::size_t begin = mark == std::string::npos ? 0 : mark + 7;
+  return complaint.substr(begin, complaint.find('\n', begin) - begin);
+}
+
+class TorchScript : public Policy {
+ public:
+  TorchScript(const torch::jit::Module& module, int observations, int actions)
+      : Policy(observations, actions), module_(module) {
+    module_.eval();
+  }
+
+  void act(std::size_t count, const float* observation, float* action) const override {
+    const torch::Tensor out = forward(count, observation);
+    if (out.numel() != static_cast<std::int64_t>(count) * actions())
+      throw io::InputError("a TorchScript that makes " + std::to_string(out.numel()) + " numbers of " +
+                           std::to_string(count) + " observations; accepted: " + std::to_string(actions()) +
+                           " of each");
+    std::copy_n(out.data_ptr<float>(), count * static_cast<std::size_t>(actions()), action);
+  }
+
+  torch::Tensor forward(std::size_t count, const float* observation) const {
+    const torch::NoGradGuard no_gradients;
+    const torch::Tensor in = torch::from_blob(const_cast<float*>(observation),
+                                              {static_cast<std::int64_t>(count), observations()}, torch::kFloat);
+    return module_.forward({in}).toTensor().contiguous();
+  }
+
+ private:
+  mutable torch::jit::Module module_;  // forward() is not const, but changes nothing
+};
+
+}  // namespace
+
+bool reads_torch_script() { return true; }
+
+std::string torch_script(const PolicyNetwork& n, const std::string& contract) {
+  const auto tensor = [](const std::vector<float>& numbers) { return torch::tensor(numbers); };
+  torch::jit::Module module("FlappyPolicy");
+  module.register_attribute("contract", torch::jit::StringType::get(), contract);
+  module.register_buffer("mean", tensor(n.mean));
+  module.register_buffer("scale", tensor(n.scale));
+  module.register_buffer("middle", tensor(n.middle));
+  module.register_buffer("half", tensor(n.half));
+  std::ostringstream forward;
+  forward.precision(9);
+  forward << "def forward(self, observation):\n"
+          << "    x = torch.clamp((observation - self.mean) * self.scale, " << -n.clip << ", " << n.clip << ")\n";
+  const float* weights = n.weights.data();
+  for (std::size_t layer = 0; layer + 1 < n.widths.size(); ++layer) {
+    const std::int64_t inputs = n.widths[layer], outputs = n.widths[layer + 1];
+    // for every output its bias, then one weight for each input
+    const torch::Tensor all =
+        torch::from_blob(const_cast<float*>(weights), {outputs, inputs + 1}, torch::kFloat).transpose(0, 1);
+    weights += outputs * (inputs + 1);
+    const std::string number = std::to_string(layer);
+    module.register_parameter("bias" + number, all.select(0, 0).clone(), false);
+    module.register_parameter("weight" + number, all.narrow(0, 1, inputs).clone(torch::MemoryFormat::Contiguous),
+                              false);
+    const bool last = layer + 2 == n.widths.size();
+    forward << "    x = torch." << (n.relu && !last ? "relu" : "tanh") << "(torch.addmm(self.bias" << number
+            << ", x, self.weight" << number << "))\n";
+  }
+  forward << "    action = self.middle + self.half * x\n"
+          << "    refused = torch.isnan(observation).any(1, True)\n"
+          << "    return torch.where(refused, torch.zeros_like(action), action)\n";
+  module.define(forward.str());
+  module.eval();
+  std::ostringstream file;  // a file on disk would hold its own name
+  module.save(file);
+  return file.str();
+}
+
+std::unique_ptr<const Policy> load_torch_script(const std::filesystem::path& path, int observations, int actions) {
+  const auto refuse = [&](const std::string& what, const std::string& accepted) {
+    throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
+  };
+  std::istringstream file(io::read_text(path));
+  at::set_num_threads(1);                       // more of them wait for each other on so few numbers
+  torch::jit::setGraphExecutorOptimize(false);  // the second call gives the bits of the first
+  std::unique_ptr<TorchScript> policy;
+  try {
+    policy = std::make_unique<TorchScript>(torch::jit::load(file), observations, actions);
+  } catch (const std::exception& e) {
+    refuse("is no TorchScript file: " + reason(e.what()), "what torch.jit.save writes");
+  }
+  const std::string sizes =
+      "float[n][" + std::to_string(observations) + "] to float[n][" + std::to_string(actions) + "]";
+  try {
+    const std::vector<float> nothing(2 * static_cast<std::size_t>(observations));
+    const torch::Tensor out = policy->forward(2, nothing.data());
+    if (out.dim() != 2 || out.size(0) != 2 || out.size(1) != actions || out.scalar_type() != torch::kFloat) {
+      std::ostringstream what;
+      what << "makes " << out.scalar_type() << out.sizes() << " of float[2, " << observations << "]";
+      refuse(what.str(), sizes + ", as the task has");
+    }
+  } catch (const io::InputError&) {
+    throw;
+  } catch (const std::exception& e) {
+    refuse("does not take " + std::to_string(observations) + " inputs: " + reason(e.what()),
+           sizes + ", as the task has");
+  }
+  return policy;
+}
+
+}  // namespace flappy::policy

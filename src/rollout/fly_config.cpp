@@ -1,0 +1,237 @@
+#include "rollout/fly_config.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "flappy/vehicle_file.hpp"
+#include "io/sha256.hpp"
+#include "io/toml_writer.hpp"
+#include "model/effects/registry.hpp"
+
+namespace flappy::rollout {
+namespace {
+
+using Overrides = std::vector<std::string>;
+
+const Overrides kFiles = {"vehicle", "task", "sensors", "controller", "randomisation"};
+
+/// Overrides by whom they are for: an included file, or "" for the configuration itself.
+std::map<std::string, Overrides> routed(const Overrides& overrides) {
+  std::map<std::string, Overrides> to;
+  for (const std::string& text : overrides) {
+    const std::size_t begin = std::min(text.find_first_not_of(" \t"), text.size());
+    const std::size_t dot = text.find_first_of(".=", begin);
+    const std::string first = text.substr(begin, dot - begin);
+    const bool passed_on = dot != std::string::npos && text[dot] == '.' && std::ranges::count(kFiles, first) > 0;
+    if (passed_on) to[first].push_back(text.substr(dot + 1));
+    else to[""].push_back(text);
+  }
+  return to;
+}
+
+/// Runs `read`; a complaint about an override that was passed on names it as its user wrote it.
+template <class Read>
+auto for_file(const std::string& name, const Read& read) {
+  try {
+    return read();
+  } catch (const io::InputError& e) {
+    const std::string line = e.what(), start = "--set ";
+    throw io::InputError(line.starts_with(start) ? start + name + "." + line.substr(start.size()) : line);
+  }
+}
+
+sim::World read_world(const io::Table& root) {
+  constexpr io::Range kPlace{-1e4, 1e4};
+  sim::World w;
+  const auto table = root.optional_table("world");
+  if (!table) return w;
+  w.gravity_m_s2 = table->number_or("gravity_m_s2", w.gravity_m_s2, {0, 100});
+  w.ground_z_m = table->number_or("ground_z_m", w.ground_z_m, kPlace);
+  w.ceiling_z_m = table->number_or("ceiling_z_m", w.ceiling_z_m, kPlace);
+  if (w.ceiling_z_m <= w.ground_z_m)
+    table->fail("ceiling_z_m", "is not above the ground", "a ceiling above ground_z_m");
+  if (!table->has("walls")) return w;
+  for (const auto& row : table->rows("walls", 4, kPlace)) {
+    const double length = std::sqrt(row[2] * row[2] + row[3] * row[3]);
+    if (std::abs(length - 1) > 1e-3)
+      table->fail("walls",
+                  "normal of wall " + std::to_string(w.walls.size()) + " has length " + io::shortest_digits(length),
+                  "[x_m, y_m, normal_x, normal_y], the normal of length 1");
+    w.walls.push_back({row[0], row[1], row[2] / length, row[3] / length});
+  }
+  return w;
+}
+
+LogOptions read_log(const io::Table& root, double control_hz) {
+  const io::Range rate = io::positive(control_hz), noise = io::non_negative(10);
+  LogOptions log;
+  if (const auto t = root.optional_table("log.power"))
+    log.power = {t->number("battery_nominal_V", io::positive(100)), t->number("rate_hz", rate),
+                 t->number("latency_s", noise), t->number("voltage_noise_V", noise),
+                 t->number("current_noise_A", noise)};
+  if (const auto t = root.optional_table("log.wings"))
+    log.wings = {t->number("rate_hz", rate), t->number("noise_rad", io::non_negative(1))};
+  return log;
+}
+
+bool whole(double number) { return number > 0.5 && std::abs(number - std::round(number)) < 1e-6; }
+
+/// An actor sees and does what it was trained for.
+std::shared_ptr<const policy::Actor> fitting_actor(const io::Table& root, const flight::Task& task) {
+  auto actor = std::make_shared<const policy::Actor>(policy::read_actor(root.file("actor")));
+  const auto check = [&](const char* does, const std::vector<std::string>& has,
+                         const std::vector<flight::Signal>& wanted) {
+    std::string list;
+    for (const flight::Signal& s : wanted) list += (list.empty() ? "" : ", ") + s.name;
+    if (!std::ranges::equal(has, wanted, {}, {}, &flight::Signal::name))
+      root.fail("actor", std::string(does) + " something else than task " + io::toml_string(task.name), list);
+  };
+  check("observes", actor->observation, task.observation());
+  check("does", actor->action, task.action());
+  return actor;
+}
+
+class Reader {
+ public:
+  Reader(const std::filesystem::path& path, const Overrides& overrides)
+      : to_(routed(overrides)), main_(io::Config::load(path, to_[""])), root_(main_.root()) {}
+
+  FlyConfig read() {
+    root_.integer("schema", 1, 1);
+    c_.precision = root_.choice("precision", {"float", "double"});
+    read_flight();
+    c_.fleet.batch.world = read_world(root_);
+    c_.excitation = flight::read_excitation(root_, c_.duration_s);
+    c_.log = read_log(root_, c_.fleet.control_hz);
+    read_files();
+    if (root_.has("actor")) c_.actor = fitting_actor(root_, c_.fleet.task);
+    root_.finish();
+    if (c_.welded && c_.fleet.task.start.settled)
+      root_.fail("flight.support",
+                 "is \"welded\", but task " + io::toml_string(c_.fleet.task.name) + " starts from hover", "\"task\"");
+    check_times();
+    keep_texts();
+    return std::move(c_);
+  }
+
+ private:
+  void read_flight() {
+    const io::Table t = root_.table("flight");
+    c_.duration_s = t.number("duration_s", io::positive(1e5));
+    c_.settle_s = t.number_or("settle_s", 3, io::non_negative(1e5));
+    c_.fleet.seed = static_cast<std::uint64_t>(t.integer("seed", 0, INT64_MAX));
+    c_.fleet.first_flapper = static_cast<std::uint32_t>(t.integer_or("first_flapper", 0, 0, 1'000'000'000));
+    c_.fleet.control_hz = t.number_or("control_hz", 500, {10, 10000});
+    c_.fleet.batch.step_s = t.number_or("step_s", 1e-4, {1e-6, 1e-3});
+    c_.fleet.batch.threads = static_cast<int>(t.integer_or("threads", 0, 0, 1024));
+    const std::string support = t.string_or("support", "task");
+    if (support != "task" && support != "welded")
+      t.fail("support", io::toml_string(support) + " is not known", "\"task\", \"welded\"");
+    c_.welded = support == "welded";
+  }
+
+  /// A file that the configuration names, its overrides applied.
+  io::Config file(const std::string& key) {
+    const std::filesystem::path path = root_.file(key);
+    return for_file(key, [&] {
+      io::Config config = io::Config::load(path, to_[key]);
+      files_.emplace(key, config);
+      return config;
+    });
+  }
+
+  void read_files() {
+    const std::filesystem::path vehicle = root_.file("vehicle");
+    c_.vehicle = for_file("vehicle", [&] { return model::read_vehicle(vehicle, to_["vehicle"]); });
+    const io::Config vehicle_config = file("vehicle");
+    c_.vehicle_file_name = vehicle.filename().string();
+    const bool as_filed = to_["vehicle"].empty();
+    c_.vehicle_text = as_filed ? io::read_text(vehicle) : vehicle_config.resolved();
+    if (as_filed) c_.vehicle_sha256 = io::sha256(c_.vehicle_text);
+    const auto read = [&](const std::string& key, const auto& reader) {
+      const io::Config config = file(key);
+      return for_file(key, [&] { return reader(config.root()); });
+    };
+    c_.fleet.task = read("task", [&](const io::Table& t) { return flight::read_task(t, 1 / c_.fleet.control_hz); });
+    c_.fleet.sensors = read("sensors", flight::read_sensors);
+    c_.fleet.controller = read("controller", flight::read_controller);
+    if (root_.has("randomisation") && root_.string("randomisation") == "posterior") {
+      if (!c_.vehicle.posterior)
+        root_.fail("randomisation", "the vehicle has no [posterior]",
+                   "a file of [[randomise]] tables, or a vehicle that flappy-gap corrected");
+      if (!to_["randomisation"].empty())
+        root_.fail("randomisation", "is \"posterior\", but overridden", "a file of [[randomise]] tables");
+      c_.randomisation = sim::Randomisation::of_posterior(c_.vehicle);
+      c_.vehicle_sha256.clear();
+    } else if (root_.has("randomisation")) {
+      c_.randomisation =
+          read("randomisation", [&](const io::Table& t) { return sim::read_randomisation(c_.vehicle, t); });
+      c_.vehicle_sha256.clear();
+    } else if (!to_["randomisation"].empty()) {
+      root_.fail("randomisation", "is missing, but overridden", "a file of [[randomise]] tables");
+    }
+  }
+
+  void check_times() const {
+    const flight::FleetOptions& o = c_.fleet;
+    const double step = o.batch.step_s;
+    if (!whole(1 / (o.control_hz * step)))
+      root_.fail("flight.control_hz", "its period is no whole number of steps", "1 / (n step_s)");
+    if (!whole(c_.vehicle.driver.hold_s / step))
+      root_.fail("flight.step_s",
+                 "does not divide the driver's hold of " + io::shortest_digits(c_.vehicle.driver.hold_s) + " s",
+                 "hold_s / n");
+    for (const double rate : {o.sensors.imu.rate_hz, o.sensors.mocap.rate_hz})
+      if (rate * step > 1 + 1e-9)
+        root_.fail("flight.step_s",
+                   "is longer than the " + io::shortest_digits(1 / rate) + " s between samples of a sensor",
+                   "a shorter step, or a slower sensor");
+    const char* const delay = model::CommandDelay::kInfo.id;
+    if (const auto found = c_.vehicle.effects.find(delay); found != c_.vehicle.effects.end()) {
+      constexpr int kKept = model::CommandDelay::kSlots - 2;
+      const auto e = static_cast<std::size_t>(model::effect_index(delay));
+      const double late_s = model::effects()[e].values(found->second)[0];
+      if (late_s > kKept * step)
+        root_.fail("flight.step_s",
+                   "is too short for a command_delay of " + io::shortest_digits(late_s) + " s, of which " +
+                       std::to_string(kKept) + " steps are kept",
+                   "a longer step, or a shorter delay");
+    }
+  }
+
+  void keep_texts() {
+    Overrides names;
+    for (const auto& [key, config] : files_) {
+      c_.resolved[key + ".toml"] = config.resolved();
+      names.push_back(key + "=" + key + ".toml");
+    }
+    // the file of a path goes along
+    const io::Table task = files_.at("task").root();
+    if (task.has("path.file")) {
+      const std::filesystem::path csv = task.file("path.file");
+      const std::string name = csv.filename().string();
+      c_.resolved[name] = io::read_text(csv);
+      c_.resolved["task.toml"] =
+          io::Config::parse(c_.resolved["task.toml"], "task.toml", {"path.file=" + io::toml_string(name)}).resolved();
+    }
+    c_.resolved["fly.toml"] = io::Config::parse(main_.resolved(), "fly.toml", names).resolved();
+  }
+
+  std::map<std::string, Overrides> to_;
+  io::Config main_;
+  io::Table root_;
+  std::map<std::string, io::Config> files_;
+  FlyConfig c_;
+};
+
+}  // namespace
+
+model::Vehicle FlyConfig::vehicle_of(std::uint32_t flapper) const {
+  return randomisation ? randomisation->sample({.seed = fleet.seed, .flapper = flapper}) : vehicle;
+}
+
+FlyConfig read_fly_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  return Reader(path, overrides).read();
+}
+
+}  // namespace flappy::rollout

@@ -1,0 +1,185 @@
+#include "rollout/outcome.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "model/math.hpp"
+#include "rollout/flight_score.hpp"
+#include "sim/storage.hpp"
+
+namespace flappy::rollout {
+namespace {
+
+using flight::Motion;
+using flight::Target;
+
+constexpr double kTick = 1e-6;  // of times that are whole control ticks: what rounding may have moved them by
+
+double length(const double (&a)[3], const double (&b)[3] = {0, 0, 0}) {
+  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+  return std::sqrt(x * x + y * y + z * z);
+}
+
+/// The true state as it is judged, relative to the set point.
+struct Seen {
+  double distance_m, speed_m_s, body_rate_rad_s, upright;  // upright: cosine of tilt
+  double facing, aside;  // the body's x axis on the level, from the set point's heading
+  double heading_cos() const { return facing / std::sqrt(std::max(facing * facing + aside * aside, 1e-12)); }
+};
+
+Seen seen(const Motion& m, const Target& goal) {
+  const auto& [w, x, y, z] = m.attitude;
+  const double r00 = 1 - 2 * (y * y + z * z), r10 = 2 * (x * y + w * z);
+  return {length(m.position_m, goal.position_m),
+          length(m.velocity_m_s, goal.velocity_m_s),
+          length(m.body_rate_rad_s),
+          1 - 2 * (x * x + y * y),
+          goal.heading_cos * r00 + goal.heading_sin * r10,
+          goal.heading_cos * r10 - goal.heading_sin * r00};
+}
+
+/// An angle over its limit, as cosines: 1 at the limit, and about in proportion.
+double angle_share(double cos, double limit_cos) { return std::sqrt(std::max(0.0, 1 - cos) / (1 - limit_cos)); }
+
+std::size_t largest(std::span<const double> list) {
+  return static_cast<std::size_t>(std::ranges::max_element(list) - list.begin());
+}
+
+Spread spread(const std::vector<double>& list) {
+  return {rollout::quantile(list, 0.1), rollout::quantile(list, 0.5), rollout::quantile(list, 0.9)};
+}
+
+}  // namespace
+
+const char* name_of(Failure failure) {
+  static constexpr const char* kNames[kFailures] = {"none",          "not_finite", "crashed",
+                                                    "out_of_bounds", "too_late",   "never_captured",
+                                                    "lost_position", "lost_tilt",  "lost_heading"};
+  return kNames[static_cast<std::size_t>(failure)];
+}
+
+const char* name_of(Demand demand) {
+  static constexpr const char* kNames[kDemands] = {"distance", "speed", "body_rate", "tilt", "heading"};
+  return kNames[static_cast<std::size_t>(demand)];
+}
+
+bool Outcome::success() const {
+  return captured_s > 0 && lost_s == 0 && status == 0 && (ended & ~std::uint32_t{flight::kTimeOut}) == 0;
+}
+
+Follower::Follower(const flight::Task& task, const Motion& start, const Target& goal)
+    : success_(task.constants.success) {
+  const double far = length(goal.position_m, start.position_m);
+  for (int i = 0; i < 3; ++i) way_[i] = far > 0 ? (goal.position_m[i] - start.position_m[i]) / far : 0;
+}
+
+void Follower::see(const Motion& truth, const Target& goal, double t_s, const Outcome& so_far) {
+  const Seen s = seen(truth, goal);
+  const flight::Success<double>& k = success_;
+  position_error_m_ = s.distance_m;
+  facing_ = s.facing, aside_ = s.aside;
+  if (strict_s_ == 0 && s.distance_m < kStrictDistance_m && s.speed_m_s < kStrictSpeed_m_s &&
+      s.body_rate_rad_s < kStrictBodyRate_rad_s && s.upright > kStrictCos && s.heading_cos() > kStrictCos)
+    strict_s_ = t_s;
+
+  const bool captured = so_far.captured_s > 0, in_time = t_s < k.by_s + kTick;
+  if (!captured && in_time) {
+    const double shares[kDemands] = {s.distance_m / k.distance_m, s.speed_m_s / k.speed_m_s,
+                                     s.body_rate_rad_s / k.body_rate_rad_s, angle_share(s.upright, k.tilt_cos),
+                                     angle_share(s.heading_cos(), k.heading_cos)};
+    const std::size_t worst = largest(shares);
+    if (shares[worst] < least_) least_ = shares[worst], missing_ = static_cast<Demand>(worst);
+  }
+  // how far beyond the goal it went, along the way from its start, between first capture and where it must have stopped
+  if (captured && t_s < k.keep_from_s + kTick) {
+    double beyond = 0;
+    for (int i = 0; i < 3; ++i) beyond += way_[i] * (truth.position_m[i] - goal.position_m[i]);
+    overshoot_m_ = std::max(overshoot_m_, beyond);
+  }
+
+  if (failure_ != Failure::none) return;
+  constexpr std::uint32_t kLate = flight::kHeadingLate | flight::kArrivalLate;
+  if ((so_far.status & sim::kFrozen) != 0) failure_ = Failure::not_finite;
+  else if (so_far.status != 0) failure_ = Failure::crashed;
+  else if ((so_far.ended & flight::kOutOfBounds) != 0) failure_ = Failure::out_of_bounds;
+  else if ((so_far.ended & kLate) != 0) failure_ = Failure::too_late;
+  else if (!captured && !in_time) failure_ = Failure::never_captured;
+  else if (so_far.lost_s > 0) {
+    const double shares[] = {s.distance_m / k.keep_distance_m, angle_share(s.upright, k.keep_tilt_cos),
+                             angle_share(s.heading_cos(), k.keep_heading_cos)};
+    failure_ = static_cast<Failure>(static_cast<std::size_t>(Failure::lost_position) + largest(shares));
+  }
+}
+
+bool Follower::manoeuvring(double t_s) const { return !handed_back_ && t_s < success_.by_s + kTick; }
+
+void Follower::spend(double energy_J, double period_s, bool handed_back) {
+  energy_J_ += energy_J;
+  manoeuvre_s_ += period_s;
+  handed_back_ = handed_back;
+}
+
+void Follower::finish(Outcome& outcome) const {
+  outcome.failure = failure_ == Failure::none && outcome.captured_s == 0 ? Failure::never_captured : failure_;
+  outcome.missing = missing_;
+  outcome.strict_s = strict_s_;
+  outcome.overshoot_m = overshoot_m_;
+  outcome.position_error_m = position_error_m_;
+  outcome.heading_error_rad = std::abs(model::atan2(aside_, facing_));
+  outcome.energy_J = energy_J_;
+  outcome.manoeuvre_s = manoeuvre_s_;
+}
+
+Rate rate_of(std::size_t successes, std::size_t flights) {
+  if (flights == 0) return {};
+  constexpr double kZ = 1.959963984540054, kZ2 = kZ * kZ;  // 97.5 % of a normal number
+  const auto n = static_cast<double>(flights);
+  const double p = static_cast<double>(successes) / n;
+  const double middle = (p + kZ2 / (2 * n)) / (1 + kZ2 / n);
+  const double half = kZ / (1 + kZ2 / n) * std::sqrt(p * (1 - p) / n + kZ2 / (4 * n * n));
+  return {p, successes == 0 ? 0 : middle - half, successes == flights ? 1 : middle + half};
+}
+
+Summary summarise(std::span<const Outcome> flights) {
+  Summary s;
+  s.flights = flights.size();
+  std::size_t successes = 0, strict = 0;
+  std::vector<double> capture, strict_s, overshoot, position, heading, energy, power;
+  for (const Outcome& o : flights) {
+    successes += o.success();
+    strict += o.strict_s > 0;
+    if (o.captured_s > 0) {
+      capture.push_back(o.captured_s);
+      overshoot.push_back(o.overshoot_m);
+    } else {
+      ++s.missing[static_cast<std::size_t>(o.missing)];
+    }
+    strict_s.push_back(o.strict_s > 0 ? o.strict_s : std::numeric_limits<double>::infinity());
+    position.push_back(o.position_error_m);
+    heading.push_back(o.heading_error_rad);
+    energy.push_back(o.energy_J);
+    if (o.manoeuvre_s > 0) power.push_back(o.energy_J / o.manoeuvre_s);
+    ++s.failures[static_cast<std::size_t>(o.failure)];
+    for (const double x : {o.captured_s, o.lost_s, o.strict_s, o.overshoot_m, o.position_error_m, o.heading_error_rad,
+                           o.energy_J, o.manoeuvre_s})
+      s.hash = sim::mixed(s.hash, sim::bits_of(x));
+    for (const std::uint64_t word :
+         {std::uint64_t{o.status}, std::uint64_t{o.ended}, static_cast<std::uint64_t>(o.failure),
+          static_cast<std::uint64_t>(o.missing), o.hash})
+      s.hash = sim::mixed(s.hash, word);
+  }
+  s.success = rate_of(successes, s.flights);
+  s.captured = rate_of(capture.size(), s.flights);
+  s.strict = rate_of(strict, s.flights);
+  s.capture_s = spread(capture);
+  s.strict_s = spread(strict_s);
+  s.overshoot_m = spread(overshoot);
+  s.position_error_m = spread(position);
+  s.heading_error_rad = spread(heading);
+  s.energy_J = spread(energy);
+  s.power_W = spread(power);
+  return s;
+}
+
+}  // namespace flappy::rollout

@@ -1,0 +1,353 @@
+#include "rollout/recorder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "model/math.hpp"
+#include "model/wing_beat.hpp"
+#include "sim/lanes.hpp"
+#include "sim/storage.hpp"
+
+namespace flappy::rollout {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// Without the last digits that sums of steps leave.
+double tidy(double t_s) { return std::round(t_s * 1e9) / 1e9; }
+
+/// What every truth has, and what holds the flapper: 0 nothing, 1 the ground, 2 it is welded.
+const std::vector<std::string> kTruthNames = [] {
+  std::vector<std::string> names = flightlog::kMotionNames;
+  names.emplace_back("support");
+  return names;
+}();
+
+/// Samples of a stream that the control ticks take: each at the first tick at or after its time.
+class TickSampler {
+ public:
+  explicit TickSampler(double rate_hz) : rate_hz_(rate_hz) {}
+  bool due(double t_s) {
+    if (t_s < static_cast<double>(count_) / rate_hz_ - 1e-9) return false;
+    ++count_;
+    return true;
+  }
+  /// Of normal numbers, each sample's own.
+  std::uint32_t first_index() const { return 4 * (count_ - 1); }
+
+ private:
+  double rate_hz_;
+  std::uint32_t count_ = 0;
+};
+
+}  // namespace
+
+template <class T>
+std::vector<DriverUpdate> driver_updates(flight::Fleet<T>& fleet, std::size_t i) {
+  using L = model::Lanes<T, 1>;  // rounds and fuses as the kernels do
+  auto& body = fleet.batch().storage();
+  const auto [block, lane] = body.at(i);
+  const auto drive = sim::get<sim::Drive<double>>(block.drive, lane);
+  const auto parameters = sim::get<model::Parameters<double>>(block.parameters, lane);
+  const auto& in = drive.input;
+  const auto& limit = drive.limit;
+  const auto clip = [](double value, double low, double high) { return model::clamp(value, low, high); };
+  const sim::Input u{
+      clip(in.amplitude_V, 0, limit.amplitude_V), clip(in.difference_V, -limit.difference_V, limit.difference_V),
+      clip(in.bias_V, -limit.bias_V, limit.bias_V), clip(in.split_cycle, -limit.split_cycle, limit.split_cycle)};
+  const model::WingBeat<L> beat{L(u.amplitude_V), L(u.difference_V), L(u.bias_V), L(u.split_cycle)};
+
+  const auto steps = static_cast<std::int64_t>(std::lround(fleet.period_s() / body.step_s));
+  std::vector<DriverUpdate> list;
+  const auto every = static_cast<std::int64_t>(body.steps_per_update);
+  for (std::int64_t step = (body.steps - steps + every - 1) / every * every; step < body.steps; step += every)
+    list.push_back({step, 0, u, 0, 0});
+  std::uint32_t phase = block.phase[lane];
+  for (std::size_t k = list.size(); k-- > 0;) {
+    list[k].phase = phase -= block.phase_per_update[lane];
+    const L fraction(static_cast<double>(model::beat_fraction<T>(phase)));
+    list[k].left_V = model::wing_beat_voltage<+1>(beat, fraction, L(parameters.left.voltage_limit_V)).raw[0];
+    list[k].right_V = model::wing_beat_voltage<-1>(beat, fraction, L(parameters.right.voltage_limit_V)).raw[0];
+  }
+  return list;
+}
+template std::vector<DriverUpdate> driver_updates(flight::Fleet<float>&, std::size_t);
+template std::vector<DriverUpdate> driver_updates(flight::Fleet<double>&, std::size_t);
+
+flightlog::ImuHeader imu_header(const flight::ImuSensor& imu) {
+  const double interval_s = 1 / imu.rate_hz, share = flight::low_pass_share(imu.low_pass_hz, interval_s),
+               past = 1 - share;
+  const auto passes = [&](double hz) {
+    const double x = kPi * hz * interval_s;
+    return model::sin_cos_wide(x).sin / x * share /
+           std::sqrt(1 - 2 * past * model::sin_cos_wide(2 * x).cos + past * past);
+  };
+  double low = 0, high = imu.rate_hz;  // nothing passes at the rate itself
+  for (int i = 0; i < 100; ++i) {
+    const double middle = (low + high) / 2;
+    (passes(middle) > std::numbers::sqrt2 / 2 ? low : high) = middle;
+  }
+  const double lag_s = interval_s / 2 + low_pass_lag_s(imu);
+  flightlog::ImuHeader h;
+  h.rate_hz = imu.rate_hz;
+  h.bandwidth_hz = high;
+  h.latency_s = std::max(0.0, imu.latency_s + lag_s - 1 / (2 * kPi * high));
+  h.position_m = {imu.position_m.x, imu.position_m.y, imu.position_m.z};
+  h.gyro_noise_rad_s = imu.gyro_noise_rad_s;
+  h.gyro_bias_sd_rad_s = {imu.gyro_bias_sd_rad_s.x, imu.gyro_bias_sd_rad_s.y, imu.gyro_bias_sd_rad_s.z};
+  h.accel_noise_m_s2 = imu.accel_noise_m_s2;
+  return h;
+}
+
+template <class T>
+struct Recorder<T>::Storage {
+  flight::Fleet<T>& fleet;
+  std::size_t flapper;
+  sim::RandomKey key;
+  flightlog::FlightLog log;
+  std::vector<flightlog::Column> truth = std::vector<flightlog::Column>(kTruthNames.size());
+  TickSampler power{0}, wings{0};
+  // at the last control tick
+  sim::FlapperState state;
+  double held_V[2] = {0, 0};
+  struct {
+    sim::Block<T> block;
+    std::vector<T> effect_states;
+  } metered;  // where power.csv is asked for
+  double step_hz;
+
+  Storage(const FlyConfig& config, flight::Fleet<T>& f, std::size_t i, const model::Vehicle& vehicle)
+      : fleet(f), flapper(i) {
+    const flight::FleetOptions& o = f.options();
+    key = {o.seed, o.first_flapper + static_cast<std::uint32_t>(i), 0, sim::Stream::power};
+    step_hz = 1 / o.batch.step_s;
+    if (std::abs(step_hz - std::round(step_hz)) < 1e-6) step_hz = std::round(step_hz);
+    flightlog::FlightHeader& h = log.header;
+    h.vehicle = config.vehicle_file_name;
+    h.vehicle_sha256 = config.vehicle_sha256;
+    h.flapping_Hz = vehicle.driver.flapping_Hz;
+    h.gravity_m_s2 = o.batch.world.gravity_m_s2;
+    h.ambient = {config.vehicle.air_density_kg_m3, o.batch.world.ground_z_m, o.batch.world.ceiling_z_m, {}};
+    for (const sim::Wall& w : o.batch.world.walls) h.ambient.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
+    const flight::MocapSensor& m = o.sensors.mocap;
+    h.mocap = {m.rate_hz, m.latency_s, m.position_noise_m, m.attitude_noise_rad};
+    h.imu = imu_header(o.sensors.imu);
+    h.power = config.log.power;
+    h.wings = config.log.wings;
+    log.command.inputs.emplace();
+    log.command.phase_rad.emplace();
+    if (h.power) log.power.emplace(), power = TickSampler(h.power->rate_hz);
+    if (h.wings) log.wings.emplace(), wings = TickSampler(h.wings->rate_hz);
+    if (h.power) {  // a meter needs the rows of effects, whatever is in force
+      f.batch().storage().keep_effects(0);
+      f.batch().storage().put_effect_rows(i, vehicle);
+    }
+    look();
+    add_truth(time_s(f.batch().storage().steps));
+  }
+
+  void look() {
+    state = fleet.batch().state(flapper);
+    if (!log.power) return;
+    auto& body = fleet.batch().storage();
+    const std::size_t block = flapper / sim::kLanes<T>;
+    const T* states = body.effects_of(block).states;
+    metered.block = body.blocks[block];
+    metered.effect_states.assign(states, states + body.state_size());
+  }
+
+  double time_s(std::int64_t step) const { return static_cast<double>(step) / step_hz; }
+
+  void add_truth(double t_s) {
+    const sim::FlapperState& s = state;
+    const flight::Motion body = fleet.truth(flapper);
+    const auto bias = fleet.gyro_bias_rad_s(flapper);
+    const auto& [p, q, v, w] = body;
+    const double row[] = {t_s,
+                          p[0],
+                          p[1],
+                          p[2],
+                          q[0],
+                          q[1],
+                          q[2],
+                          q[3],
+                          v[0],
+                          v[1],
+                          v[2],
+                          w[0],
+                          w[1],
+                          w[2],
+                          s.stroke_rad[0],
+                          s.rotation_rad[0],
+                          s.stroke_rad[1],
+                          s.rotation_rad[1],
+                          s.stroke_rate_rad_s[0],
+                          s.rotation_rate_rad_s[0],
+                          s.stroke_rate_rad_s[1],
+                          s.rotation_rate_rad_s[1],
+                          bias[0],
+                          bias[1],
+                          bias[2],
+                          static_cast<double>(fleet.batch().support(flapper))};
+    for (std::size_t k = 0; k < truth.size(); ++k) truth[k].push_back(row[k]);
+  }
+
+  void add_command(const DriverUpdate& u) {
+    flightlog::CommandStream& c = log.command;
+    c.t_s.push_back(time_s(u.step));
+    c.left_voltage_V.push_back(u.left_V);
+    c.right_voltage_V.push_back(u.right_V);
+    c.inputs->amplitude_V.push_back(u.input.amplitude_V);
+    c.inputs->difference_V.push_back(u.input.difference_V);
+    c.inputs->bias_V.push_back(u.input.bias_V);
+    c.inputs->split_cycle.push_back(u.input.split_cycle);
+    c.phase_rad->push_back(2 * kPi * 0x1p-32 * u.phase);
+    held_V[0] = u.left_V;
+    held_V[1] = u.right_V;
+  }
+
+  double normal(sim::Stream stream, std::uint32_t index) {
+    key.stream = stream;
+    return sim::normal(key, index);
+  }
+
+  /// Of the state at the start of a period and the voltages from then on, as the command's times have them: what a meter in the
+  /// first physics step reads, which a copy takes once more.
+  void add_power(double t_s) {
+    const flightlog::PowerHeader& h = *log.header.power;
+    if (!power.due(t_s)) return;
+    const std::uint32_t n = power.first_index();
+    auto& body = fleet.batch().storage();
+    constexpr std::size_t kLanes = sim::kLanes<T>;
+    const std::size_t lane = flapper % kLanes;
+    T voltages_V[2 * kLanes] = {}, meter[sim::kMeterRows * kLanes];
+    for (std::size_t side = 0; side < 2; ++side) voltages_V[side * kLanes + lane] = static_cast<T>(held_V[side]);
+    sim::BlockEffects<T> in_force = body.effects_of(flapper / kLanes);
+    in_force.states = metered.effect_states.data();
+    in_force.voltages_V = voltages_V;
+    in_force.meter = meter;
+    sim::StepPlan plan = body.plan();
+    plan.steps_per_update = 1;
+    body.kernel(metered.block, in_force, plan, 0, 1, nullptr);
+    const auto noisy = [&](double value, double sd, std::uint32_t k) {
+      return value + sd * normal(sim::Stream::power, n + k);
+    };
+    log.power->t_s.push_back(tidy(t_s + h.latency_s));
+    log.power->battery_V.push_back(noisy(h.battery_nominal_V * static_cast<double>(meter[lane]), h.voltage_noise_V, 0));
+    log.power->left_current_A.push_back(noisy(static_cast<double>(meter[kLanes + lane]), h.current_noise_A, 1));
+    log.power->right_current_A.push_back(noisy(static_cast<double>(meter[2 * kLanes + lane]), h.current_noise_A, 2));
+  }
+
+  void add_wings(double t_s) {
+    if (!wings.due(t_s)) return;
+    const std::uint32_t n = wings.first_index();
+    const auto seen = [&](double angle, std::uint32_t k) {
+      return angle + log.header.wings->noise_rad * normal(sim::Stream::wings, n + k);
+    };
+    flightlog::WingsStream& w = *log.wings;
+    w.t_s.push_back(t_s);
+    w.left_stroke_rad.push_back(seen(state.stroke_rad[0], 0));
+    w.left_rotation_rad.push_back(seen(state.rotation_rad[0], 1));
+    w.right_stroke_rad.push_back(seen(state.stroke_rad[1], 2));
+    w.right_rotation_rad.push_back(seen(state.rotation_rad[1], 3));
+  }
+
+  void record() {
+    const std::int64_t end = fleet.batch().storage().steps;
+    const std::int64_t begin = end - std::lround(fleet.period_s() * step_hz);
+    bool sampled = false;
+    const auto sample_tick = [&] {
+      if (!std::exchange(sampled, true) && log.power) add_power(time_s(begin));
+    };
+    for (const DriverUpdate& u : driver_updates(fleet, flapper)) {
+      if (u.step > begin) sample_tick();
+      add_command(u);
+      sample_tick();
+    }
+    sample_tick();
+    if (log.wings) add_wings(time_s(begin));
+
+    look();
+    add_truth(time_s(end));
+    for (const auto& s : fleet.imu_samples(flapper)) {
+      flightlog::ImuStream& imu = log.imu;
+      imu.t_s.push_back(tidy(s.arrival_s));
+      imu.gyro_x_rad_s.push_back(s.gyro_rad_s[0]);
+      imu.gyro_y_rad_s.push_back(s.gyro_rad_s[1]);
+      imu.gyro_z_rad_s.push_back(s.gyro_rad_s[2]);
+      imu.accel_x_m_s2.push_back(s.accel_m_s2[0]);
+      imu.accel_y_m_s2.push_back(s.accel_m_s2[1]);
+      imu.accel_z_m_s2.push_back(s.accel_m_s2[2]);
+    }
+    for (const auto& s : fleet.mocap_samples(flapper)) {
+      if (!s.valid) continue;
+      flightlog::MocapStream& m = log.mocap;
+      m.t_s.push_back(tidy(s.arrival_s));
+      m.x_m.push_back(s.position_m[0]);
+      m.y_m.push_back(s.position_m[1]);
+      m.z_m.push_back(s.position_m[2]);
+      m.qw.push_back(s.attitude[0]);
+      m.qx.push_back(s.attitude[1]);
+      m.qy.push_back(s.attitude[2]);
+      m.qz.push_back(s.attitude[3]);
+    }
+  }
+
+  /// Whether every stream has two samples, and all of them some time in common.
+  bool complete() const {
+    std::vector<const flightlog::Column*> times = {&log.command.t_s, &log.mocap.t_s, &log.imu.t_s};
+    if (log.power) times.push_back(&log.power->t_s);
+    if (log.wings) times.push_back(&log.wings->t_s);
+    double from = 0, to = 1e300;
+    for (const flightlog::Column* t : times) {
+      if (t->size() < 2) return false;
+      from = std::max(from, t->front());
+      to = std::min(to, t->back());
+    }
+    return from < to;
+  }
+};
+
+template <class T>
+Recorder<T>::Recorder(const FlyConfig& config, flight::Fleet<T>& fleet, std::size_t i, const model::Vehicle& vehicle)
+    : storage_(std::make_unique<Storage>(config, fleet, i, vehicle)) {}
+template <class T>
+Recorder<T>::~Recorder() = default;
+template <class T>
+Recorder<T>::Recorder(Recorder&&) noexcept = default;
+template <class T>
+Recorder<T>& Recorder<T>::operator=(Recorder&&) noexcept = default;
+
+template <class T>
+void Recorder<T>::record() {
+  storage_->record();
+}
+
+template <class T>
+std::optional<flightlog::FlightLog> Recorder<T>::log() const {
+  if (!storage_->complete()) return {};
+  return storage_->log;
+}
+
+template <class T>
+bool Recorder<T>::write(const std::filesystem::path& folder) const {
+  if (!storage_->complete()) return false;
+  write_flight_log(folder, storage_->log);
+  flightlog::write_truth(folder, kTruthNames, storage_->truth);
+  return true;
+}
+
+template <class T>
+double Recorder<T>::bytes_per_s(const FlyConfig& c) {
+  const flight::FleetOptions& o = c.fleet;
+  const double numbers = 8 / c.vehicle.driver.hold_s + 7 * o.sensors.imu.rate_hz + 8 * o.sensors.mocap.rate_hz +
+                         static_cast<double>(kTruthNames.size() + 9) * o.control_hz;
+  return 2 * sizeof(double) * numbers;  // vectors grow by doubling
+}
+
+template class Recorder<float>;
+template class Recorder<double>;
+
+}  // namespace flappy::rollout

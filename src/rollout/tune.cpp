@@ -1,0 +1,168 @@
+#include "rollout/tune.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <numbers>
+#include <pagmo/algorithm.hpp>
+#include <pagmo/algorithms/cmaes.hpp>
+#include <pagmo/population.hpp>
+#include <pagmo/problem.hpp>
+
+#include "rollout/flight_score.hpp"
+
+namespace flappy::rollout {
+namespace {
+
+constexpr int kLook = 5;             // control periods between looks
+constexpr double kReach = 3;         // gains stay within e^+-3 of where they start
+constexpr double kFirstStep = 0.05;  // of the whole range 2 kReach: 0.3
+
+struct Score {
+  double farthest_m = 0, strayed_at = -1;
+  double sum = 0, yaw = 0;
+  int settled = 0;
+};
+
+double square(double x) { return x * x; }
+
+void look(Score& s, const flight::Motion& m, const flight::Target& t, double done, bool settled) {
+  if (s.strayed_at >= 0) return;
+  const auto [roll, pitch, yaw, x, y, z] = errors_of(m, t);
+  const double distance = std::hypot(x, y, z);
+  if (!(distance <= kFarAway_m)) {
+    s.strayed_at = done;
+    return;
+  }
+  s.farthest_m = std::max(s.farthest_m, distance);
+  if (!settled) return;
+  constexpr double kDegree = std::numbers::pi / 180;
+  s.yaw += square(yaw / (10 * kDegree));
+  s.sum += square(roll / (5 * kDegree)) + square(pitch / (5 * kDegree)) + square(distance / 0.05);
+  ++s.settled;
+}
+
+double cost_of(const Score& s) {
+  if (s.strayed_at >= 0) return 4 - s.strayed_at;
+  const double n = std::max(1, s.settled);
+  return square(s.farthest_m / kFarAway_m) + s.sum / n + std::min(1.0, s.yaw / n);
+}
+
+/// What a file of gains has of one, so that its cost is that of the file.
+double four_digits(double gain) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", gain);
+  return std::strtod(text, nullptr);
+}
+
+struct Problem {
+  const TuneConfig* config = nullptr;
+
+  /// A decision is the logarithm of each gain over where it started.
+  flight::Controller controller(const std::vector<double>& decision) const {
+    flight::Controller c = config->start;
+    const std::vector<flight::ControllerField> all = fields(c);
+    for (std::size_t i = 0; i < decision.size(); ++i) {
+      const flight::ControllerField& f = *std::ranges::find(all, config->vary[i], &flight::ControllerField::path);
+      *f.value = four_digits(std::clamp(*f.value * std::exp(decision[i]), f.range.low, f.range.high));
+    }
+    return c;
+  }
+  std::vector<double> fitness(const std::vector<double>& decision) const {
+    return {rollout::cost_of(*config, controller(decision))};
+  }
+  std::pair<std::vector<double>, std::vector<double>> get_bounds() const {
+    return {std::vector<double>(config->vary.size(), -kReach), std::vector<double>(config->vary.size(), kReach)};
+  }
+};
+
+double cost_of_trial(const TuneConfig& config, const Trial& trial, const flight::Controller& controller) {
+  flight::FleetOptions o = trial.fly.fleet;
+  o.task.forbid_actions();
+  o.controller = controller;
+  o.seed = config.seed;
+  flight::Fleet<float> fleet(trial.count, trial.fly.vehicle, o);
+  for (std::size_t i = 0; i < trial.count; ++i)
+    if (trial.fly.randomisation)
+      fleet.set_vehicle(i, trial.fly.randomisation->sample({.seed = o.seed, .flapper = static_cast<std::uint32_t>(i)}));
+  std::vector<Score> scores(trial.count);
+  const int ticks = static_cast<int>(std::lround(config.duration_s / fleet.period_s()));
+  for (int k = 1; k <= ticks; ++k) {
+    fleet.step();
+    if (k % kLook != 0) continue;
+    for (std::size_t i = 0; i < trial.count; ++i)
+      look(scores[i], fleet.truth(i), fleet.target(i), static_cast<double>(k) / ticks,
+           k * fleet.period_s() >= config.settle_s);
+  }
+  double sum = 0;
+  for (const Score& s : scores) sum += cost_of(s);
+  return sum / static_cast<double>(trial.count);
+}
+
+}  // namespace
+
+TuneConfig read_tune_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  const io::Table root = io::Config::load(path, overrides).root();
+  root.integer("schema", 1, 1);
+  TuneConfig c;
+  c.vary = root.strings("vary");
+  c.duration_s = root.number("duration_s", io::positive(1000));
+  c.settle_s = root.number("settle_s", io::non_negative(1000));
+  c.seed = static_cast<std::uint64_t>(root.integer("seed", 0, INT64_MAX));
+  c.population = static_cast<unsigned>(root.integer("population", 5, 10000));
+  c.generations = static_cast<unsigned>(root.integer("generations", 1, 100000));
+  for (const io::Table& t : root.tables("trial")) {
+    c.trials.push_back({read_fly_config(t.file("fly")), static_cast<std::size_t>(t.integer("count", 1, 100000)),
+                        t.number("weight", io::positive(1e6))});
+    const FlyConfig& fly = c.trials.back().fly;
+    if (fly.welded || fly.actor || fly.excitation.acts() || fly.fleet.task.start.settled)
+      t.fail("fly", "is held on a stand, excited, flown by an actor or starts from hover",
+             "flights of a controller alone from where the task starts");
+  }
+  if (c.trials.empty()) root.fail("trial", "is missing", "at least one [[trial]]");
+  if (c.vary.empty()) root.fail("vary", "is empty", "paths of the controller's file");
+  c.start = c.trials[0].fly.fleet.controller;
+  std::vector<std::string> known;
+  for (const flight::ControllerField& f : fields(c.start)) known.push_back(f.path);
+  for (const std::string& gain : c.vary) {
+    const auto found = std::ranges::find(known, gain);
+    if (found == known.end())
+      root.fail("vary", "no gain \"" + gain + "\"", "paths of the controller's file" + io::did_you_mean(gain, known));
+    if (!(*fields(c.start)[static_cast<std::size_t>(found - known.begin())].value > 0))
+      root.fail("vary", gain + " starts at 0", "gains above 0");
+  }
+  root.finish();
+  return c;
+}
+
+double cost_of(const TuneConfig& config, const flight::Controller& controller) {
+  double cost = 0, weight = 0;
+  for (const Trial& trial : config.trials) {
+    cost += trial.weight * cost_of_trial(config, trial, controller);
+    weight += trial.weight;
+  }
+  return cost / weight;
+}
+
+TuneResult tune(const TuneConfig& config, const std::function<bool(const TuneResult&)>& progress) {
+  const Problem problem{&config};
+  const auto seed = static_cast<unsigned>(config.seed);
+  // the first generation springs from the controller as it is
+  pagmo::population population(pagmo::problem(problem), 0, seed);
+  for (unsigned i = 0; i < config.population; ++i)
+    population.push_back(std::vector<double>(config.vary.size(), 0), {i == 0 ? cost_of(config, config.start) : 1e9});
+  const pagmo::algorithm algorithm(pagmo::cmaes(1, -1, -1, -1, -1, kFirstStep, 0, 0, true, true, seed));
+  TuneResult result{config.start, population.get_f()[0][0], 0};
+  while (result.generations < config.generations) {
+    population = algorithm.evolve(population);
+    ++result.generations;
+    const double cost = population.get_f()[population.best_idx()][0];
+    if (cost < result.cost)
+      result = {problem.controller(population.get_x()[population.best_idx()]), cost, result.generations};
+    if (!progress(result)) break;
+  }
+  return result;
+}
+
+}  // namespace flappy::rollout

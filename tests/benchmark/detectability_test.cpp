@@ -1,0 +1,217 @@
+// The oracle's formula against draws, its search on hand-made information, and the carried robot against its own flights.
+#include "benchmark/detectability.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "gap/evidence/hypothesis.hpp"
+#include "model/effects/registry.hpp"
+#include "vehicles.hpp"
+
+namespace flappy::blind {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+double log_normal(const VectorXd& r, const MatrixXd& covariance) {
+  const Eigen::LLT<MatrixXd> llt(covariance);
+  return -0.5 * r.dot(llt.solve(r)) - llt.matrixLLT().diagonal().array().log().sum();
+}
+
+// Twelve rows, two parameters; the truth is beside both columns of the hypothesis. Of 20,000 draws the mean of the differences,
+// each worked out from whole covariances, within four of its standard errors.
+TEST(Oracle, ExpectsWhatDrawsGive) {
+  constexpr Index kRows = 12;
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  const auto draw = [&](Index rows, Index columns) {
+    return MatrixXd(MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }));
+  };
+  // little is known of the second coefficient, so that what learning it costs shows
+  const MatrixXd parameters = 2 * draw(kRows, 2), both = 0.4 * draw(kRows, 2);
+  const MatrixXd covariance = MatrixXd::Identity(kRows, kRows) + parameters * parameters.transpose();
+  const VectorXd precision = Eigen::Vector2d(0.2, 1), weights = Eigen::Vector2d(4, 1);
+  MatrixXd columns(kRows, 3);
+  columns << both, both * weights + 0.3 * draw(kRows, 1);
+  const VectorXd truth = Eigen::Vector3d::UnitZ();
+  const MatrixXd hypothesis = MatrixXd::Identity(3, 2);
+  const MatrixXd wide = covariance + both * precision.cwiseInverse().asDiagonal() * both.transpose();
+
+  const MatrixXd information = columns.transpose() * covariance.llt().solve(columns);
+
+  const Eigen::LLT<MatrixXd> llt(covariance);
+  double sum = 0, squares = 0;
+  constexpr int kDraws = 20000;
+  for (int n = 0; n < kDraws; ++n) {
+    const VectorXd r = columns.col(2) + llt.matrixL() * draw(kRows, 1);
+    const double gain = log_normal(r, wide) - log_normal(r, covariance);
+    sum += gain, squares += gain * gain;
+  }
+  const double mean = sum / kDraws, error = std::sqrt((squares / kDraws - mean * mean) / kDraws);
+  EXPECT_NEAR(benchmark::expected_gain(information, truth, hypothesis, precision), mean, 4 * error);
+  EXPECT_GT(mean, 20 * error) << "nothing was tested";
+}
+
+TEST(Oracle, FindsTheSizeAndTheRivals) {
+  std::array<benchmark::Oracle::Columns, kEffects> effects;
+  const auto give = [&](Effect e) -> benchmark::Oracle::Columns& { return effects[static_cast<std::size_t>(e)]; };
+  give(Effect::added_mass) = {{1, 2}, {0, 1}, {}};
+  give(Effect::body_drag) = {{1}, {2}, {3}};
+  give(Effect::tether) = {{1}, {4}, {}};
+  give(Effect::wall_effect) = {{1, 2}, {5, 6}, {}};
+  // rows: added_mass goes along x, at size 2 three times as far; body_drag along x + y, further along x - y; tether along z,
+  // and wall_effect, which is smaller at size 2
+  MatrixXd rows(3, 7);
+  rows << 1, 3, 1, 1, 0, 0, 0,  //
+      0, 0, 1, -1, 0, 0, 0,     //
+      0, 0, 0, 0, 1, 1, 0.9;
+  const benchmark::Oracle oracle(effects, 300 * rows.transpose() * rows);
+  // the truth is straight of the next larger size tried, 1 or 3 along x; the hypothesis, of the other one, m, with prior
+  // precision of its coefficient size^2/4
+  const auto expected = [](double size) {
+    const double d = size <= 1 ? size : 1.5 * size;
+    const double m = size <= 1 ? 3 : 1, tried = size <= 1 ? 2 : 1;
+    const double prior = tried * tried / 4, a = 300 * m * m, f = 300 * m * d;
+    return 0.5 * (f * f / (a + prior) + a / (a + prior) - std::log1p(a / prior)) / 3;
+  };
+  for (const double size : {0.2, 1.0, 1.5, 2.0})
+    EXPECT_NEAR(oracle.gain(Effect::added_mass, size), expected(size), 1e-9 * expected(size)) << size;
+  EXPECT_EQ(oracle.gain(Effect::added_mass, 2.1), 0) << "not tried";
+  EXPECT_EQ(oracle.gain(Effect::wind, 1), 0) << "not tried";
+  const double found = oracle.detectable(Effect::added_mass, 10);
+  EXPECT_NEAR(expected(found), 10, 1e-3);
+  EXPECT_TRUE(std::isinf(oracle.detectable(Effect::added_mass, 1e6)));
+  const double lasting = oracle.detectable(Effect::wall_effect, 20);
+  EXPECT_GT(oracle.gain(Effect::wall_effect, lasting), 22);
+  EXPECT_NEAR(oracle.gain(Effect::wall_effect, 2 * lasting), 20, 1e-3);
+  // body_drag and its direction together are as good, but for what one more coefficient costs; tether says nothing of it
+  // a third of 1/2 log(1 + 600 / 0.25)
+  for (const double size : {1.0, 1.5})
+    EXPECT_LT(std::abs(oracle.gain_over(Effect::added_mass, size, Effect::body_drag)), 1.3) << size;
+  EXPECT_NEAR(oracle.gain_over(Effect::added_mass, 1, Effect::tether), oracle.gain(Effect::added_mass, 1), 0.5);
+}
+
+Case flown(const std::vector<BlindEffect>& effects) {
+  Case c{.vehicle = test::identified(), .sizes = Sizes(effects), .seed = 11};
+  c.declared_density_kg_m3 = c.vehicle.air_density_kg_m3;
+  return c;
+}
+
+gap::CarriedFlight carried(const Case& c, std::size_t flight) {
+  Flight f = fly(c, flight);
+  EXPECT_FALSE(f.crashed) << f.how;
+  return gap::CarriedFlight(gap::Recording("flight", std::move(f.log), c.vehicle));
+}
+
+/// Rms over beats of what is left of the steady turn and force, [channel].
+std::array<double, 6> left(const gap::CarriedFlight& flight, const benchmark::Rider& rider) {
+  const gap::Rows rows = carry(flight.recording(), rider, 0);
+  std::array<double, 6> rms{};
+  double n = 0;
+  for (std::size_t j = 0; j < flight.beats(); ++j) {
+    if (!flight.covers(j, gap::kTorqueX)) continue;
+    n += 1;
+    for (std::size_t s = 0; s < 6; ++s) {
+      const std::size_t row = j * gap::kRowsPerBeat + s * gap::kCoefficients;
+      rms[s] += std::pow(flight.measured()[row] - rows[row], 2);
+    }
+  }
+  for (double& x : rms) x = std::sqrt(x / n);
+  return rms;
+}
+
+// A robot carried along its own flight leaves noise. With n samples of dt in a beat T, hats of a beat to either side: of the
+// accelerometer 0.5 sqrt(2/3 / n) = 0.11 m/s^2 at 500 Hz, of the gyro differenced 0.05 sqrt(2 dt/T) / T = 0.6 rad/s^2; what
+// drifts in them, and what the record gets wrong of the torso's motion, adds half of that. Without the effect that it flew
+// with, what is left is several times as much.
+TEST(OracleCarry, KnowsItsOwnFlight) {
+  for (const std::vector<BlindEffect>& effects : {std::vector<BlindEffect>{{"coulomb_friction", 1}, {"body_drag", 1}},
+                                                  {{"wind", 2}},            // its gusts come as they came
+                                                  {{"battery_sag", 4}}}) {  // empty by as much as the trim took
+    const Case c = flown(effects);
+    const gap::CarriedFlight flight = carried(c, 0);
+    const auto with = left(flight, {c.vehicle, c.sizes, c.seed}), without = left(flight, {c.vehicle, {}, c.seed});
+    double worst = 0;
+    for (std::size_t s = 0; s < 6; ++s) {
+      EXPECT_LT(with[s], s < 3 ? 0.95 : 0.16) << effects[0].id << ' ' << gap::channel_name(static_cast<int>(s));
+      worst = std::max(worst, without[s] / with[s]);
+    }
+    EXPECT_GT(worst, 2) << effects[0].id;
+  }
+}
+
+TEST(OracleCarry, LagsByWholeSteps) {
+  const Case c = flown({});
+  gap::Recording late = carried(c, 0).recording();
+  const gap::Rows expected = benchmark::carry(late, {c.vehicle, {}, c.seed, 1}, 0);
+  for (std::vector<double>* v : {&late.left_V, &late.right_V}) {
+    v->insert(v->begin(), v->front());
+    v->pop_back();
+  }
+  EXPECT_EQ(benchmark::carry(late, {c.vehicle, {}, c.seed, 0}, 0), expected);
+}
+
+TEST(OracleSubject, SensorsDoNotChangeTheFlight) {
+  const Flight plain = fly(flown({}), 0);
+  std::vector<BlindEffect> all;
+  for (std::size_t e = 0; e < kEffects; ++e)
+    if (benchmark::acts_on_sensors(static_cast<Effect>(e))) all.push_back({effect_names()[e], 2});
+  const Flight f = fly(flown(all), 0);
+  EXPECT_EQ(f.log.command, plain.log.command);
+  EXPECT_NE(f.log.imu, plain.log.imu);
+  EXPECT_NE(f.log.mocap, plain.log.mocap);
+  for (std::size_t k = 0; k < 22; ++k) EXPECT_EQ(f.truth[k], plain.truth[k]) << k;
+}
+
+// With j = b' C^-1 b of a column b of the background, what is known of a coefficient of b beside one of variance 1 is
+// j/(1 + j), and less beside others: less than the little that every vehicle has says nothing.
+TEST(OracleSubject, LessThanEveryVehicleHasSaysNothing) {
+  const Case c = flown({});
+  const benchmark::Subject subject(c, benchmark::fly_all(c, 2), 2);
+  const std::vector<gap::Smooth> background = subject.background();
+  std::size_t sizes = 0;
+  for (const model::EffectEntry& e : model::effects()) sizes += static_cast<std::size_t>(e.info.sizes);
+  ASSERT_EQ(background.size(), sizes);
+  const std::vector<gap::Smooth> some = {background.front(), background[sizes / 2], background.back()};
+  const MatrixXd alone = subject.information({}, some), beside = subject.information(background, some);
+  for (Index i = 0; i < 3; ++i) {
+    EXPECT_GT(alone(i, i), beside(i, i));
+    const std::vector<gap::Smooth> b = {some[static_cast<std::size_t>(i)]};
+    const double j = alone(i, i), known = subject.information(b, b)(0, 0);
+    EXPECT_NEAR(known, j / (1 + j), 1e-9);
+    EXPECT_LT(beside(i, i), known * (1 + 1e-9));
+    EXPECT_GT(beside(i, i), 0);
+  }
+  // a column is as large as the catalogue's entry at that coordinate
+  const std::string first = model::effects().front().info.id;
+  const auto unknowns = static_cast<Index>(gap::unknowns_of(first).size());
+  const double sd = gap::background_sd(first), reach = 0.4;
+  const std::vector<VectorXd> at = {reach * VectorXd::Unit(unknowns, 0)};
+  const gap::Smooth there = subject.catalogue(first, at)[0];
+  EXPECT_LT((background.front() - sd / reach * there).norm(), 1e-12 * there.norm());
+}
+
+// Effects whose size both sides state in the same units: the entry comes out as what was put in. Poses
+// are jittered by as much as a tenth of the delay.
+TEST(OracleTruth, FindsWhatWasPutIn) {
+  const auto uncertain =
+      sim::read_randomisation(test::nominal(), io::Config::load(test::source_path("configs/gap/priors.toml")).root());
+  const auto values =
+      benchmark::true_values(flown({}), {{"mocap_tilt", 2}, {"mocap_delay", 1}, {"com_offset", 2}}, uncertain, 2);
+  const auto at = [&](const char* name) {
+    const auto found = values.find(name);
+    if (found == values.end() || !found->second) ADD_FAILURE() << name;
+    return found == values.end() ? 0 : found->second.value_or(0);
+  };
+  EXPECT_NEAR(std::hypot(at("mocap_tilt.x_rad"), at("mocap_tilt.y_rad")), 0.02, 0.002);
+  EXPECT_NEAR(at("mocap_delay.delay_s"), 0.005, 0.0005);
+  EXPECT_NEAR(std::hypot(at("com_offset.x_m"), at("com_offset.y_m")), 0.002, 0.0002);
+  EXPECT_EQ(values.size(), 6u);
+}
+
+}  // namespace
+}  // namespace flappy::blind

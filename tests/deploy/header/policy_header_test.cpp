@@ -1,0 +1,299 @@
+// What flappy-export makes of an actor: the C header in both precisions, TorchScript, and what they have to agree with.
+#include "deploy/header/policy_header.hpp"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <random>
+
+#include "deploy/header/policy_vectors.hpp"
+#include "io/run_program.hpp"
+#include "policy/policy.hpp"
+#include "policy/torch_script.hpp"
+#include "rollout/evaluation.hpp"
+#include "rollout/fly_fixture.hpp"
+
+namespace flappy::deploy {
+namespace {
+
+using flight::Folder;
+using policy::Activation;
+using Words = std::vector<std::string>;
+
+/// The escape under an actor of random weights.
+rollout::FlyConfig escape(const std::vector<int>& hidden_widths, Activation hidden, const Words& overrides = {}) {
+  Words all = {"flight.duration_s=0.7", "task.success.keep.until_s=0.7", "flight.threads=1"};
+  all.insert(all.end(), overrides.begin(), overrides.end());
+  rollout::FlyConfig config = rollout::read_fly_config(test::source_path("configs/fly/escape.toml"), all);
+  policy::Actor a;
+  a.task = config.fleet.task.name;
+  for (const flight::Signal& s : config.fleet.task.observation()) {
+    a.observation.push_back(s.name);
+    a.mean.push_back((s.low + s.high) / 2);
+    a.scale.push_back(2 / (s.high - s.low));
+  }
+  for (const flight::Signal& s : config.fleet.task.action()) a.action.push_back(s.name);
+  a.widths = {static_cast<int>(a.observation.size())};
+  a.widths.insert(a.widths.end(), hidden_widths.begin(), hidden_widths.end());
+  a.widths.push_back(flight::kActions);
+  a.hidden = hidden;
+  std::mt19937 engine(5);
+  for (std::size_t layer = 0; layer + 1 < a.widths.size(); ++layer)
+    for (int i = 0; i < (a.widths[layer] + 1) * a.widths[layer + 1]; ++i)
+      a.weights.push_back(
+          static_cast<float>((static_cast<double>(engine()) / 0x1p31 - 1) * std::sqrt(3.0 / a.widths[layer])));
+  config.actor = std::make_shared<policy::Actor>(a);
+  return config;
+}
+
+const policy::RunInfo kRun{std::string(64, 'a'), "0123456789ab", true, "escape"};
+
+/// An exported header with a self-test of 20 rows and the corners.
+template <class Network>
+std::string header_of(const rollout::FlyConfig& config, const Network& network, const policy::PolicyVectors& flown) {
+  policy::PolicyVectors v = some_of(flown, 20);
+  append(v, corners(network_of(config), config.fleet.task.observation()));
+  v.action = evaluate(network, v.observation);
+  return policy_header(config, kRun, network, v);
+}
+
+/// Compiles sources in `folder` and runs the program; what it prints, or the compiler's complaint.
+std::string compiled(const Folder& folder, const Words& options, const Words& sources) {
+  Words command = {"cc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror"};
+  command.insert(command.end(), options.begin(), options.end());
+  for (const std::string& source : sources) command.push_back(folder / source);
+  command.insert(command.end(), {"-o", folder / "program"});
+  const io::Finished done = io::run(command);
+  return done.exit_code == 0 ? io::run({folder / "program"}).out : done.err;
+}
+
+std::vector<float> acts(const policy::Policy& policy, const std::vector<float>& observation) {
+  const std::size_t rows = observation.size() / static_cast<std::size_t>(policy.observations());
+  std::vector<float> action(rows * static_cast<std::size_t>(policy.actions()));
+  policy.act(rows, observation.data(), action.data());
+  return action;
+}
+
+std::vector<std::uint32_t> bits(const std::vector<float>& numbers) {
+  std::vector<std::uint32_t> list;
+  for (const float x : numbers) list.push_back(std::bit_cast<std::uint32_t>(x));
+  return list;
+}
+
+TEST(PolicyHeader, ActsAsTheLanesToTheBit) {
+  const Folder folder;
+  for (const auto& [widths, hidden] : {std::pair{std::vector<int>{32, 32}, Activation::relu},
+                                       std::pair{std::vector<int>{7, 40, 3, 5, 9}, Activation::tanh},
+                                       std::pair{std::vector<int>{}, Activation::relu}}) {
+    const rollout::FlyConfig config = escape(widths, hidden);
+    const policy::PolicyNetwork network = network_of(config);
+    const policy::PolicyVectors flown = roll_out(config, 0, 40);
+    ASSERT_GT(flown.action.size(), 4000u);
+    EXPECT_EQ(bits(evaluate(network, flown.observation)), bits(flown.action));
+    folder.write("p.h", header_of(config, network, flown));
+    const auto policy = policy::load_policy(folder / "p.h", network.inputs(), network.outputs());
+    EXPECT_EQ(bits(acts(*policy, flown.observation)), bits(flown.action));
+    const policy::PolicyVectors wild = corners(network, config.fleet.task.observation());
+    EXPECT_EQ(bits(acts(*policy, wild.observation)), bits(wild.action));
+
+    const QuantisedNetwork whole = quantise(network, flown.observation);
+    folder.write("q.h", header_of(config, whole, flown));
+    const auto int8 = policy::load_policy(folder / "q.h", network.inputs(), network.outputs());
+    EXPECT_EQ(bits(acts(*int8, flown.observation)), bits(evaluate(whole, flown.observation)));
+    EXPECT_EQ(bits(acts(*int8, wild.observation)), bits(evaluate(whole, wild.observation)));
+  }
+}
+
+TEST(PolicyHeader, FliesEveryEpisodeAsTheRunItCameFrom) {
+  const Folder folder;
+  const rollout::FlyConfig config = escape({16}, Activation::relu);
+  const policy::PolicyNetwork network = network_of(config);
+  folder.write("p.h", header_of(config, network, roll_out(config, 0, 4)));
+  const auto policy = policy::load_policy(folder / "p.h", network.inputs(), network.outputs());
+  rollout::Evaluator evaluator(config, {.count = 48});
+  const auto actor = evaluator.fly({config.actor, nullptr}, rollout::Detail::full).flights;
+  const auto header = evaluator.fly({nullptr, policy.get()}, rollout::Detail::full).flights;
+  ASSERT_EQ(actor.size(), 48u);
+  for (std::size_t i = 0; i < actor.size(); ++i) {
+    EXPECT_EQ(actor[i].hash, header[i].hash) << i;
+    EXPECT_EQ(actor[i].captured_s, header[i].captured_s) << i;
+    EXPECT_EQ(actor[i].energy_J, header[i].energy_J) << i;
+    EXPECT_EQ(actor[i].success(), header[i].success()) << i;
+  }
+  // flights that know nothing of each other
+  EXPECT_NE(actor[0].hash, actor[1].hash);
+}
+
+TEST(PolicyHeader, IsTheSameBytesForAnyThreads) {
+  const auto export_with = [](const std::string& threads) {
+    const rollout::FlyConfig config = escape({16}, Activation::relu, {"flight.threads=" + threads});
+    return header_of(config, network_of(config), roll_out(config, 0, 40));
+  };
+  EXPECT_EQ(export_with("1"), export_with("3"));
+}
+
+TEST(PolicyHeader, MayBeIncludedTwiceAndInSeveralFiles) {
+  const Folder folder;
+  const rollout::FlyConfig config = escape({8}, Activation::tanh);
+  folder.write("p.h", header_of(config, network_of(config), roll_out(config, 0, 4)));
+  folder.write("other.c", "#include \"p.h\"\nint other(void);\nint other(void) { return flappy_policy_selftest(); }\n");
+  folder.write("main.c",
+               "#include \"p.h\"\n#include \"p.h\"\n#include <stdio.h>\nint other(void);\nint main(void) {\n"
+               "  printf(\"%d %d %d %s %s %s\", flappy_policy_selftest(), other(), FLAPPY_POLICY_DIRTY, "
+               "flappy_policy_observation[11].name, flappy_policy_observation[11].unit, FLAPPY_POLICY_COMMIT);\n"
+               "  return 0;\n}\n");
+  EXPECT_EQ(compiled(folder, {"-O2"}, {"main.c", "other.c"}), "0 0 1 added_amplitude V 0123456789ab");
+}
+
+TEST(PolicyHeader, RefusesArithmeticThatIsNotItsOwn) {
+  const Folder folder;
+  const rollout::FlyConfig config = escape({8}, Activation::relu);
+  folder.write("p.h", header_of(config, network_of(config), roll_out(config, 0, 4)));
+  folder.write("main.c", "#include \"p.h\"\nint main(void) { return 0; }\n");
+  for (const char* option : {"-ffast-math", "-Ofast", "-ffinite-math-only"})
+    EXPECT_NE(compiled(folder, {"-O2", option}, {"main.c"}).find("leave it away"), std::string::npos) << option;
+  EXPECT_NE(compiled(folder, {"-mfpmath=387"}, {"main.c"}).find("wider type"), std::string::npos);
+  EXPECT_EQ(compiled(folder, {"-O2"}, {"main.c"}), "");
+}
+
+/// A program that turns over every bit of every number and counts what the self-test lets pass; `arrays`: name and count.
+std::string mutations(const std::vector<std::pair<std::string, std::string>>& arrays) {
+  std::string text =
+      "#include \"p.h\"\n#include <stdio.h>\nint main(void) {\n  unsigned long flips = 0, missed = 0;\n"
+      "  if (flappy_policy_selftest() != 0) return 1;\n";
+  for (const auto& [name, count] : arrays)
+    text += "  for (unsigned i = 0; i < " + count + "; ++i)\n    for (unsigned bit = 0; bit < 8 * sizeof " + name +
+            "[0]; ++bit) {\n      unsigned char *byte = (unsigned char *)&" + name +
+            "[i] + bit / 8;\n      *byte = (unsigned char)(*byte ^ 1U << bit % 8);\n"
+            "      missed += flappy_policy_selftest() == 0;\n"
+            "      *byte = (unsigned char)(*byte ^ 1U << bit % 8);\n      ++flips;\n    }\n";
+  return text + "  printf(\"%lu flips, %lu missed\", flips, missed);\n  return 0;\n}\n";
+}
+
+TEST(PolicyHeader, CatchesEveryFlippedBit) {
+  const Folder folder;
+  const rollout::FlyConfig config = escape({32, 32}, Activation::relu);
+  const policy::PolicyNetwork network = network_of(config);
+  const policy::PolicyVectors flown = roll_out(config, 0, 8);
+  const std::vector<std::pair<std::string, std::string>> common = {{"flappy_policy_mean", "FLAPPY_POLICY_OBS"},
+                                                                   {"flappy_policy_scale", "FLAPPY_POLICY_OBS"},
+                                                                   {"flappy_policy_middle", "FLAPPY_POLICY_ACT"},
+                                                                   {"flappy_policy_half", "FLAPPY_POLICY_ACT"},
+                                                                   {"flappy_policy_weights", "FLAPPY_POLICY_WEIGHTS"}};
+  folder.write("p.h", header_of(config, network, flown));
+  folder.write("main.c", mutations(common));
+  const std::size_t numbers = network.weights.size() + 2 * network.mean.size() + 2 * network.half.size();
+  const Words writable = {"-O2", "-Dconst=", "-Wno-unused-variable"};
+  EXPECT_EQ(compiled(folder, writable, {"main.c"}), std::to_string(32 * numbers) + " flips, 0 missed");
+
+  // without the CRC the vectors miss some, as a mean error does: the count above can fail
+  std::string blind = header_of(config, network, flown);
+  const std::string check = "flappy_policy_crc32() != FLAPPY_POLICY_CRC32";
+  blind.replace(blind.find(check), check.size(), "0");
+  folder.write("p.h", blind);
+  EXPECT_EQ(compiled(folder, writable, {"main.c"}).find(" flips, 0 missed"), std::string::npos);
+
+  const QuantisedNetwork whole = quantise(network, flown.observation);
+  folder.write("p.h", header_of(config, whole, flown));
+  auto all = common;
+  all.insert(all.end(),
+             {{"flappy_policy_multiplier", "FLAPPY_POLICY_NEURONS"}, {"flappy_policy_bias", "FLAPPY_POLICY_NEURONS"}});
+  folder.write("main.c", mutations(all));
+  const std::size_t flips = 8 * whole.weights.size() + 64 * whole.bias.size() + 64 * (whole.mean.size() + 4);
+  EXPECT_EQ(compiled(folder, writable, {"main.c"}), std::to_string(flips) + " flips, 0 missed");
+}
+
+TEST(PolicyHeader, AddsNothingUponNaN) {
+  const Folder folder;
+  const rollout::FlyConfig config = escape({8}, Activation::relu);
+  const policy::PolicyNetwork network = network_of(config);
+  const policy::PolicyVectors flown = roll_out(config, 0, 4);
+  folder.write("p.h", header_of(config, network, flown));
+  folder.write("q.h", header_of(config, quantise(network, flown.observation), flown));
+  Words files = {"p.h", "q.h"};
+#ifdef FLAPPY_HAVE_TORCH
+  folder.write("p.pt", torch_script(network, ""));
+  files.emplace_back("p.pt");
+#endif
+  for (const std::string& file : files) {
+    const auto policy = policy::load_policy(folder / file, network.inputs(), network.outputs());
+    for (std::size_t i = 0; i < network.mean.size(); ++i) {
+      std::vector<float> seen(flown.observation.begin(), flown.observation.begin() + network.inputs());
+      seen[i] = std::nanf("");
+      EXPECT_EQ(acts(*policy, seen), std::vector<float>(4, 0)) << file << ", input " << i;
+      seen[i] = -INFINITY;
+      for (const float x : acts(*policy, seen)) EXPECT_TRUE(std::isfinite(x)) << file << ", input " << i;
+    }
+  }
+  // a header that lets NaN pass fails its own test
+  std::string blind = header_of(config, network, flown);
+  const std::string check = "refused |= x != x;";
+  blind.replace(blind.find(check), check.size(), "");
+  folder.write("b.h", blind);
+  EXPECT_NE(flight::message([&] { policy::load_policy(folder / "b.h", network.inputs(), 4); }).find("self-test: 3"),
+            std::string::npos);
+}
+
+/// Inputs, weights and activations are rounded by 1/(127 sqrt 12) = 0.23 % of their largest, rms. In a sum of 30 terms of random
+/// sign errors and terms grow alike, so each of three layers adds its three times 0.23 % of the largest term over the usual
+/// one, a factor of 2 or 3: 1 to 2 % in all.
+TEST(QuantisedPolicy, StaysNearTheActor) {
+  const rollout::FlyConfig config = escape({32, 32}, Activation::relu);
+  const policy::PolicyNetwork network = network_of(config);
+  const policy::PolicyVectors fit = roll_out(config, 0, 64), unseen = roll_out(config, 64, 64);
+  const QuantisedNetwork whole = quantise(network, fit.observation);
+  const std::vector<float> action = evaluate(whole, unseen.observation);
+  double sum = 0;
+  for (std::size_t i = 0; i < action.size(); ++i)
+    sum += std::pow((action[i] - unseen.action[i]) / (2 * network.half[i % 4]), 2);
+  EXPECT_LT(std::sqrt(sum / static_cast<double>(action.size())), 0.02);
+  EXPECT_GT(sum, 0);
+}
+
+#ifdef FLAPPY_HAVE_TORCH
+TEST(TorchScriptExport, ActsAsTheLanesWithinRounding) {
+  const Folder folder;
+  for (const Activation hidden : {Activation::relu, Activation::tanh}) {
+    const rollout::FlyConfig config = escape({32, 32}, hidden);
+    const policy::PolicyNetwork network = network_of(config);
+    policy::PolicyVectors all = roll_out(config, 0, 40);
+    append(all, corners(network, config.fleet.task.observation()));
+    const std::string bytes = torch_script(network, "a contract");
+    EXPECT_EQ(bytes, torch_script(network, "a contract"));
+    EXPECT_NE(bytes.find("a contract"), std::string::npos);
+    folder.write("p.pt", bytes);
+    const auto action = acts(*policy::load_policy(folder / "p.pt", network.inputs(), 4), all.observation);
+    for (std::size_t i = 0; i < action.size(); ++i)
+      ASSERT_NEAR(action[i], all.action[i], 1e-5 * 2 * network.half[i % 4]) << i;
+  }
+}
+#endif
+
+TEST(PolicyHeader, SaysWhatItCannotExport) {
+  rollout::FlyConfig config = escape({8}, Activation::relu);
+  config.vehicle.driver.hold_s = 1e-3 / 3;
+  EXPECT_NE(flight::message([&] { contract_crc32(config); }).find("no whole number of microseconds"),
+            std::string::npos);
+}
+
+TEST(Contract, ChangesWithWhatHeadersMustShare) {
+  const rollout::FlyConfig config = escape({8}, Activation::relu);
+  const std::uint32_t own = contract_crc32(config);
+  rollout::FlyConfig other = config;
+  EXPECT_EQ(contract_crc32(other), own);
+  other.fleet.task.hold = 1;
+  EXPECT_NE(contract_crc32(other), own);
+  other = config;
+  other.fleet.control_hz = 250;
+  EXPECT_NE(contract_crc32(other), own);
+  other = config;
+  other.fleet.task.parts &= ~1U << static_cast<int>(flight::Part::time);
+  EXPECT_NE(contract_crc32(other), own);
+  other = config;
+  other.fleet.task.constants.holds_trim = 0;
+  EXPECT_NE(contract_crc32(other), own);
+}
+
+}  // namespace
+}  // namespace flappy::deploy

@@ -1,0 +1,350 @@
+#include "flightlog/flight_log.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <numbers>
+#include <stdexcept>
+
+#include "io/files.hpp"
+
+namespace flappy::flight {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Digits that no decimal has, in every column; unit quaternions to the last digit.
+flightlog::FlightLog sample_log() {
+  flightlog::FlightLog log;
+  flightlog::FlightHeader& h = log.header;
+  h.vehicle = "hummingbird \"seven\".toml";
+  h.vehicle_sha256 = std::string(64, 'a');
+  h.flapping_Hz = 34;
+  h.gravity_m_s2 = 9.80665;
+  h.ambient = {1.0 / 0.85, -0.0, 2.5, {{1.0 / 3, -2, 0, -1}, {4, 0, 0.6, 0.8}}};
+  h.mocap = {200, 1.0 / 300, 1e-4, 2e-3};
+  h.imu = {500, 2e-3, 80, {1e-3, -1.0 / 7000, 0}, 0.01, {0.02, 0.03, 1.0 / 30}, 0.3};
+  h.power = {7.4, 1000, 0.5e-3, 0.01, 0.02};
+  h.wings = {1000, 0.01};
+  const auto column = [](double scale) {
+    flightlog::Column c;
+    for (int i = 0; i < 5; ++i) c.push_back(scale * std::sin(1.0 + i));
+    return c;
+  };
+  flightlog::Column t_s;
+  for (int i = 0; i < 5; ++i) t_s.push_back(i / 300.0);
+  log.command = {t_s, column(9), column(8), flightlog::BeatInputs{column(7), column(1), column(0.5), column(0.1)},
+                 column(3)};
+  flightlog::Column qw, qx;
+  for (int i = 0; i < 5; ++i) qw.push_back(std::cos(i / 9.0)), qx.push_back(std::sin(i / 9.0));
+  log.mocap = {t_s, column(1), column(2), column(3), qw, qx, flightlog::Column(5, 0.0), flightlog::Column(5, -0.0)};
+  log.imu = {t_s, column(4), column(5), column(6), column(7), column(8), column(9)};
+  log.power = flightlog::PowerStream{t_s, column(7), column(0.3), column(-0.4)};
+  log.wings = flightlog::WingsStream{t_s, column(1.1), column(0.7), column(1.2), column(0.8)};
+  return log;
+}
+
+std::string message(const std::function<void()>& action) {
+  try {
+    action();
+    return "accepted";
+  } catch (const io::InputError& error) {
+    return error.what();
+  }
+}
+
+/// What a person sees when `old` in a file of a good log has become `fresh`.
+std::string edited(const std::string& name, const std::string& old, const std::string& fresh) {
+  flightlog::LogFiles files = flight_log_files(sample_log());
+  const std::size_t at = files.at(name).find(old);
+  if (at == std::string::npos) return "\"" + old + "\" is not in " + name;
+  files[name].replace(at, old.size(), fresh);
+  return message([&] { flightlog::parse_flight_log(files, "log"); });
+}
+
+/// The same when line `number` of a file is another one.
+std::string with_line(const std::string& name, int number, const std::string& line) {
+  flightlog::LogFiles files = flight_log_files(sample_log());
+  std::string& text = files.at(name);
+  std::size_t begin = 0;
+  for (int i = 1; i < number; ++i) begin = text.find('\n', begin) + 1;
+  text.replace(begin, text.find('\n', begin) - begin, line);
+  return message([&] { flightlog::parse_flight_log(files, "log"); });
+}
+
+TEST(FlightLog, ReadsBackExactly) {
+  const flightlog::FlightLog log = sample_log();
+  EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(log), "log"), log);
+  flightlog::FlightLog least = log;
+  least.header.vehicle_sha256.clear();
+  least.header.ambient.walls.clear();
+  least.header.power.reset();
+  least.header.wings.reset();
+  least.command.inputs.reset();
+  least.command.phase_rad.reset();
+  least.power.reset();
+  least.wings.reset();
+  EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(least), "log"), least);
+  EXPECT_EQ(flight_log_files(least).size(), 4u);
+}
+
+TEST(FlightLog, KeepsUnitQuaternionsToTheLastDigit) {
+  flightlog::FlightLog log = sample_log();
+  flightlog::MocapStream& m = log.mocap;
+  m = {};
+  for (int i = 0; i < 1000; ++i) {
+    const double w = std::cos(i), x = std::sin(2.0 * i), y = std::sin(3.0 * i), z = std::cos(5.0 * i);
+    const double length = std::sqrt(w * w + x * x + y * y + z * z);
+    m.t_s.push_back(1e-3 * i);
+    for (flightlog::Column* c : {&m.x_m, &m.y_m, &m.z_m}) c->push_back(i);
+    m.qw.push_back(w / length), m.qx.push_back(x / length), m.qy.push_back(y / length), m.qz.push_back(z / length);
+  }
+  EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(log), "log"), log);
+}
+
+TEST(FlightLog, TakesColumnsInAnyOrder) {
+  flightlog::LogFiles files = flight_log_files(sample_log());
+  files["power.csv"] = "right_current_A,battery_V,t_s,left_current_A\n1,2,0,3\n4,5,0.01,6\n";
+  const flightlog::FlightLog log = flightlog::parse_flight_log(files, "log");
+  EXPECT_EQ(*log.power, (flightlog::PowerStream{{0, 0.01}, {2, 5}, {3, 6}, {1, 4}}));
+}
+
+TEST(FlightLog, NormalisesQuaternionsAndNormals) {
+  flightlog::LogFiles files = flight_log_files(sample_log());
+  files["mocap.csv"] = "t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,1.0009,0,0,0\n0.01,0,0,0,0.7071,0,0,0.7071\n";
+  std::string& header = files["flight.toml"];
+  header.replace(header.find("0.6, 0.8"), 8, "0.7071, 0.7071");
+  const flightlog::FlightLog log = flightlog::parse_flight_log(files, "log");
+  EXPECT_DOUBLE_EQ(log.mocap.qw[0], 1);
+  EXPECT_DOUBLE_EQ(log.mocap.qz[1], std::numbers::sqrt2 / 2);
+  EXPECT_DOUBLE_EQ(log.header.ambient.walls[1].normal_x, std::numbers::sqrt2 / 2);
+  EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(log), "log"), log);
+}
+
+TEST(FlightLog, RefusesFaultyHeaders) {
+  const auto header = [](const std::string& old, const std::string& fresh) {
+    return edited("flight.toml", old, fresh);
+  };
+  EXPECT_EQ(header("schema = 1", "schema = 2"),
+            "log/flight.toml:1:10: schema: 2 is out of range; accepted: an integer from 1 to 1");
+  EXPECT_EQ(header("gravity_m_s2", "gravity"),
+            "log/flight.toml: gravity_m_s2: is missing; accepted: a number from 0 to 100");
+  EXPECT_EQ(header("flapping_Hz = 34.0", "flapping_Hz = -34.0"),
+            "log/flight.toml:4:15: flapping_Hz: -34 is out of range; accepted: a number above 0, at most 1000");
+  EXPECT_EQ(
+      header("\"hummingbird", "\"../hummingbird"),
+      "log/flight.toml:2:11: vehicle: \"../hummingbird \"seven\".toml\" is no file name; accepted: the name of the "
+      "vehicle's file, without folder");
+  EXPECT_EQ(header("aaaa", "AAAA"),
+            "log/flight.toml:3:18: vehicle_sha256: is no SHA-256; accepted: 64 digits of 0 to 9 and a to f");
+  EXPECT_EQ(header("aaaa", "aaa"),
+            "log/flight.toml:3:18: vehicle_sha256: is no SHA-256; accepted: 64 digits of 0 to 9 and a to f");
+  EXPECT_EQ(header("ceiling_z_m = 2.5", "ceiling_z_m = -1"),
+            "log/flight.toml:10:15: ambient.ceiling_z_m: -1 is not above the ground; accepted: a number above -0");
+  EXPECT_EQ(header("0.6, 0.8", "0.0, -2.0"),
+            "log/flight.toml:11:9: ambient.walls: normal of wall 1 has length 2; accepted: [x_m, y_m, "
+            "normal_x, normal_y], the normal of length 1");
+  EXPECT_EQ(header(", 0.6, 0.8", ", 0.6"),
+            "log/flight.toml:11:49: ambient.walls[1]: has 3 elements; accepted: an array of 4, each a number from "
+            "-1e+06 to 1e+06");
+  EXPECT_EQ(header("latency_s = 0.002", "latency_s = -0.002"),
+            "log/flight.toml:21:13: imu.latency_s: -0.002 is out of range; accepted: a number from 0 to 10");
+  EXPECT_EQ(header("bandwidth_hz", "bandwith_hz"),
+            "log/flight.toml:19:1: imu.bandwidth_hz: is missing; accepted: a number above 0, at most 1e+06; is it "
+            "misspelt as \"bandwith_hz\"?");
+  EXPECT_EQ(header("noise_rad = 0.01", "noise_rad = 0.01\nlatency_s = 0"),
+            "log/flight.toml:38:1: wings.latency_s: unknown key; accepted: noise_rad, rate_hz");
+}
+
+TEST(FlightLog, RefusesFaultyColumns) {
+  const std::string imu = "t_s, gyro_x_rad_s, gyro_y_rad_s, gyro_z_rad_s, accel_x_m_s2, accel_y_m_s2, accel_z_m_s2";
+  EXPECT_EQ(edited("imu.csv", "gyro_x_rad_s", "gyro_x_rads"),
+            "log/imu.csv:1: gyro_x_rads: unknown column; accepted: " + imu + "; did you mean \"gyro_x_rad_s\"?");
+  EXPECT_EQ(edited("mocap.csv", "x_m", "x_mm"),
+            "log/mocap.csv:1: x_mm: unknown column; accepted here with another unit: \"x_m\"");
+  EXPECT_EQ(edited("mocap.csv", "y_m", "x_m"), "log/mocap.csv:1:9: x_m: column name is given twice");
+  flightlog::LogFiles files = flight_log_files(sample_log());
+  files["imu.csv"] = "t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2\n0,0,0,0,0,0\n";
+  EXPECT_EQ(message([&] { flightlog::parse_flight_log(files, "log"); }),
+            "log/imu.csv:1: accel_z_m_s2: column is missing; accepted: " + imu);
+  EXPECT_EQ(
+      edited("command.csv", "amplitude_V", "voltage_V"),
+      "log/command.csv:1: voltage_V: unknown column; accepted: t_s, left_voltage_V, right_voltage_V, amplitude_V, "
+      "difference_V, bias_V, split_cycle, phase_rad");
+  files["command.csv"] = "t_s,left_voltage_V,right_voltage_V,amplitude_V,bias_V\n0,0,0,0,0\n1,0,0,0,0\n";
+  EXPECT_EQ(message([&] { flightlog::parse_flight_log(files, "log"); }),
+            "log/command.csv:1: difference_V, split_cycle: missing beside other inputs of the wing beat; accepted: all "
+            "four or none");
+}
+
+TEST(FlightLog, RefusesFaultySamples) {
+  EXPECT_EQ(with_line("power.csv", 4, "0.002,7,0,0"),
+            "log/power.csv:4: t_s: 0.002 does not come after 0.0033333333333333335 of the line before; accepted: times "
+            "that increase");
+  EXPECT_EQ(with_line("mocap.csv", 3, "0,0,0,0,1,0,0,0"),
+            "log/mocap.csv:3: t_s: 0 does not come after 0 of the line before; accepted: times that increase");
+  EXPECT_EQ(with_line("wings.csv", 2, "0,nan,0,0,0"),
+            "log/wings.csv:2:3: left_stroke_rad: nan is not finite; accepted: a number");
+  EXPECT_EQ(
+      with_line("mocap.csv", 5, "0.01,0,0,0,1,0.1,0,0"),
+      "log/mocap.csv:5: qw, qx, qy, qz: length is 1.004987562112089; accepted: a quaternion of length 1 to within "
+      "0.001");
+  EXPECT_EQ(with_line("mocap.csv", 5, "0.01,0,0,0,0,0,0,0"),
+            "log/mocap.csv:5: qw, qx, qy, qz: length is 0; accepted: a quaternion of length 1 to within 0.001");
+  EXPECT_EQ(with_line("command.csv", 6, "1,9000,0,0,0,0,0,0"),
+            "log/command.csv:6: left_voltage_V: 9000 is out of range; accepted: a number from -100 to 100");
+  EXPECT_EQ(with_line("command.csv", 6, "1,0,0,0,0,0,0.6,0"),
+            "log/command.csv:6: split_cycle: 0.6 is out of range; accepted: a number from -0.5 to 0.5");
+  EXPECT_EQ(with_line("power.csv", 2, "0,7,250,0"),
+            "log/power.csv:2: left_current_A: 250 is out of range; accepted: a number from -100 to 100");
+  EXPECT_EQ(with_line("imu.csv", 3, "0.001,0,0,0,0,0"),
+            "log/imu.csv:3:16: row has 6 cells; accepted: 7, as in the header");
+}
+
+TEST(FlightLog, RefusesWhatIsMissingOrApart) {
+  const auto changed = [](const std::function<void(flightlog::LogFiles&)>& change) {
+    flightlog::LogFiles files = flight_log_files(sample_log());
+    change(files);
+    return message([&] { flightlog::parse_flight_log(files, "log"); });
+  };
+  EXPECT_EQ(changed([](flightlog::LogFiles& f) { f.erase("imu.csv"); }),
+            "log/imu.csv: is missing; accepted: a folder with flight.toml, command.csv, mocap.csv and imu.csv");
+  EXPECT_EQ(changed([](flightlog::LogFiles& f) { f.erase("power.csv"); }),
+            "log/flight.toml:28:1: power: is declared, but power.csv is missing; accepted: both or neither");
+  EXPECT_EQ(changed([](flightlog::LogFiles& f) {
+              std::string& header = f["flight.toml"];
+              header.resize(header.find("\n[wings]"));
+            }),
+            "log/wings.csv: is there, but flight.toml has no [wings]; accepted: both or neither");
+  EXPECT_EQ(
+      changed([](flightlog::LogFiles& f) { f["wings.csv"] = f["wings.csv"].substr(0, f["wings.csv"].find('\n')); }),
+      "log/wings.csv: holds 0 samples; accepted: at least 2");
+  EXPECT_EQ(changed([](flightlog::LogFiles& f) { f["wings.csv"].resize(f["wings.csv"].find("\n0.00")); }),
+            "log/wings.csv: holds 1 samples; accepted: at least 2");
+  EXPECT_EQ(changed([](flightlog::LogFiles& f) { f["power.csv"] = ""; }),
+            "log/power.csv: is empty; accepted: a line of column names, then rows of numbers");
+  EXPECT_EQ(changed([](flightlog::LogFiles& f) {
+              f["power.csv"] = "t_s,battery_V,left_current_A,right_current_A\n0.5,7,0,0\n0.6,7,0,0\n";
+            }),
+            "log/power.csv:2: t_s: begins at 0.5 s, when command.csv has ended at 0.013333333333333334 s; accepted: "
+            "streams that overlap, of one clock");
+}
+
+class FlightLogFolder : public testing::Test {
+ protected:
+  ~FlightLogFolder() override { fs::remove_all(root_); }
+
+  std::vector<std::string> names() const {
+    std::vector<std::string> list;
+    for (const auto& entry : fs::directory_iterator(root_)) list.push_back(entry.path().filename());
+    std::ranges::sort(list);
+    return list;
+  }
+  std::string write_message(const fs::path& folder, const flightlog::FlightLog& log = sample_log()) const {
+    return message([&] { write_flight_log(folder, log); });
+  }
+  std::string read_message(const fs::path& folder) const {
+    return message([&] { flightlog::read_flight_log(folder); });
+  }
+
+  const fs::path root_ =
+      testing::TempDir() + "flappy_log_" + testing::UnitTest::GetInstance()->current_test_info()->name();
+  const bool made_ = fs::create_directories(root_);
+  const fs::path folder_ = root_ / "flight_1";
+};
+
+TEST_F(FlightLogFolder, IsWrittenAndReplacedAsAWhole) {
+  write_flight_log(root_ / "a" / "b/", sample_log());
+  EXPECT_EQ(flightlog::read_flight_log(root_ / "a" / "b"), sample_log());
+  fs::remove_all(root_ / "a");
+
+  fs::create_directory(folder_);
+  write_flight_log(folder_, sample_log());
+  flightlog::write_truth(folder_, {"t_s", "x_m"}, {{0, 1}, {2, 3}});
+  flightlog::write_vehicle(folder_, sample_log().header.vehicle, "mass");
+  EXPECT_EQ(io::read_text(folder_ / "truth.csv"), "t_s,x_m\n0,2\n1,3\n");
+  EXPECT_EQ(flightlog::read_flight_log(folder_), sample_log());
+
+  flightlog::FlightLog other = sample_log();
+  other.header.power.reset();
+  other.power.reset();
+  write_flight_log(folder_, other);
+  EXPECT_EQ(flightlog::read_flight_log(folder_), other);
+  EXPECT_FALSE(fs::exists(folder_ / "power.csv"));
+  EXPECT_FALSE(fs::exists(folder_ / "truth.csv"));  // it was another flight's
+  EXPECT_FALSE(fs::exists(folder_ / sample_log().header.vehicle));
+  EXPECT_EQ(names(), std::vector<std::string>{"flight_1"});
+}
+
+TEST_F(FlightLogFolder, FollowsALinkToAFolder) {
+  fs::create_directory(folder_);
+  fs::create_directory_symlink(folder_, root_ / "link");
+  write_flight_log(root_ / "link", sample_log());
+  EXPECT_TRUE(fs::is_symlink(root_ / "link"));
+  EXPECT_EQ(flightlog::read_flight_log(folder_), sample_log());
+}
+
+TEST_F(FlightLogFolder, IsNotWrittenOverSomethingElse) {
+  const std::string accepted = "; accepted: a new folder, an empty one, or a flight log to replace";
+  io::write_atomically(root_ / "file", "x");
+  EXPECT_EQ(write_message(root_ / "file"), (root_ / "file").string() + ": is no folder" + accepted);
+  fs::create_directory(folder_);
+  io::write_atomically(folder_ / "imu.csv", "x");
+  EXPECT_EQ(write_message(folder_), folder_.string() + ": holds files, but no flight.toml" + accepted);
+  fs::remove(folder_ / "imu.csv");
+  write_flight_log(folder_, sample_log());
+  io::write_atomically(folder_ / "notes.txt", "x");
+  EXPECT_EQ(write_message(folder_),
+            folder_.string() + ": holds notes.txt, which is no part of a flight log" + accepted);
+  EXPECT_EQ(io::read_text(folder_ / "notes.txt"), "x");
+  EXPECT_EQ(write_message(root_ / "file" / "log"),
+            (root_ / "file/log").string() + ": cannot be written: Not a directory");
+  EXPECT_EQ(names(), (std::vector<std::string>{"file", "flight_1"}));
+}
+
+TEST_F(FlightLogFolder, IsNotWrittenWhenItCouldNotBeRead) {
+  flightlog::FlightLog log = sample_log();
+  log.mocap.t_s[2] = log.mocap.t_s[1];
+  EXPECT_EQ(write_message(folder_, log), folder_.string() +
+                                             "/mocap.csv:4: t_s: 0.0033333333333333335 does not come after "
+                                             "0.0033333333333333335 of the line before; accepted: times that increase");
+  log = sample_log();
+  log.imu.gyro_x_rad_s[0] = std::nan("");
+  EXPECT_EQ(write_message(folder_, log),
+            folder_.string() + "/imu.csv:2:3: gyro_x_rad_s: nan is not finite; accepted: a number");
+  log = sample_log();
+  log.imu.gyro_x_rad_s.pop_back();
+  EXPECT_THROW(write_flight_log(folder_, log), std::invalid_argument);
+  EXPECT_TRUE(names().empty());
+}
+
+TEST_F(FlightLogFolder, NeverOpensTheTruth) {
+  write_flight_log(folder_, sample_log());
+  fs::create_symlink("truth.csv", folder_ / "truth.csv");  // whoever opens it fails
+  EXPECT_EQ(flightlog::read_flight_log(folder_), sample_log());
+}
+
+TEST_F(FlightLogFolder, RefusesWhatIsNotThere) {
+  EXPECT_EQ(read_message(folder_), folder_.string() + ": cannot be read: No such file or directory");
+  EXPECT_EQ(message([&] { flightlog::write_truth(root_, {"t_s"}, {{0}}); }),
+            root_.string() + ": is no flight log; accepted: a folder with flight.toml");
+  write_flight_log(folder_, sample_log());
+  io::write_atomically(folder_ / "notes.csv", "anything");
+  EXPECT_EQ(flightlog::read_flight_log(folder_), sample_log());
+  fs::rename(folder_ / "power.csv", folder_ / "Power.csv");
+  EXPECT_EQ(read_message(folder_), (folder_ / "Power.csv").string() +
+                                       ": is no stream of a flight log; accepted: power.csv or "
+                                       "wings.csv; did you mean \"power.csv\"?");
+  fs::remove(folder_ / "Power.csv");
+  EXPECT_EQ(read_message(folder_),
+            (folder_ / "flight.toml").string() +
+                ":28:1: power: is declared, but power.csv is missing; accepted: both or neither");
+  fs::remove(folder_ / "flight.toml");
+  EXPECT_EQ(read_message(folder_), (folder_ / "flight.toml").string() + ": cannot be read: No such file or directory");
+}
+
+}  // namespace
+}  // namespace flappy::flight

@@ -1,0 +1,302 @@
+// The parts of a diagnosis on simulated flights: what carrying, rows, noise and fit find where the truth is known.
+#include "gap/diagnose/diagnose.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "gap/replay/sensor_correction.hpp"
+#include "io/config.hpp"
+#include "model/effects/registry.hpp"
+#include "rollout/fly.hpp"
+#include "rollout/fly_fixture.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Eigen::Index;
+
+const std::string kConfigs = FLAPPY_SOURCE_DIR "/configs/";
+
+model::Vehicle nominal() { return model::read_vehicle(kConfigs + "vehicles/hummingbird_nominal.toml"); }
+
+sim::Randomisation uncertain() {
+  return sim::read_randomisation(nominal(), io::Config::load(kConfigs + "gap/priors.toml", {}).root());
+}
+
+/// Eight seconds: take-off and hover, the last five under multisines.
+std::vector<CarriedFlight> flown(const std::string& vehicle, const std::vector<std::string>& overrides = {}) {
+  flight::Folder folder;
+  rollout::FlyOptions options;
+  options.log_folder = folder / "flight";
+  std::vector<std::string> all = {"vehicle=../vehicles/" + vehicle + ".toml", "flight.duration_s=8"};
+  all.insert(all.end(), overrides.begin(), overrides.end());
+  rollout::fly(rollout::read_fly_config(kConfigs + "fly/identify_multisine.toml", all), options);
+  std::vector<CarriedFlight> flights;
+  flights.emplace_back(Recording(options.log_folder, flightlog::read_flight_log(options.log_folder), nominal()));
+  return flights;
+}
+
+double rms(const CarriedFlight& f, const Rows& rows, int group) {
+  double sum = 0, n = 0;
+  for (std::size_t j = 0; j < f.beats(); ++j)
+    if (f.covers(j, group / kCoefficients)) {
+      const double x = rows[j * kRowsPerBeat + static_cast<std::size_t>(group)];
+      sum += x * x, n += 1;
+    }
+  return std::sqrt(sum / n);
+}
+
+TEST(BeatRows, ProjectAConstantAndItsHarmonics) {
+  constexpr std::size_t kBeats = 8, kPerBeat = 15;
+  std::vector<double> beat, samples;
+  for (std::size_t i = 0; i < kBeats * kPerBeat; ++i) {
+    const double b = (static_cast<double>(i) + 0.5) / kPerBeat, a = 2 * std::numbers::pi * b;
+    beat.push_back(b);
+    samples.push_back(3 + 2 * std::cos(a) - 0.5 * std::sin(3 * a));
+  }
+  std::vector<char> valid(beat.size(), 1);
+  valid[5 * kPerBeat + 7] = 0;
+  valid[5 * kPerBeat + 8] = 0;
+  const BeatProjection projection(beat, valid, kBeats, 1);
+  std::vector<double> rows(kBeats * kCoefficients, 0);
+  projection.project(samples.data(), 1, rows.data());
+  EXPECT_FALSE(projection.covers(0)) << "left out";
+  EXPECT_FALSE(projection.covers(5)) << "two samples of the middle are more than a tenth of its weight";
+  ASSERT_TRUE(projection.covers(3));
+  const double* r = &rows[std::size_t{3} * kCoefficients];
+  const double expected[kCoefficients] = {3, 2, 0, 0, 0, 0, -0.5, 0, 0};
+  // over whole samples of a hat, harmonics leak into each other by the square of 1/(2 x 15)
+  for (int c = 0; c < kCoefficients; ++c) EXPECT_NEAR(r[c], expected[c], 5e-3) << c;
+}
+
+TEST(Carried, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
+  const std::vector<CarriedFlight> flights = flown(
+      "hummingbird_nominal", {"log.power.battery_nominal_V=18", "log.power.rate_hz=500", "log.power.latency_s=0.001",
+                              "log.power.voltage_noise_V=0.02", "log.power.current_noise_A=0.01"});
+  const Candidate it{nominal(), 0};
+  const Rows predicted = flights[0].predict({&it})[0];
+  const Rows noise = flights[0].declared_noise(1);
+  Rows left = flights[0].measured();
+  for (std::size_t i = 0; i < left.size(); ++i) left[i] -= predicted[i];
+  // 250 beats: an rms of as many normal numbers varies by 4 %, of neighbours that share samples by 6 %; heavy tails, for
+  // now and then a wing's landing comes a little early, add to a few
+  for (const int channel : {kTorqueX, kTorqueY, kTorqueZ, kForceX, kForceY, kForceZ, kStrokeLeft, kStrokeRight,
+                            kCurrentLeft, kCurrentRight, kBattery, kPathX, kTurnZ})
+    for (int c = 0; c < (channel < kPathX ? 3 : 1); ++c) {
+      const int g = channel * kCoefficients + c;
+      const double ratio = rms(flights[0], left, g) / rms(flights[0], noise, g);
+      EXPECT_GT(ratio, 0.7) << channel_name(channel) << " " << c;
+      EXPECT_LT(ratio, 1.4) << channel_name(channel) << " " << c;
+    }
+}
+
+TEST(Recording, FliesWhatWasDriven) {
+  const std::vector<CarriedFlight> flights = flown(
+      "hummingbird_nominal", {"log.power.battery_nominal_V=18", "log.power.rate_hz=500", "log.power.latency_s=0.001",
+                              "log.power.voltage_noise_V=0.02", "log.power.current_noise_A=0.01"});
+  const Recording& whole = flights[0].recording();
+  flightlog::FlightLog log = whole.log;
+  flightlog::CommandStream& c = log.command;
+  const double start_s = c.t_s.front(), from_s = start_s + 3, to_s = start_s + 3.5, end_s = start_s + 6;
+  const flightlog::Column t_s = c.t_s;
+  for (flightlog::Column* column :
+       {&c.t_s, &c.left_voltage_V, &c.right_voltage_V, &*c.phase_rad, &c.inputs->amplitude_V, &c.inputs->difference_V,
+        &c.inputs->bias_V, &c.inputs->split_cycle}) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < t_s.size(); ++i)
+      if ((t_s[i] < from_s || t_s[i] > to_s) && t_s[i] < end_s) (*column)[kept++] = (*column)[i];
+    column->resize(kept);
+  }
+  for (double& v : log.power->battery_V) v *= 1.1;
+  const Recording r("flight", log, nominal());
+  EXPECT_LT(r.end_s.back(), end_s);
+  EXPECT_GT(r.end_s.back(), end_s - 0.1);
+  // until the wings have forgotten: six beats of 34 Hz
+  for (std::size_t k = 0; k < r.intervals(); ++k) {
+    const double begin_s = r.end_s[k] - r.interval_s(k);
+    if (begin_s > from_s + 0.006 && r.end_s[k] < to_s + 6.0 / 34) EXPECT_FALSE(r.valid[k]) << begin_s - start_s;
+    else if (r.end_s[k] < from_s || begin_s > to_s + 6.1 / 34)
+      EXPECT_EQ(r.valid[k], whole.valid[k]) << begin_s - start_s;
+  }
+  // a battery fuller than nominal drives that much harder; 0.02 V of noise in each of twenty samples of 18 V
+  EXPECT_NEAR(r.full, 1.1, 5 * 0.02 / 18 / std::sqrt(20));
+  EXPECT_DOUBLE_EQ(r.left_V[1000], r.full * whole.left_V[1000]);
+  EXPECT_EQ(whole.full, 1);
+}
+
+// Of two effects that oppose each other each errs by 0.3 of what its sizes change; shapes are no more of it.
+TEST(Fit, EveryEquationErrsByItself) {
+  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
+  const Evidence evidence(flights, 2);
+  const Fitter fitter(flights, evidence, 2);
+  const sim::Randomisation prior = uncertain();
+  const Hypothesis h(prior, {"ground_effect", "spring_hardening"});
+  Linearised l{Eigen::VectorXd::Zero(h.size()), Fitter::axes(h), {}, {}, {}};
+  for (Index i = 0; i < h.size(); ++i) {
+    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+    if (i >= h.shared()) l.at[i] = u.effect == "ground_effect" ? 2 : -2;
+    l.columns.push_back(Smooth::Constant(kGroups, evidence.basis().size(), u.size ? 1 : 50));
+  }
+  ASSERT_EQ(h.size() - h.shared(), 3) << "two sizes and a length";
+  EXPECT_NEAR(fitter.form_error(h, l).maxCoeff(), 0.3 * 2 * std::sqrt(2), 1e-12);
+  EXPECT_NEAR(fitter.form_error(h, l).minCoeff(), 0.3 * 2 * std::sqrt(2), 1e-12);
+}
+
+TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
+  const std::vector<CarriedFlight> flights = flown("hummingbird_identified");
+  const sim::Randomisation prior = uncertain();
+  const Hypothesis plain(prior, {});
+  Evidence evidence(flights, 2);
+  const Fitter fitter(flights, evidence, 2);
+  const Linearised start =
+      fitter.linearise(plain, plain.start(), {Eigen::MatrixXd(plain.size(), 0), Eigen::VectorXd(0)});
+  evidence.learn_weights(start.residual);
+  Fit fit = fitter.fit(plain, plain.start(), 4);
+  evidence.learn_weights(fit.point.residual);
+  fit = fitter.refit(plain, fit, 3);
+  const int groups[] = {kTorqueX * kCoefficients, kTorqueZ * kCoefficients + 1, kForceY * kCoefficients,
+                        kStrokeLeft * kCoefficients};
+  std::vector<double> declared;
+  const Rows noise = flights[0].declared_noise(1);
+  for (const int g : groups) {
+    declared.push_back(evidence.noise_sd(g));
+    // of one course of the noise, whose innovations are found with its memory
+    EXPECT_LT(declared.back(), 1.2 * rms(flights[0], noise, g)) << g;
+    EXPECT_GT(declared.back(), 0.4 * rms(flights[0], noise, g)) << g;
+  }
+  evidence.learn_noise(fit.point.residual);
+  // what a right model leaves is noise as declared, to the 8 % of a median of 200, and no less by definition
+  for (std::size_t i = 0; i < declared.size(); ++i)
+    EXPECT_LT(evidence.noise_sd(groups[i]), 1.35 * declared[i]) << groups[i];
+  fit = fitter.refit(plain, fit, 3);
+  const model::Vehicle truth = model::read_vehicle(kConfigs + "vehicles/hummingbird_identified.toml");
+  const Eigen::VectorXd mean = fit.mean();
+  const Eigen::MatrixXd covariance = fit.covariance();
+  const auto off = [&](const std::string& path, double coordinate) {
+    for (Index i = 0; i < plain.shared(); ++i)
+      if (plain.unknowns()[static_cast<std::size_t>(i)].name == path)
+        return (mean[i] - coordinate) / std::sqrt(covariance(i, i));
+    ADD_FAILURE() << path;
+    return 0.0;
+  };
+  // of its own prior, in standard deviations of what the flight tells; 4 of them hold for all of eight
+  EXPECT_LT(std::abs(off("left.motor.resistance_ohm", (truth.left.motor.resistance_ohm / 12.4 - 1) / 0.1)), 4);
+  EXPECT_LT(std::abs(off("right.motor.resistance_ohm", (truth.right.motor.resistance_ohm / 12.4 - 1) / 0.1)), 4);
+  EXPECT_LT(std::abs(off("left.spring.rest_angle_rad", truth.left.spring.rest_angle_rad / 0.05)), 4);
+  EXPECT_LT(std::abs(off("right.spring.rest_angle_rad", truth.right.spring.rest_angle_rad / 0.05)), 4);
+  EXPECT_LT(std::abs(off("left.rotation.lower_rad", (truth.left.rotation.lower_rad / -0.7854 - 1) / 0.07)), 4);
+  EXPECT_LT(std::abs(off("right.rotation.upper_rad", (truth.right.rotation.upper_rad / 0.7854 - 1) / 0.07)), 4);
+  EXPECT_LT(std::abs(off("air.density_kg_m3", 0)), 4);
+  EXPECT_LT(std::abs(off("torso.mass_kg", 0)), 4);
+  // and it does tell: rest angles and stops to a tenth of their prior
+  for (Index i = 0; i < plain.shared(); ++i)
+    if (plain.unknowns()[static_cast<std::size_t>(i)].name.find("rest_angle") != std::string::npos)
+      EXPECT_LT(std::sqrt(covariance(i, i)), 0.1);
+}
+
+TEST(SensorEffects, AreTakenBack) {
+  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal");
+  const flightlog::FlightLog& log = flights[0].recording().log;
+  const auto mean_path = [](const CarriedFlight& f) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double n = 0;
+    for (std::size_t j = 0; j < f.beats(); ++j)
+      if (f.covers(j, kPathX)) {
+        for (std::size_t i = 0; i < 3; ++i)
+          sum[static_cast<Index>(i)] += f.measured()[j * kRowsPerBeat + (kPathX + i) * kCoefficients];
+        n += 1;
+      }
+    return Eigen::Vector3d(sum / n);
+  };
+  // a world that leans by e sees gravity lean: its path bends by -g e x z beyond what the accelerometer says
+  const double e = 0.02, g = 9.81;
+  const CarriedFlight tilted = flights[0].with_log(without({{"mocap_tilt", {{"x_rad", -e}, {"y_rad", 0}}}}, log));
+  const Eigen::Vector3d bend = mean_path(tilted) - mean_path(flights[0]);
+  EXPECT_NEAR(bend.y(), g * e, 0.05 * g * e);
+  EXPECT_NEAR(bend.x(), 0, 0.05 * g * e);
+  // and comes back
+  const flightlog::FlightLog back = without({{"mocap_tilt", {{"x_rad", e}, {"y_rad", 0}}}}, tilted.recording().log);
+  EXPECT_NEAR(back.mocap.y_m[100], log.mocap.y_m[100], 1e-12);
+  // an offset moves the point, a delay the clock
+  const auto moved = without({{"marker_offset", {{"x_m", 0.01}, {"y_m", 0}, {"z_m", 0}}}}, log);
+  EXPECT_NEAR(std::hypot(moved.mocap.x_m[100] - log.mocap.x_m[100], moved.mocap.y_m[100] - log.mocap.y_m[100],
+                         moved.mocap.z_m[100] - log.mocap.z_m[100]),
+              0.01, 1e-12);
+  EXPECT_EQ(without({{"mocap_delay", {{"delay_s", 0.004}}}}, log).header.mocap.latency_s,
+            log.header.mocap.latency_s + 0.004);
+  // a turned accelerometer keeps its length
+  const auto turned = without({{"accelerometer_misalignment", {{"x_rad", 0.1}, {"y_rad", 0}, {"z_rad", 0}}}}, log);
+  EXPECT_NEAR(turned.imu.accel_x_m_s2[50], log.imu.accel_x_m_s2[50], 1e-12);
+  EXPECT_NEAR(turned.imu.accel_y_m_s2[50],
+              std::cos(0.1) * log.imu.accel_y_m_s2[50] + std::sin(0.1) * log.imu.accel_z_m_s2[50], 1e-12);
+  // a shaking of amplitude A rectifies to gain A^2 / 2; over 14 of 14.7 samples of a beat to 1 %
+  flightlog::FlightLog shaking = log;
+  flightlog::Column& x = shaking.imu.accel_x_m_s2;
+  for (std::size_t i = 0; i < x.size(); ++i)
+    x[i] = 3 + 10 * std::sin(2 * std::numbers::pi * 34 * (shaking.imu.t_s[i] - shaking.imu.t_s[0]));
+  const auto mean = [](const flightlog::Column& c) {
+    return std::accumulate(c.begin() + 100, c.end() - 100, 0.0) / static_cast<double>(c.size() - 200);
+  };
+  const auto calmed = without({{"vibration_rectification", {{"gain_s2_m", 1e-3}}}}, shaking);
+  EXPECT_NEAR(mean(x) - mean(calmed.imu.accel_x_m_s2), 1e-3 * 100 / 2, 0.01 * 0.05);
+  EXPECT_EQ(without({{"vibration_rectification", {{"gain_s2_m", 0}}}}, shaking).imu, shaking.imu);
+  EXPECT_TRUE(sensor_effects({{"wind", {}}, {"mocap_tilt", {}}}).count("mocap_tilt"));
+  EXPECT_FALSE(sensor_effects({{"wind", {}}, {"mocap_tilt", {}}}).count("wind"));
+}
+
+TEST(Diagnose, StopsWithWhatItHas) {
+  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal");
+  DiagnoseOptions options;
+  options.threads = 2;
+  options.progress = [](double, const std::string&) { return false; };
+  const Diagnosis d = diagnose(flights, uncertain(), options);
+  EXPECT_FALSE(d.complete);
+  ASSERT_EQ(d.answers.size(), 3 + model::effects().size());
+  double sum = 0;
+  for (const Answer& a : d.answers) {
+    EXPECT_TRUE(a.left.empty());
+    sum += a.probability;
+  }
+  EXPECT_NEAR(sum, 1, 1e-12);
+  EXPECT_EQ(d.answers[0].kind, Answer::Kind::none);
+}
+
+// Of one coefficient of the basis in one group: log p by hand, where it is a column, a floor, or may be larger than its floor.
+TEST(Evidence, IntegratesOutInClosedForm) {
+  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
+  const Evidence evidence(flights, 2);
+  const Candidate it{nominal(), 0};
+  Rows residual = flights[0].measured();
+  const Rows predicted = flights[0].predict({&it})[0];
+  for (std::size_t i = 0; i < residual.size(); ++i) residual[i] -= predicted[i];
+  const Statistics s = evidence.statistics({residual}), zero = evidence.statistics({Rows(residual.size(), 0)});
+  constexpr int kGroup = kForceX * kCoefficients + 1, kFunction = 2;
+  const Smooth none = Smooth::Zero(kGroups, evidence.basis().size());
+  Smooth unit = none;
+  unit(kGroup, kFunction) = 1;
+  Statistics of_unit = zero;
+  evidence.add(1, unit, of_unit);
+  const double a = of_unit.sums[0][kGroup][kFunction], b = s.sums[0][kGroup][kFunction];
+  const double sd = 2 / std::sqrt(a), m = 0.7;
+  const auto log_p = [&](const Smooth& eta_sd, bool column) {
+    const std::vector<const Smooth*> columns(column ? 1 : 0, &unit);
+    return Evidence::posterior(evidence.reduce(s, columns, {1}, eta_sd), std::vector<int>(column ? 1 : 0, 0),
+                               Eigen::VectorXd::Constant(column ? 1 : 0, m))
+        .log_evidence;
+  };
+  const double plain = log_p(none, false);
+  const double by_eta = 0.5 * b * b / (a + 1 / (sd * sd)) - 0.5 * std::log1p(a * sd * sd);
+  const double by_column = -0.5 * (m * m - (b + m) * (b + m) / (a + 1)) - 0.5 * std::log1p(a);
+  // sums of squares of some thousand rows, less each other
+  const double error = 1e-12 * std::abs(plain);
+  EXPECT_NEAR(log_p(sd * unit, false) - plain, by_eta, error);
+  EXPECT_NEAR(log_p(none, true) - plain, by_column, error);
+  EXPECT_NEAR(evidence.local_gains(s, {1}, none, sd * unit)(kGroup, kFunction), by_eta, error);
+  EXPECT_EQ(evidence.reduce(s, {&unit}, {0}, none).sums.norm(), 0) << "a flight that is left out";
+}
+
+}  // namespace
+}  // namespace flappy::gap

@@ -1,0 +1,374 @@
+// What a diagnosis reports, and that it reads no truth.
+#include "gap/diagnose/report.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "gap/diagnose/diagnose_command.hpp"
+#include "gap/diagnose/summary.hpp"
+#include "io/config.hpp"
+#include "io/progress.hpp"
+#include "model/effects/registry.hpp"
+#include "refusal.hpp"
+#include "rollout/fly.hpp"
+#include "rollout/fly_fixture.hpp"
+#include "vehicles.hpp"
+
+namespace flappy::gap {
+namespace {
+
+const std::string kConfigs = FLAPPY_SOURCE_DIR "/configs/";
+
+Answer answer(double probability, std::vector<std::string> effects) {
+  Answer a;
+  a.kind = Answer::Kind::effect;
+  a.effects = std::move(effects);
+  a.probability = probability;
+  return a;
+}
+
+Answer answer(double probability, Answer::Kind kind) {
+  Answer a;
+  a.kind = kind;
+  a.probability = probability;
+  return a;
+}
+
+// ---- verdict
+
+TEST(Verdict, IsNotSureOfEntries) {
+  const auto weighed = [](double log_evidence, Answer a) {
+    a.log_evidence = log_evidence;
+    return a;
+  };
+  std::vector<Answer> all = {weighed(-1000, answer(0, Answer::Kind::parameters)),
+                             weighed(-1000, answer(0, Answer::Kind::unknown)), weighed(-900, answer(0, {"body_drag"})),
+                             weighed(-800, answer(0, {"wind"}))};
+  set_probabilities(all);
+  // 0.06 of what entries hold goes to an unknown cause, 0.06 to both entries alike
+  EXPECT_EQ(all[0].effects, std::vector<std::string>{"wind"});
+  EXPECT_NEAR(all[0].probability, 0.88 + 0.03, 1e-12);
+  EXPECT_EQ(all[1].kind, Answer::Kind::unknown);
+  EXPECT_NEAR(all[1].probability, 0.06, 1e-12);
+  EXPECT_NEAR(all[2].probability, 0.03, 1e-12);
+  EXPECT_NEAR(all[3].probability, 0, 1e-12);
+  // what other answers hold stays
+  all = {weighed(std::log(0.7), answer(0, Answer::Kind::parameters)), weighed(std::log(0.3), answer(0, {"wind"})),
+         weighed(-1000, answer(0, Answer::Kind::unknown))};
+  set_probabilities(all);
+  EXPECT_NEAR(all[0].probability, 0.7, 1e-12);
+  EXPECT_NEAR(all[1].probability, 0.3 * 0.94, 1e-12);
+  EXPECT_NEAR(all[2].probability, 0.3 * 0.06, 1e-12);
+}
+
+TEST(Verdict, NamesTheLargestMass) {
+  const Conclusion c = conclude({answer(0.6, {"wind"}), answer(0.3, Answer::Kind::parameters),
+                                 answer(0.06, Answer::Kind::none), answer(0.04, Answer::Kind::unknown)});
+  EXPECT_EQ(c.kind, Conclusion::Kind::effect);
+  EXPECT_EQ(c.effects, std::vector<std::string>{"wind"});
+  EXPECT_EQ(c.probability, 0.6);
+  EXPECT_EQ(c.answer, 0u);
+  EXPECT_EQ(conclude({answer(0.4, {"wind"}), answer(0.6, Answer::Kind::none)}).kind, Conclusion::Kind::none);
+  EXPECT_EQ(conclude({answer(0.4, {"wind"}), answer(0.6, Answer::Kind::unknown)}).kind, Conclusion::Kind::unknown);
+  EXPECT_EQ(conclude({answer(0.4, {"wind"}), answer(0.6, Answer::Kind::parameters)}).answer, 1u);
+}
+
+TEST(Verdict, PoolsRivals) {
+  // together they outweigh the parameters, and neither is clear
+  const Conclusion c = conclude({answer(0.4, Answer::Kind::parameters), answer(0.3, {"rotational_lift"}),
+                                 answer(0.25, {"wake_capture"}), answer(0.05, Answer::Kind::none)});
+  EXPECT_EQ(c.kind, Conclusion::Kind::group);
+  EXPECT_EQ(c.effects, (std::vector<std::string>{"rotational_lift", "wake_capture"}));
+  EXPECT_DOUBLE_EQ(c.probability, 0.55);
+  EXPECT_EQ(c.answer, 1u);
+  // effects without a group are no rivals of each other
+  EXPECT_EQ(
+      conclude({answer(0.4, Answer::Kind::parameters), answer(0.3, {"body_drag"}), answer(0.3, {"clap_and_fling"})})
+          .kind,
+      Conclusion::Kind::parameters);
+}
+
+TEST(Verdict, NamesAMemberThatIsClear) {
+  // half of everything
+  Conclusion c = conclude({answer(0.51, {"rotational_lift"}), answer(0.49, {"wake_capture"})});
+  EXPECT_EQ(c.kind, Conclusion::Kind::effect);
+  EXPECT_EQ(c.probability, 0.51);
+  // four fifths of its pool
+  c = conclude({answer(0.41, {"rotational_lift"}), answer(0.09, {"wake_capture"}), answer(0.3, {"body_drag"}),
+                answer(0.2, {"clap_and_fling"})});
+  EXPECT_EQ(c.kind, Conclusion::Kind::effect);
+  EXPECT_EQ(c.effects, std::vector<std::string>{"rotational_lift"});
+  // what holds less than a twentieth of a pool is no member
+  c = conclude({answer(0.3, {"ground_effect"}), answer(0.28, {"battery_sag"}), answer(0.02, {"ceiling_effect"}),
+                answer(0.4, Answer::Kind::none)});
+  EXPECT_EQ(c.effects, (std::vector<std::string>{"ground_effect", "battery_sag"}));
+}
+
+TEST(Verdict, PoolsSetsByTheGroupsOfTheirEffects) {
+  EXPECT_EQ(pool_name({"wind", "body_drag"}), pool_name({"body_drag", "tether"}));
+  EXPECT_NE(pool_name({"wind"}), pool_name({"wind", "tether"}));
+  const Conclusion c =
+      conclude({answer(0.3, {"wind", "body_drag"}), answer(0.28, {"body_drag", "tether"}), answer(0.42, {"wind"})});
+  EXPECT_EQ(c.kind, Conclusion::Kind::group);
+  EXPECT_EQ(c.effects, (std::vector<std::string>{"wind", "body_drag", "tether"}));
+}
+
+// Between what refitted parameters leave and the floor lies the gap; three tenths of it more is too much.
+TEST(Verdict, RefutesWhatLeavesMore) {
+  const double floor = huber_floor();
+  const auto losses = [](double mean) { return Losses{{8 * mean, 4 * mean}, {8, 4}}; };
+  const Losses before = losses(floor + 1);
+  EXPECT_FALSE(refuted(before, losses(floor + 1.29)));
+  EXPECT_TRUE(refuted(before, losses(floor + 1.31)));
+  EXPECT_FALSE(refuted(before, losses(floor)));
+  EXPECT_FALSE(refuted(before, {})) << "a vehicle that came apart has no loss";
+}
+
+// Of coordinates with sd 0.2 and covariance 0.01: 1.4 times as wide, and a size of 2 by a tenth of itself besides.
+TEST(Verdict, WidensSizesAndShapes) {
+  const auto uncertain =
+      sim::read_randomisation(test::nominal(), io::Config::load(test::source_path("configs/gap/priors.toml")).root());
+  const Hypothesis h(uncertain, {"ground_effect"});  // one size, one shape
+  Fit fit;
+  fit.point.directions = Fitter::axes(h);
+  fit.point.at = h.start();
+  fit.posterior.mean = Eigen::VectorXd::Zero(h.size());
+  const Eigen::Index size = h.shared(), shape = size + 1;
+  ASSERT_EQ(h.size(), shape + 1);
+  fit.posterior.mean[size] = 2;
+  fit.posterior.covariance = 0.04 * Eigen::MatrixXd::Identity(h.size(), h.size());
+  fit.posterior.covariance(size, shape) = fit.posterior.covariance(shape, size) = 0.01;
+  widen(fit, h);
+  EXPECT_NEAR(fit.covariance()(size, size), 1.96 * 0.04 + 0.04, 1e-12);
+  EXPECT_NEAR(fit.covariance()(shape, shape), 1.96 * 0.04, 1e-12);
+  EXPECT_NEAR(fit.covariance()(size, shape), 1.96 * 0.01, 1e-12);
+  EXPECT_NEAR(fit.covariance()(0, 0), 0.04, 1e-12) << "parameters stay";
+  Answer a = answer(1, {"ground_effect"});
+  a.fit = fit;
+  const Size gain = sizes_of(a, uncertain)[0];  // 90 % of the prior up to 0.45
+  EXPECT_NEAR(gain.value, 2 * 0.45 / 1.645, 1e-12);
+  EXPECT_NEAR(gain.high - gain.low, 2 * 0.45 * std::sqrt(0.1184), 1e-12);
+}
+
+// ---- what is written
+
+TEST(Report, UnitsAreThoseOfTheNames) {
+  const std::pair<const char*, const char*> kExpected[] = {{"x_m", "m"},
+                                                           {"delay_s", "s"},
+                                                           {"dead_V", "V"},
+                                                           {"rise_K_W", "K/W"},
+                                                           {"fade_V_C", "V/C"},
+                                                           {"source_ohm", "ohm"},
+                                                           {"per_rad2", "1/rad^2"},
+                                                           {"compliance_rad_Nm", "rad/Nm"},
+                                                           {"x_m_s", "m/s"},
+                                                           {"twist_rad_N", "rad/N"},
+                                                           {"drag_area_m2", "m^2"},
+                                                           {"line_kg_m", "kg/m"},
+                                                           {"stiffness_N_m", "N/m"},
+                                                           {"gain_s2_m", "s^2/m"},
+                                                           {"stribeck_rad_s", "rad/s"},
+                                                           {"factor", ""},
+                                                           {"side_gain", ""},
+                                                           {"xy", ""},
+                                                           {"damping_ratio", ""}};
+  for (const auto& [name, unit] : kExpected) EXPECT_EQ(unit_of(name), unit) << name;
+}
+
+TEST(Report, SaysWhatToDoInThirtyLines) {
+  Report r;
+  r.conclusion = {Conclusion::Kind::group, {"wind", "tether"}, 0.9, 0};
+  for (const char* e : {"wind", "tether", "body_drag", "added_mass", "battery_sag"}) {
+    Reported c;
+    c.effects = {e};
+    c.group = pool_name(c.effects);
+    c.probability = 0.2;
+    for (int i = 0; i < 20; ++i) c.sizes.push_back({std::string(e) + ".x_m_s", 0.3, 0.1, 0.5, "m/s"});
+    r.candidates.push_back(c);
+  }
+  for (int i = 0; i < 50; ++i) {
+    r.places.push_back({"refit", i % 2 == 0 ? "regime" : "phase", i % kChannels, "somewhere", 2, 1, 1e-3, true});
+    r.moved.push_back({"torso.mass_kg", 1.5});
+  }
+  r.places.push_back({"refit", "frequency", 0, "0 to 0.5 Hz", 2, 1, 1e-3, true});
+  r.closed_loop = {{"flight", "mean_bias_V", 1, 0, 0.9}};
+  r.next = NextExperiment{"dash", {"wind", "tether"}, 3};
+  r.closure = Closure{0.9, 0.8, 0.95};
+  const auto all = [&] {
+    std::string text;
+    const std::vector<std::string> lines = summary_of(r, "/out");
+    EXPECT_LE(lines.size() + 1, kSummaryLines) << "one more for the files";
+    for (const std::string& l : lines) text += l + "\n";
+    return text;
+  };
+  std::string text = all();
+  EXPECT_TRUE(text.starts_with(
+      "Missing in the model: one of wind or tether, which these flights cannot tell apart (together 0.90)\n"))
+      << text;
+  EXPECT_NE(text.find("wind.x_m_s"), std::string::npos);
+  EXPECT_NE(text.find("0.3 (0.1 to 0.5) m/s\n"), std::string::npos);
+  EXPECT_NE(text.find("runners-up: tether 0.2"), std::string::npos) << text;
+  r.conclusion = {Conclusion::Kind::effect, {"wind"}, 0.3, 0};
+  EXPECT_NE(all().find("(probability 0.30, no more than a guess)"), std::string::npos);
+  EXPECT_NE(all().find("--set vehicle=/out/vehicle_corrected.toml"), std::string::npos);
+  EXPECT_NE(all().find("wind and tether differ most in configs/gap/experiments/dash.toml"), std::string::npos);
+  EXPECT_NE(all().find("mean_bias_V recorded 1, by the vehicle's file 0, by the corrected one 0.9"), std::string::npos);
+  for (const auto& [kind, begin] : {std::pair{Conclusion::Kind::none, "No gap beyond noise"},
+                                    {Conclusion::Kind::parameters, "Nothing is missing"},
+                                    {Conclusion::Kind::unknown, "Something is missing in the model that no entry"}}) {
+    r.conclusion = {kind, {}, 0.9, 0};
+    EXPECT_TRUE(all().starts_with(begin)) << all();
+  }
+  r.complete = false;
+  EXPECT_TRUE(all().starts_with("Stopped before every effect was weighed")) << all();
+  EXPECT_EQ(all().find("vehicle_corrected.toml"), std::string::npos);
+  r.complete = true;
+  r.conclusion.kind = Conclusion::Kind::data;
+  r.faults = std::vector<flightlog::DataFault>(40, {"imu.csv", 7, "degrees"});
+  EXPECT_NE(all().find("imu.csv:7: degrees"), std::string::npos);
+}
+
+TEST(Report, JsonTellsNoGapByNull) {
+  Report r;
+  r.flights = {"a"};
+  r.faults = {{"imu.csv", 3, "degrees"}};
+  r.conclusion = {Conclusion::Kind::data, {}, 1, 0};
+  r.refit = 0.6;
+  Reported c;
+  c.effects = {"wind"};
+  c.group = "world_force";
+  c.sizes = {{"wind.x_m_s", 0.3, 0.1, 0.5, "m/s"}};
+  r.candidates = {c};
+  for (int i = 0; i < 30; ++i)
+    r.places.push_back({i < 2 ? "effect" : "refit", i == 2 ? "input" : "regime", kForceZ, "height below 1 m",
+                        static_cast<double>(i), 1, 0.01, i != 29});
+  nlohmann::ordered_json j = diagnosis_json(r);
+  EXPECT_EQ(j["data_faults"].dump(), R"([{"file":"imu.csv","line":3,"what":"degrees"}])");
+  EXPECT_EQ(j["verdict"].dump(), R"({"kind":"data","effects":[],"probability":1.0})");
+  EXPECT_EQ(
+      j["candidates"].dump(),
+      R"([{"effects":["wind"],"group":"world_force","probability":0.0,"parameters":{"wind.x_m_s":{"value":0.3,"low":0.1,"high":0.5,"unit":"m/s"}},"closure":null}])");
+  EXPECT_TRUE(j["gap"]["nominal"].is_null());
+  EXPECT_EQ(j["gap"]["refit"], 0.6);
+  EXPECT_TRUE(j["gap"]["closure_low"].is_null());
+  ASSERT_EQ(j["where"].size(), 20u);
+  EXPECT_EQ(j["where"][0].dump(),
+            R"({"channel":"force_z","regime":"height below 1 m","gap":28.0,"noise_floor":1.0,"p_value":0.01})");
+  r.closure = Closure{0.9, 0.8, 0.95};
+  r.candidates[0].closure = r.closure;
+  j = diagnosis_json(r);
+  EXPECT_EQ(j["gap"]["closure_high"], 0.95);
+  EXPECT_EQ(j["candidates"][0]["closure"], 0.9);
+}
+
+std::string contents(const std::filesystem::path& path) { return io::read_text(path); }
+
+/// `kind` and numbers of the types that the schema has.
+void expect_schema(const nlohmann::ordered_json& j) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : j.items()) keys.push_back(key);
+  EXPECT_EQ(keys, (std::vector<std::string>{"schema", "flights", "data_faults", "verdict", "where", "candidates",
+                                            "unexplained", "gap", "closed_loop", "next_experiment"}));
+  double sum = 0;
+  for (const auto& c : j["candidates"]) {
+    sum += c["probability"].get<double>();
+    for (const auto& [name, p] : c["parameters"].items()) {
+      EXPECT_LE(p["low"], p["value"]) << name;
+      EXPECT_GE(p["high"], p["value"]) << name;
+      EXPECT_TRUE(p["unit"].is_string());
+    }
+  }
+  EXPECT_NEAR(sum, 1, 1e-12);
+  EXPECT_GT(j["gap"]["nominal"].get<double>(), j["gap"]["refit"].get<double>());
+  EXPECT_LE(j["where"].size(), 20u);
+}
+
+TEST(RunDiagnose, ReadsNoTruth) {
+  const flight::Folder folder;
+  rollout::FlyOptions options;
+  options.log_folder = folder / "flight";
+  rollout::fly(rollout::read_fly_config(kConfigs + "fly/identify_multisine.toml",
+                                        {"vehicle=../vehicles/hummingbird_identified.toml", "flight.duration_s=4"}),
+               options);
+  DiagnoseCommand command;
+  command.vehicle = kConfigs + "vehicles/hummingbird_nominal.toml";
+  command.priors = kConfigs + "gap/priors.toml";
+  command.flights = {options.log_folder.string()};
+  command.out = folder / "out";
+  for (const model::EffectEntry& e : model::effects())
+    if (std::string(e.info.id) != "clap_and_fling") command.withheld.push_back(e.info.id);
+  const std::filesystem::path truth = options.log_folder / "truth.csv";
+  const std::string honest = contents(truth);
+  const auto result = [&] {
+    std::string bytes = run_diagnose(command).dump();
+    for (const char* file : {"diagnosis.json", "vehicle_corrected.toml", "residuals.csv", "candidates.csv"})
+      bytes += contents(folder / "out" / file);
+    return bytes;
+  };
+  const std::string with_truth = result();
+  // the identified one flew: believed 0, flew 0.04 rad, and by so little off is the middle of the stroke seen
+  const model::Vehicle fixed = model::read_vehicle(folder / "out/vehicle_corrected.toml"), flew = test::identified();
+  EXPECT_NEAR(fixed.left.spring.rest_angle_rad, flew.left.spring.rest_angle_rad, 0.02);
+  EXPECT_NEAR(fixed.right.spring.rest_angle_rad, flew.right.spring.rest_angle_rad, 0.02);
+  EXPECT_TRUE(fixed.posterior);
+  expect_schema(nlohmann::ordered_json::parse(contents(folder / "out/diagnosis.json")));
+  std::filesystem::remove(truth);
+  EXPECT_EQ(result(), with_truth) << "without truth";
+  // a lie: another flight's motion, in a file that reads well
+  std::string lie = honest.substr(0, honest.find('\n') + 1);
+  const std::string line = honest.substr(lie.size(), honest.find('\n', lie.size()) + 1 - lie.size());
+  for (int i = 0; i < 100; ++i) lie += std::to_string(i) + line.substr(line.find(','));
+  std::ofstream(truth) << lie;
+  // and, in one go, without gnuplot: a line of warning, all else written
+  for (const char* figure : {"residuals.svg", "probabilities.svg"}) {
+    EXPECT_TRUE(contents(folder / "out" / figure).ends_with("</svg>\n\n")) << figure;
+    std::filesystem::remove(folder / "out" / figure);
+  }
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", "/nowhere", 1);
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(result(), with_truth) << "beside a lie";
+  setenv("PATH", path.c_str(), 1);
+  const std::string warning =
+      "warning: " + (folder / "out/residuals.svg").string() + ": is not written: gnuplot is not installed\n";
+  EXPECT_NE(testing::internal::GetCapturedStderr().find(warning), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/residuals.svg"));
+  // after Ctrl-C, which nothing takes back, so last
+  io::stop_on_interrupt();
+  std::raise(SIGINT);
+  EXPECT_EQ(run_diagnose(command)["complete"], false);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/vehicle_corrected.toml")) << "of a diagnosis that was stopped";
+}
+
+// Where `run_diagnose` complains before it reads a flight; of the vehicle with the place in its file.
+TEST(RunDiagnose, RefusesWhatItCannotAnswer) {
+  const flight::Folder folder;
+  DiagnoseCommand command;
+  command.vehicle = kConfigs + "vehicles/hummingbird_nominal.toml";
+  command.priors = kConfigs + "gap/priors.toml";
+  command.flights = {(folder / "").string(), (folder / ".").string()};
+  const auto refusal = [&] { return test::refusal([&] { run_diagnose(command); }); };
+  EXPECT_EQ(refusal(), command.flights[1] + ": is given twice; accepted: each flight once");
+  command.flights.pop_back();
+  const std::string nominal = contents(command.vehicle);
+  command.vehicle = (folder / "v.toml").string();
+  const auto with = [&](const std::string& text) { std::ofstream(command.vehicle) << text; };
+  with(nominal + "\n[effects.wind]\nx_m_s = 0.1\n");
+  EXPECT_TRUE(refusal().ends_with(
+      ": effects: what is missing is asked of the vehicle as it was believed; accepted: a vehicle without effects"))
+      << refusal();
+  EXPECT_TRUE(refusal().starts_with(command.vehicle + ":")) << refusal();
+  std::string fast = nominal;
+  with(fast.replace(fast.find("hold_s = 1e-3"), 13, "hold_s = 5e-5"));
+  EXPECT_TRUE(
+      refusal().ends_with(": driver.hold_s: physics goes by steps of 1e-04 s here; accepted: a multiple of that"))
+      << refusal();
+}
+
+}  // namespace
+}  // namespace flappy::gap

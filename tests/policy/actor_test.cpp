@@ -1,0 +1,312 @@
+// Actors: lanes against an evaluation of their own in double, and the file.
+#include "policy/actor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <random>
+
+#include "flight/fleets.hpp"
+#include "sim/lanes.hpp"
+
+namespace flappy::flight {
+namespace {
+
+policy::Actor random_actor(std::vector<int> widths, policy::Activation hidden, std::uint32_t seed) {
+  std::mt19937 engine(seed);
+  std::normal_distribution<double> normal;
+  policy::Actor a;
+  a.task = "test";
+  a.widths = std::move(widths);
+  a.hidden = hidden;
+  for (std::size_t layer = 0; layer + 1 < a.widths.size(); ++layer)
+    for (int o = 0; o < a.widths[layer + 1]; ++o)
+      for (int i = 0; i <= a.widths[layer]; ++i) a.weights.push_back(normal(engine) / std::sqrt(a.widths[layer] + 1.0));
+  for (int i = 0; i < a.widths[0]; ++i) {
+    a.observation.push_back("o" + std::to_string(i));
+    a.mean.push_back(normal(engine));
+    a.scale.push_back(0.5 + std::abs(normal(engine)));
+  }
+  a.action = {"amplitude", "difference", "bias", "split_cycle"};
+  a.clip = 2.5;
+  return a;
+}
+
+std::vector<double> expected(const policy::Actor& a, std::vector<double> x) {
+  for (std::size_t i = 0; i < x.size(); ++i)
+    x[i] = std::min(std::max((x[i] - a.mean[i]) * a.scale[i], -a.clip), a.clip);
+  std::size_t weight = 0;
+  for (std::size_t layer = 1; layer < a.widths.size(); ++layer) {
+    std::vector<double> y;
+    for (int o = 0; o < a.widths[layer]; ++o) {
+      double sum = a.weights[weight++];
+      for (const double in : x) sum += a.weights[weight++] * in;
+      const bool last = layer + 1 == a.widths.size();
+      y.push_back(last || a.hidden == policy::Activation::tanh ? std::tanh(sum) : std::max(sum, 0.0));
+    }
+    x = y;
+  }
+  EXPECT_EQ(weight, a.weights.size());
+  return x;
+}
+
+template <class T>
+struct Numbers {
+  std::vector<T> all;
+  policy::ActorView<T> view;
+  explicit Numbers(const policy::Actor& a) {
+    for (const auto* list : {&a.weights, &a.mean, &a.scale})
+      for (const double x : *list) all.push_back(static_cast<T>(x));
+    view.layers = static_cast<int>(a.widths.size()) - 1;
+    for (std::size_t i = 0; i < a.widths.size(); ++i) view.widths[i] = a.widths[i];
+    view.hidden = a.hidden;
+    view.weights = all.data();
+    view.mean = all.data() + a.weights.size();
+    view.scale = view.mean + a.mean.size();
+    view.clip = static_cast<T>(a.clip);
+  }
+};
+
+/// Weights have size 1/sqrt(inputs), so sums have size 1 and gather sqrt(inputs) roundings for each layer, which the next one
+/// carries on: 40 ulp for up to six layers. Measured: 6.
+template <class T, int N>
+void lanes_agree() {
+  using L = model::Lanes<T, N>;
+  std::mt19937 engine(5);
+  std::normal_distribution<double> normal(0, 2);
+  for (const policy::Activation hidden : {policy::Activation::relu, policy::Activation::tanh})
+    for (const std::vector<int>& widths :
+         {std::vector<int>{3, 4}, {1, 1, 4}, {17, 31, 4}, {18, 64, 64, 4}, {5, 7, 9, 11, 13, 15, 4}, {32, 256, 3, 4}}) {
+      const policy::Actor a = random_actor(widths, hidden, 3);
+      const Numbers<T> numbers(a);
+      std::vector<L> in(static_cast<std::size_t>(widths[0]));
+      for (L& row : in)
+        for (int i = 0; i < N; ++i) row.raw[i] = static_cast<T>(normal(engine));
+      L out[kActions];
+      evaluate(numbers.view, in.data(), out);
+      for (int i = 0; i < N; ++i) {
+        std::vector<double> alone;
+        for (const L& row : in) alone.push_back(row.raw[i]);
+        const std::vector<double> y = expected(a, alone);
+        for (std::size_t k = 0; k < y.size(); ++k)
+          EXPECT_NEAR(out[k].raw[i], y[k], 40 * std::numeric_limits<T>::epsilon())
+              << widths.size() << " layers, lane " << i;
+      }
+      // a lane of NaN is nobody else's affair
+      const std::vector<L> good = in;
+      for (L& row : in) row.raw[1] = std::numeric_limits<T>::quiet_NaN();
+      L beside[kActions];
+      evaluate(numbers.view, in.data(), beside);
+      for (int k = 0; k < kActions; ++k)
+        for (int i = 0; i < N; ++i)
+          if (i != 1) EXPECT_EQ(beside[k].raw[i], out[k].raw[i]);
+    }
+}
+
+TEST(Actor, LanesOfFloatAreTheNetwork) { lanes_agree<float, 4>(); }
+TEST(Actor, LanesOfDoubleAreTheNetwork) { lanes_agree<double, 2>(); }
+
+TEST(Actor, ClipsItsInputs) {
+  const policy::Actor a = random_actor({3, 5, 4}, policy::Activation::tanh, 7);
+  const Numbers<double> numbers(a);
+  using L = model::Lanes<double, 2>;
+  L in[3], out[4];
+  for (int i = 0; i < 3; ++i) in[i].raw[0] = 1e6, in[i].raw[1] = a.mean[static_cast<std::size_t>(i)] + 1e3;
+  evaluate(numbers.view, in, out);
+  for (const L& y : out) EXPECT_EQ(y.raw[0], y.raw[1]);
+}
+
+/// The hover task, whose observation has 18 rows.
+FleetOptions hovering() {
+  const auto text = io::Config::load(test::source_path("configs/tasks/hover.toml"));
+  return fleet_options(sensors("paper"), controller("pid"), read_task(text.root(), 0.002));
+}
+
+policy::Actor fitting(const Task& task) {
+  policy::Actor a = random_actor({static_cast<int>(task.observation().size()), 16, 4}, policy::Activation::relu, 9);
+  a.observation.clear(), a.action.clear();
+  for (const Signal& s : task.observation()) a.observation.push_back(s.name);
+  for (const Signal& s : task.action()) a.action.push_back(s.name);
+  return a;
+}
+
+TEST(Actor, ActsInAFleetOnWhatItObserves) {
+  const FleetOptions o = hovering();
+  const auto actor = std::make_shared<policy::Actor>(fitting(o.task));
+  Fleet<double> with(3, test::nominal(), o), by_hand(3, test::nominal(), o);
+  with.set_actor(actor);
+  for (int period = 0; period < 50; ++period) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::vector<double> y = expected(*actor, by_hand.observation(i));
+      by_hand.set_action(i, {y[0], y[1], y[2], y[3]});
+    }
+    with.step();
+    by_hand.step();
+    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(with.input(i).bias_V, by_hand.input(i).bias_V, 1e-9);
+  }
+}
+
+TEST(Actor, HoldsItsActionAndGathersWhatItEarns) {
+  FleetOptions o = hovering();
+  o.task.hold = 3;
+  const auto actor = std::make_shared<policy::Actor>(fitting(o.task));
+  Fleet<double> fleet(2, test::nominal(), o);
+  fleet.set_actor(actor);
+  std::vector<double> acted;
+  double gained = 0;
+  for (std::uint32_t tick = 0; tick < 20; ++tick) {
+    if (tick == 7) fleet.start(1, 1);  // whose actions are then out of step with the other's
+    if (tick % 3 == 0) acted = expected(*actor, fleet.observation(0)), gained = 0;
+    fleet.step();
+    gained += fleet.reward(0);
+    for (std::size_t k = 0; k < kActions; ++k) ASSERT_NEAR(fleet.action(0)[k], acted[k], 1e-12) << tick;
+    ASSERT_NEAR(fleet.gain(0), gained, 1e-12) << tick;
+    ASSERT_EQ(fleet.tick(1), tick < 7 ? tick + 1 : tick - 6);
+  }
+}
+
+TEST(Actor, ExploresWithNoiseOfItsDeviationAndMemory) {
+  FleetOptions o = hovering();
+  o.task.hold = 2;
+  policy::Actor quiet = fitting(o.task);
+  for (double& w : quiet.weights) w = 0;
+  const std::size_t n = 256;
+  const int steps = 40;
+  Fleet<float> fleet(n, test::nominal(), o);
+  fleet.set_actor(std::make_shared<policy::Actor>(quiet));
+  fleet.set_exploration({0.05, 0.15, 0.6});
+  std::vector<std::array<float, kActions>> last(n);
+  double low = 0, high = 0, with_last = 0, of_two = 0;
+  const double burn_in = 15;  // 0.6^15 of the start, which is at rest, is left
+  for (int step = 0; step < steps; ++step) {
+    fleet.step(), fleet.step();
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto a = fleet.action(i);
+      for (std::size_t k = 0; k < kActions && step >= burn_in; ++k) {
+        (i < n / 2 ? low : high) += a[k] * a[k];
+        const double deviation = 0.05 + 0.1 * static_cast<double>(i) / (n - 1);
+        with_last += a[k] * last[i][k] / (deviation * deviation), of_two += 1;
+      }
+      last[i] = a;
+    }
+  }
+  // Means of sigma^2 over each half of a line; 12,800 samples a half, of which (1 - 0.36)/(1 + 0.36) are independent: 1.8 %
+  const auto half = [](double from, double to) { return (from * from + from * to + to * to) / 3; };
+  EXPECT_NEAR(low / (of_two / 2) / half(0.05, 0.1), 1, 0.08);
+  EXPECT_NEAR(high / (of_two / 2) / half(0.1, 0.15), 1, 0.08);
+  EXPECT_NEAR(with_last / of_two, 0.6, 0.05);
+  fleet.set_exploration({});
+  fleet.step(), fleet.step();
+  EXPECT_EQ(fleet.action(3)[1], 0);
+}
+
+TEST(Actor, MustFitItsTask) {
+  const FleetOptions o = hovering();
+  Fleet<float> fleet(1, test::nominal(), o);
+  EXPECT_NO_THROW(fleet.set_actor(std::make_shared<policy::Actor>(fitting(o.task))));
+  policy::Actor other = fitting(o.task);
+  other.observation[3] = "something_else";
+  EXPECT_THROW(fleet.set_actor(std::make_shared<policy::Actor>(other)), std::invalid_argument);
+  other = fitting(o.task);
+  std::swap(other.action[0], other.action[1]);
+  EXPECT_THROW(fleet.set_actor(std::make_shared<policy::Actor>(other)), std::invalid_argument);
+  EXPECT_THROW(fleet.set_actor(std::make_shared<policy::Actor>(random_actor({40, 4}, policy::Activation::relu, 1))),
+               std::invalid_argument);
+  fleet.step();  // and goes on with the one it had
+  EXPECT_NO_THROW(fleet.set_actor(nullptr));
+}
+
+std::string file_name() { return testing::TempDir() + "actor_test.json"; }
+
+TEST(ActorFile, ReadsBackWhatWasWritten) {
+  policy::Actor a = random_actor({18, 5, 4}, policy::Activation::tanh, 11);
+  a.weights[3] = -0.0, a.weights[4] = 1e-300, a.weights[5] = 1.0 / 3;
+  write_actor(file_name(), a);
+  const policy::Actor b = policy::read_actor(file_name());
+  EXPECT_EQ(b.task, a.task);
+  EXPECT_EQ(b.observation, a.observation);
+  EXPECT_EQ(b.action, a.action);
+  EXPECT_EQ(b.widths, a.widths);
+  EXPECT_EQ(b.hidden, a.hidden);
+  EXPECT_EQ(b.weights, a.weights);
+  EXPECT_EQ(b.mean, a.mean);
+  EXPECT_EQ(b.scale, a.scale);
+  EXPECT_EQ(b.clip, a.clip);
+  EXPECT_EQ(policy::weight_count({18, 5, 4}), 19u * 5 + 6 * 4);
+}
+
+std::string refused(const std::string& text) {
+  std::ofstream(file_name()) << text;
+  try {
+    policy::read_actor(file_name());
+    return "accepted";
+  } catch (const io::InputError& e) {
+    const std::string what = e.what();
+    EXPECT_EQ(what.find(file_name()), 0u) << what;  // says which file
+    return what;
+  }
+}
+
+TEST(ActorFile, RefusesWhatIsNoActor) {
+  const auto with = [](const std::function<void(policy::Actor&)>& change) {
+    policy::Actor a = random_actor({3, 5, 4}, policy::Activation::relu, 13);
+    change(a);
+    write_actor(file_name(), a);
+    return refused(io::read_text(file_name()));
+  };
+  const auto has = [](const std::string& text, const std::string& part) {
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  };
+  EXPECT_EQ(with([](policy::Actor&) {}), "accepted");
+  has(with([](policy::Actor& a) { a.weights.pop_back(); }), "weights has 43 entries; accepted: 44 of them");
+  has(with([](policy::Actor& a) { a.observation.emplace_back("more"); }), "observation has 4");
+  has(with([](policy::Actor& a) { a.action.pop_back(); }), "action has 3");
+  has(with([](policy::Actor& a) { a.mean.clear(); }), "mean has 0");
+  has(with([](policy::Actor& a) { a.scale.push_back(1); }), "scale has 4");
+  has(with([](policy::Actor& a) { a.widths = {3}; }), "0 layers");
+  has(with([](policy::Actor& a) { a.widths = {}; }), "layers");
+  has(with([](policy::Actor& a) { a.widths = std::vector<int>(8, 3); }), "7 layers");
+  has(with([](policy::Actor& a) { a.widths = {3, 257, 4}; }), "257 wide");
+  has(with([](policy::Actor& a) { a.widths = {3, 0, 4}; }), "0 wide");
+  has(with([](policy::Actor& a) { a.widths = {3, -5, 4}; }), "-5 wide");
+  has(with([](policy::Actor& a) { a.widths = {3, 5, 3}; }), "widths has 3");
+  has(with([](policy::Actor& a) { a.weights[7] = std::numeric_limits<double>::quiet_NaN(); }),
+      "weights has null in it; accepted: numbers");
+  has(with([](policy::Actor& a) { a.mean[1] = std::numeric_limits<double>::infinity(); }),
+      "mean has null in it; accepted: numbers");
+  has(with([](policy::Actor& a) { a.clip = -1; }), "clip is -1");
+  has(with([](policy::Actor& a) { a.clip = 0; }), "clip is 0");
+
+  policy::write_actor(file_name(), random_actor({3, 5, 4}, policy::Activation::relu, 13));
+  const std::string good = io::read_text(file_name());
+  const auto edited = [&](const std::string& old, const std::string& fresh) {
+    std::string text = good;
+    const auto where = text.find(old);
+    EXPECT_NE(where, std::string::npos) << old;
+    return refused(text.replace(where, old.size(), fresh));
+  };
+  has(edited("\"schema\":1", "\"schema\":2"), "schema");
+  has(edited("\"relu\"", "\"gelu\""), "gelu");
+  has(edited("\"relu\"", "5"), "string");
+  for (const char* key :
+       {"schema", "task", "observation", "action", "widths", "hidden", "mean", "scale", "clip", "weights"})
+    has(edited("\"" + std::string(key) + "\":", "\"x\":"), key);
+  has(edited("\"widths\":[3,", "\"widths\":[\"a\","), "number");
+  has(edited("\"widths\":[3,", "\"widths\":[true,"), "whole numbers");
+  has(edited("\"widths\":[3,5,4]", "\"widths\":[3,4294967301,4]"), "4294967301 wide");
+  has(edited("\"widths\":[3,5,4]", "\"widths\":[3,5.7,4]"), "5.7");
+  has(edited("\"clip\":2.5", "\"clip\":1e999"), "no JSON");
+  has(with([](policy::Actor& a) { a.weights[3] = -1e39; }), "has -1e+39 in it, which single precision does not hold");
+  has(edited("\"weights\":[", "\"weights\":[[1],"), "weights has [1] in it");
+  has(refused(""), "no JSON");
+  has(refused("[1, 2]"), "actor file");
+  has(refused(good.substr(0, good.size() / 2)), "no JSON");
+  EXPECT_THROW(policy::read_actor(testing::TempDir() + "there_is_no_such_file.json"), io::InputError);
+}
+
+}  // namespace
+}  // namespace flappy::flight

@@ -1,0 +1,257 @@
+// What a configuration of a flight may say, and what is added to the inputs.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "io/sha256.hpp"
+#include "rollout/fly.hpp"
+#include "rollout/fly_fixture.hpp"
+
+namespace flappy::flight {
+namespace {
+
+TEST(FlyConfig, ShippedOnesAreRead) {
+  int count = 0;
+  for (const auto& entry : fs::directory_iterator(source_path("configs/fly"))) {
+    EXPECT_EQ(refusal({}, entry.path()), "accepted") << entry.path();
+    ++count;
+  }
+  EXPECT_GE(count, 8);
+  const rollout::FlyConfig c = rollout::read_fly_config(kHover);
+  EXPECT_EQ(c.vehicle_file_name, "hummingbird_identified.toml");
+  EXPECT_EQ(c.vehicle_sha256, io::sha256(io::read_text(source_path("configs/vehicles/hummingbird_identified.toml"))));
+  EXPECT_EQ(c.fleet.control_hz, 500);
+  EXPECT_EQ(c.fleet.batch.world.ground_z_m, 0);
+  EXPECT_EQ(c.settle_s, 3);
+  EXPECT_FALSE(c.excitation.changes());
+}
+
+TEST(FlyConfig, OverridesReachTheFileTheyName) {
+  const rollout::FlyConfig c =
+      rollout::read_fly_config(kHover, {"vehicle.left.motor.resistance_ohm=14", "sensors.mocap.loss_probability = 0.1",
+                                        "controller.attitude.pitch.p=4.25", "task.end.time_s=7", "flight.seed=9",
+                                        "world.walls=[[1.0, 0, -1, 0]]"});
+  EXPECT_EQ(c.vehicle.left.motor.resistance_ohm, 14);
+  EXPECT_EQ(c.vehicle_sha256, "");
+  EXPECT_EQ(c.fleet.sensors.mocap.loss_probability, 0.1);
+  EXPECT_EQ(c.fleet.controller.pid.pitch.p, 4.25);
+  EXPECT_EQ(c.fleet.task.constants.limits.time_s, 7);
+  EXPECT_EQ(c.fleet.seed, 9u);
+  ASSERT_EQ(c.fleet.batch.world.walls.size(), 1u);
+  EXPECT_EQ(c.fleet.batch.world.walls[0].normal_x, -1);
+
+  const rollout::FlyConfig arc =
+      rollout::read_fly_config(kHover, {"controller=../controllers/arc.toml", "controller.heading.k_1_s=3"});
+  EXPECT_EQ(arc.fleet.controller.kind, Controller::Kind::arc);
+  EXPECT_EQ(arc.fleet.controller.arc.heading.k_1_s, 3);
+
+  const rollout::FlyConfig random = rollout::read_fly_config(kHover, {"randomisation=../randomisation/published.toml"});
+  EXPECT_EQ(random.vehicle_sha256, "");
+  EXPECT_NE(random.vehicle_of(0).torso.mass_kg, random.vehicle_of(1).torso.mass_kg);
+  EXPECT_EQ(c.vehicle_of(0).torso.mass_kg, c.vehicle_of(1).torso.mass_kg);
+}
+
+TEST(FlyConfig, DrawsFromThePosteriorOfTheVehicle) {
+  const Folder folder;
+  model::Vehicle v = test::identified();
+  v.posterior = {{"torso.mass_kg"}, {0.012}, {{1e-8}}};
+  folder.write("v.toml", model::vehicle_text(v));
+  const std::string vehicle = "vehicle=" + (folder / "v.toml").string();
+  const rollout::FlyConfig c =
+      rollout::read_fly_config(kHover, {vehicle, "randomisation=posterior", "flight.duration_s=0.1"});
+  EXPECT_NE(c.vehicle_of(0).torso.mass_kg, c.vehicle_of(1).torso.mass_kg);
+  EXPECT_NEAR(c.vehicle_of(0).torso.mass_kg, 0.012, 6e-4);  // six of its sd
+  EXPECT_EQ(c.vehicle_sha256, "");
+  for (const auto& [file, text] : c.resolved) folder.write(file, text);
+  EXPECT_EQ(rollout::fly(rollout::read_fly_config(folder / "rollout::fly.toml"), {.count = 2}).hash,
+            rollout::fly(c, {.count = 2}).hash);
+  EXPECT_EQ(refusal({"randomisation=posterior"}),
+            "--set randomisation=posterior: randomisation: the vehicle has no [posterior]; accepted: a file of "
+            "[[randomise]] tables, or a vehicle that flappy-gap corrected");
+  EXPECT_EQ(refusal({vehicle, "randomisation=posterior", "randomisation.schema=1"}),
+            "--set randomisation=posterior: randomisation: is \"posterior\", but overridden; accepted: a file of "
+            "[[randomise]] tables");
+}
+
+TEST(FlyConfig, RefusesInOneLine) {
+  const std::string pid = source_path("configs/fly/../controllers/pid.toml");
+  EXPECT_EQ(
+      refusal({"flight.duration_s=0"}),
+      "--set flight.duration_s=0: flight.duration_s: 0 is out of range; accepted: a number above 0, at most 1e+05");
+  EXPECT_EQ(
+      refusal({"controller.attitude.pitch.p=-1"}),
+      "--set controller.attitude.pitch.p=-1: attitude.pitch.p: -1 is out of range; accepted: a number from 0 to 1000");
+  EXPECT_EQ(refusal({"controller=3"}), "--set controller=3: controller: is an integer; accepted: the name of a file");
+  EXPECT_EQ(refusal({"controller=none_such.toml"}),
+            source_path("configs/fly/none_such.toml") + ": cannot be read: No such file or directory");
+  EXPECT_EQ(refusal({"vehicle.torso.mass_g=12"}),
+            "--set vehicle.torso.mass_g=12: torso.mass_g: unknown key; accepted here with another unit: \"mass_kg\"");
+  EXPECT_EQ(refusal({"flight.control_hz=300"}),
+            "--set flight.control_hz=300: flight.control_hz: its period is no whole number of steps; accepted: 1 / (n "
+            "step_s)");
+  EXPECT_EQ(
+      refusal({"flight.step_s=4e-4"}),
+      "--set flight.step_s=4e-4: flight.step_s: does not divide the driver's hold of 0.001 s; accepted: hold_s / n");
+  EXPECT_EQ(refusal({"flight.step_s=5e-5", "vehicle.effects.command_delay.delay_s=0.02"}),
+            "--set flight.step_s=5e-5: flight.step_s: is too short for a command_delay of 0.02 s, of which 254 steps "
+            "are kept; accepted: a longer step, or a shorter delay");
+  EXPECT_EQ(
+      refusal({"flight.step_s=5e-4", "sensors.imu.rate_hz=4000"}),
+      "--set flight.step_s=5e-4: flight.step_s: is longer than the 0.00025 s between samples of a sensor; accepted: a "
+      "shorter step, or a slower sensor");
+  EXPECT_EQ(refusal({"flight.support=glued"}),
+            "--set flight.support=glued: flight.support: \"glued\" is not known; accepted: \"task\", \"welded\"");
+  EXPECT_EQ(
+      message([] { rollout::read_fly_config(source_path("configs/fly/escape.toml"), {"flight.support=welded"}); }),
+      "--set flight.support=welded: flight.support: is \"welded\", but task \"escape\" starts from hover; accepted: "
+      "\"task\"");
+  EXPECT_EQ(refusal({"world.walls=[[0, 0, 1, 1]]"}),
+            "--set world.walls=[[0, 0, 1, 1]]: world.walls: normal of wall 0 has length 1.4142135623730951; accepted: "
+            "[x_m, y_m, normal_x, normal_y], the normal of length 1");
+  EXPECT_EQ(refusal({"randomisation.schema=1"}),
+            kHover + ": randomisation: is missing, but overridden; accepted: a file of [[randomise]] tables");
+  EXPECT_EQ(refusal({"log.power={battery_nominal_V=8, rate_hz=600, latency_s=0, voltage_noise_V=0, current_noise_A=0}"})
+                .substr(0, 10),
+            "--set log.");
+  EXPECT_EQ(refusal({"actor=none_such.json"}),
+            source_path("configs/fly/none_such.json") + ": cannot be read: No such file or directory");
+  EXPECT_EQ(refusal({"fligth.seed=1"}).substr(0, 60), "--set fligth.seed=1: fligth: unknown key; accepted: actor, c");
+  EXPECT_EQ(message([&] { rollout::read_fly_config(pid); }).find(": flight"), std::string::npos);
+}
+
+TEST(FlyConfig, RefusesAnActorOfAnotherTask) {
+  const Folder folder;
+  policy::Actor a;
+  a.task = "hover";
+  for (const Signal& s : rollout::read_fly_config(kHover).fleet.task.observation()) a.observation.push_back(s.name);
+  a.action = {"amplitude", "difference", "bias", "split_cycle"};
+  a.widths = {static_cast<int>(a.observation.size()), 4};
+  a.mean.assign(a.observation.size(), 0);
+  a.scale.assign(a.observation.size(), 1);
+  a.weights.assign(policy::weight_count(a.widths), 0);
+  write_actor(folder / "good.json", a);
+  EXPECT_EQ(refusal({"actor=" + (folder / "good.json").string()}), "accepted");
+  std::swap(a.observation[0], a.observation[1]);
+  write_actor(folder / "swapped.json", a);
+  const std::string line = refusal({"actor=" + (folder / "swapped.json").string()});
+  EXPECT_NE(line.find("actor: observes something else than task \"hover\"; accepted: R_xx, R_xy"), std::string::npos)
+      << line;
+}
+
+TEST(FlyConfig, ResolvedTextsFlyTheSame) {
+  for (const char* name : {"hover_randomised", "figure_eight"}) {
+    const Folder folder;
+    const rollout::FlyConfig c =
+        rollout::read_fly_config(source_path(std::string("configs/fly/") + name + ".toml"),
+                                 {"flight.duration_s=0.1", "controller.attitude.yaw.p=0.1", "flight.seed=3"});
+    for (const auto& [file, text] : c.resolved) folder.write(file, text);
+    EXPECT_EQ(rollout::fly(rollout::read_fly_config(folder / "rollout::fly.toml"), {.count = 2}).hash,
+              rollout::fly(c, {.count = 2}).hash)
+        << name;
+  }
+}
+
+// ---- excitation
+
+Excitation excitation(const std::string& text, const std::string& name = "e.toml") {
+  const io::Table root = io::Config::parse(text, name).root();
+  Excitation e = read_excitation(root, 10);
+  root.finish();
+  return e;
+}
+
+TEST(Excitation, StepLastsAsLongAsItSays) {
+  const Excitation e = excitation(
+      "constant_input = {amplitude_V = 9}\n"
+      "[[excitation]]\nkind = \"step\"\ninput = \"amplitude_V\"\nstart_s = 0.3\nduration_s = 0.1\nheight = 2.5\n");
+  int ticks = 0;
+  for (int tick = 0; tick < 500; ++tick) {
+    const double extra = e.at(tick * 0.002).amplitude_V - 9;
+    EXPECT_TRUE(extra == 0 || extra == 2.5);
+    if (extra != 0) ++ticks;
+  }
+  EXPECT_EQ(ticks, 50);
+  EXPECT_EQ(e.at(150 * 0.002).amplitude_V, 11.5);
+  EXPECT_EQ(e.at(200 * 0.002).amplitude_V, 9);
+}
+
+TEST(Excitation, SweepGoesThroughItsFrequencies) {
+  const Excitation e = excitation(
+      "[[excitation]]\nkind = \"sweep\"\ninput = \"bias_V\"\nstart_s = 1\nduration_s = 4\nfrom_hz = 2\nto_hz = "
+      "6\namplitude = 0.5\n");
+  EXPECT_EQ(e.at(0.999).bias_V, 0);
+  EXPECT_EQ(e.at(5).bias_V, 0);
+  for (const double t : {0.0, 0.3, 1.7, 3.99})
+    EXPECT_NEAR(e.at(1 + t).bias_V, 0.5 * std::sin(2 * kPi * (2 * t + 0.5 * t * t)), 1e-12) << t;
+}
+
+std::string multisine(const std::string& input, const std::string& more = "") {
+  return "[[excitation]]\nkind = \"multisine\"\ninput = \"" + input +
+         "\"\nrms = 0.2\nfrom_hz = 0.5\nto_hz = 12\ncount = 20\nperiod_s = 10\n" + more;
+}
+
+TEST(Excitation, MultisinesAreOrthogonalAndAsStrongAsStated) {
+  const Excitation e =
+      excitation(multisine("amplitude_V") + multisine("difference_V") + multisine("bias_V") + multisine("split_cycle"));
+  constexpr int kTicks = 5000;
+  std::array<std::vector<double>, 4> u;
+  for (int tick = 0; tick < kTicks; ++tick) {
+    const sim::Input x = e.at(tick * 0.002);
+    u[0].push_back(x.amplitude_V), u[1].push_back(x.difference_V), u[2].push_back(x.bias_V),
+        u[3].push_back(x.split_cycle);
+  }
+  const auto product = [&](int a, int b) {
+    double sum = 0;
+    for (int k = 0; k < kTicks; ++k) sum += u[a][k] * u[b][k];
+    return sum / kTicks;
+  };
+  for (int a = 0; a < 4; ++a) {
+    EXPECT_NEAR(product(a, a), 0.04, 1e-12);
+    for (int b = 0; b < a; ++b) EXPECT_NEAR(product(a, b), 0, 1e-12) << a << b;
+    const double peak = *std::ranges::max_element(u[a], {}, [](double x) { return std::abs(x); });
+    EXPECT_LT(std::abs(peak), 2.5 * 0.2);  // 20 sines in phase would reach 6.3
+    const std::vector<int>& h = e.waves[static_cast<std::size_t>(a)].harmonics;
+    EXPECT_EQ(h.size(), 20u);
+    EXPECT_GE(h.front(), 5);
+    EXPECT_LE(h.back(), 120);
+  }
+}
+
+TEST(Excitation, MultisineRefusals) {
+  EXPECT_EQ(message([] { excitation(multisine("bias_V") + multisine("bias_V", "start_s = -1\n")); }),
+            "e.toml:17:11: excitation[1].start_s: -1 is out of range; accepted: a number from 0 to 1e+05");
+  std::string other = multisine("bias_V");
+  other.replace(other.find("period_s = 10"), 13, "period_s = 20");
+  EXPECT_EQ(message([&] { excitation(multisine("bias_V") + other); }),
+            "e.toml:16:12: excitation[1].period_s: differs from that of another multisine; accepted: one period, so "
+            "that they "
+            "do not correlate");
+  std::string many = multisine("bias_V");
+  many.replace(many.find("count = 20"), 10, "count = 117");
+  EXPECT_EQ(message([&] { excitation(many); }),
+            "e.toml:7:9: excitation[0].count: the band holds 116 harmonics of this multisine's own; accepted: at most "
+            "that many; "
+            "a longer period_s has more");
+  EXPECT_EQ(message([] { excitation("[[excitation]]\nkind = \"noise\"\n"); }),
+            "e.toml:2:8: excitation[0].kind: \"noise\" is not known; accepted: \"step\", \"sweep\", \"multisine\", "
+            "\"script\"");
+}
+
+TEST(Excitation, ScriptHoldsEachRow) {
+  const Folder folder;
+  folder.write("s.csv", "t_s,amplitude_V,difference_V,bias_V,split_cycle\n0.1,9,0,0,0\n0.3,10,0.5,-1,0.02\n");
+  const std::string text = "[[excitation]]\nkind = \"script\"\nfile = \"s.csv\"\n";
+  const Excitation e = excitation(text, (folder / "e.toml").string());
+  EXPECT_EQ(e.at(0.098).amplitude_V, 0);
+  EXPECT_EQ(e.at(50 * 0.002).amplitude_V, 9);
+  EXPECT_EQ(e.at(150 * 0.002).amplitude_V, 10);
+  EXPECT_EQ(e.at(99).split_cycle, 0.02);
+  EXPECT_EQ(e.at(99).bias_V, -1);
+  folder.write("s.csv", "t_s,amplitude_V,difference_V,bias_V,split_cycle\n0.3,9,0,0,0\n0.3,10,0,0,0\n");
+  EXPECT_EQ(message([&] { excitation(text, (folder / "e.toml").string()); }),
+            (folder / "s.csv").string() +
+                ":3: t_s does not come after that of the line before; accepted: times that increase");
+}
+
+}  // namespace
+}  // namespace flappy::flight

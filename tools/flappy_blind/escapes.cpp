@@ -1,0 +1,139 @@
+#include "escapes.hpp"
+
+#include <omp.h>
+
+#include <cstdio>
+
+#include "blind/escape.hpp"
+#include "flight/constants.hpp"
+#include "io/progress.hpp"
+#include "io/toml_writer.hpp"
+#include "policy/policy.hpp"
+#include "rollout/fly_config.hpp"
+#include "rollout/outcome.hpp"
+
+namespace flappy::blind {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// A trained actor as it is on disk, or a policy from elsewhere.
+Policy policy_of(const fs::path& path, const rollout::FlyConfig& config) {
+  if (const auto& actor = config.actor) {
+    return [actor, task = config.fleet.task.constants](const std::vector<double>& observation) {
+      policy::ActorView<double> view;
+      view.layers = static_cast<int>(actor->widths.size()) - 1;
+      std::ranges::copy(actor->widths, view.widths);
+      view.hidden = actor->hidden;
+      view.weights = actor->weights.data(), view.mean = actor->mean.data(), view.scale = actor->scale.data();
+      view.clip = actor->clip;
+      double action[flight::kActions];
+      policy::evaluate(view, observation.data(), action);
+      std::array<double, flight::kActions> adds{};
+      for (int i = 0; i < flight::kActions; ++i)
+        adds[static_cast<std::size_t>(i)] = flight::scaled_action(task, i, action[i]);
+      return adds;
+    };
+  }
+  const std::shared_ptr<const policy::Policy> policy =
+      policy::load_policy(path, static_cast<int>(config.fleet.task.observation().size()), flight::kActions);
+  return [policy, task = config.fleet.task.constants](const std::vector<double>& observation) {
+    const std::vector<float> row(observation.begin(), observation.end());
+    float action[flight::kActions];
+#pragma omp critical(policy)
+    policy->act(1, row.data(), action);
+    std::array<double, flight::kActions> adds{};
+    for (std::size_t i = 0; i < adds.size(); ++i)
+      adds[i] = std::clamp<double>(action[i], task.action_low[i], task.action_high[i]);
+    return adds;
+  };
+}
+
+EscapeRules rules_of(const EscapeOptions& o) {
+  const fs::path path = o.policy;
+  const std::string kind = path.extension().string();
+  io::read_text(path);  // or a complaint that names it
+  if (kind != ".json" && kind != ".pt" && kind != ".h")
+    throw io::InputError(o.policy + ": is no policy; accepted: an actor (.json), TorchScript (.pt) or a C header (.h)");
+  std::vector<std::string> overrides;
+  if (kind == ".json") overrides.push_back("actor=" + io::toml_string(fs::absolute(path).string()));
+  const rollout::FlyConfig config = rollout::read_fly_config(o.config, overrides);
+  const flight::FleetOptions& fleet = config.fleet;
+  if (fleet.controller.kind != flight::Controller::Kind::pid || fleet.task.path.size() != 1 ||
+      fleet.task.constants.success.by_s <= 0 || std::abs(fleet.control_hz * kControl_s - 1) > 1e-9)
+    throw io::InputError(o.config +
+                         ": is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal "
+                         "that stands still and a success");
+  const flight::FlightConstants k = flight::flight_constants(fleet);
+  return {fleet.task, k.task, k.pid, policy_of(path, config)};
+}
+
+rollout::Outcome outcome_of(const Escape& e) {
+  rollout::Outcome outcome;
+  outcome.captured_s = e.captured_s, outcome.lost_s = e.lost_s;
+  outcome.ended = e.ended;
+  outcome.status = e.flight.crashed ? std::uint32_t{sim::kFrozen} : 0;
+  return outcome;
+}
+
+}  // namespace
+
+Json fly_escapes(const EscapeOptions& o) {
+  const EscapeRules rules = rules_of(o);
+  const Case robot = Robots(o.robot).robot(o.draw);
+  if (!o.robot.out.empty()) io::make_folder(o.robot.out);
+  std::vector<Escape> escapes(o.count);
+  io::ProgressLine progress("escapes");
+  io::stop_on_interrupt();
+  std::size_t done = 0;
+  std::string failed;
+#pragma omp parallel for schedule(dynamic) num_threads(omp_get_num_procs())
+  for (std::size_t i = 0; i < o.count; ++i) {
+    if (io::interrupted()) continue;
+    try {
+      escapes[i] = escape(robot, i, rules);
+    } catch (const std::exception& e) {  // of the policy: nothing may leave a parallel loop
+#pragma omp critical
+      failed = e.what();
+    }
+#pragma omp critical
+    progress.show(static_cast<double>(++done) / static_cast<double>(o.count));
+  }
+  progress.clear();
+  if (!failed.empty()) throw io::InputError(o.policy + ": " + failed + "; accepted: a policy for every observation");
+  if (io::interrupted()) throw io::InputError("stopped: no escape was judged; accepted: all of them");
+  std::vector<rollout::Outcome> outcomes;
+  std::size_t crashed = 0, out_of_bounds = 0;
+  for (std::size_t i = 0; i < o.count; ++i) {
+    const Escape& e = escapes[i];
+    outcomes.push_back(outcome_of(e));
+    crashed += e.flight.crashed;
+    out_of_bounds += (e.ended & flight::kOutOfBounds) != 0;
+    if (!o.robot.out.empty() && !e.flight.log.mocap.t_s.empty())
+      write(e.flight, fs::path(o.robot.out) / ("escape_" + std::to_string(i + 1)), !o.robot.no_truth);
+  }
+  const rollout::Summary s = rollout::summarise(outcomes);
+  std::printf("%zu escapes: success %.1f %% (%.1f to %.1f), captured the goal %.1f %%\n", s.flights,
+              100 * s.success.value, 100 * s.success.low, 100 * s.success.high, 100 * s.captured.value);
+  if (s.capture_s.median)
+    std::printf("  time to capture, 10 / 50 / 90 %%: %.3f %.3f %.3f s\n", *s.capture_s.p10, *s.capture_s.median,
+                *s.capture_s.p90);
+  std::printf("  out of bounds: %zu; crashed: %zu\n", out_of_bounds, crashed);
+  const auto or_null = [](std::optional<double> x) { return x ? Json(*x) : Json(nullptr); };
+  return {{"policy", o.policy},
+          {"seed", o.robot.seed},
+          {"draw", o.draw},
+          {"escapes", s.flights},
+          {"success_rate", s.success.value},
+          {"success_low", s.success.low},
+          {"success_high", s.success.high},
+          {"captured_rate", s.captured.value},
+          {"time_to_capture_p10_s", or_null(s.capture_s.p10)},
+          {"time_to_capture_median_s", or_null(s.capture_s.median)},
+          {"time_to_capture_p90_s", or_null(s.capture_s.p90)},
+          {"out_of_bounds", out_of_bounds},
+          {"crashed", crashed}};
+}
+
+}  // namespace flappy::blind

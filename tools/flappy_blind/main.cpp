@@ -1,0 +1,126 @@
+// flappy-blind: flies a robot of another making, with or without something wrong, and writes what it logged.
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "benchmark/detectability.hpp"
+#include "benchmark/detectability_table.hpp"
+#include "benchmark/make.hpp"
+#include "benchmark/score_bench.hpp"
+#include "escapes.hpp"
+#include "flappy/vehicle_file.hpp"
+#include "io/config.hpp"
+
+namespace flappy::blind {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json fly_case(const RobotOptions& o, Programme programme) {
+  const Robots robots(o);
+  const std::filesystem::path folder(o.out);
+  std::error_code error;
+  if (std::filesystem::exists(folder, error)) io::make_folder(folder);
+  const Drawn drawn = robots.fly(programme);
+  Json crashes = Json::array(), list = Json::array();
+  for (std::size_t draw = 0; draw < drawn.lost.size(); ++draw) {
+    const Crash& lost = drawn.lost[draw];
+    std::printf("draw %zu: flight %zu %s; the next draw\n", draw, lost.flight, lost.how.c_str());
+    crashes.push_back(lost.how);
+  }
+  io::make_folder(folder);
+  for (std::size_t k = 0; k < kFlights; ++k) {
+    const Flight& flight = drawn.flights[k];
+    const std::filesystem::path to = folder / ("flight_" + std::to_string(k + 1));
+    write(flight, to, !o.no_truth);
+    std::printf("%s: %g s, up to %.0f mm off, tilted up to %.0f deg\n", to.c_str(), kFlight_s, 1e3 * flight.farthest_m,
+                flight.most_tilt_rad * 180 / kPi);
+    list.push_back(
+        {{"folder", to.string()}, {"farthest_m", flight.farthest_m}, {"most_tilt_rad", flight.most_tilt_rad}});
+  }
+  return {{"seed", o.seed}, {"draw", drawn.draw}, {"crashes", crashes}, {"flights", list}};
+}
+
+}  // namespace
+}  // namespace flappy::blind
+
+int main(int argc, char** argv) {
+  using namespace flappy;
+  io::Program program("flappy-blind", "A robot of another making, for a diagnosis to be tried on.", {});
+  CLI::App* list = program.app().add_subcommand("effects", "lists what may be wrong with it");
+  CLI::App* fly = program.app().add_subcommand("fly", "flies three times and writes the logs");
+  blind::RobotOptions robot;
+  std::string programme = "rich";
+  blind::add_robot_options(*fly, robot);
+  fly->add_option("--programme", programme, "rich: excitation, a path, turns; hover: calm")
+      ->check(CLI::IsMember({"rich", "hover"}))
+      ->capture_default_str();
+  fly->add_option("--out", robot.out, "folder for flight_1, flight_2, flight_3")->required();
+  CLI::App* escape = program.app().add_subcommand("escape", "flies a policy's manoeuvre many times over");
+  blind::EscapeOptions escapes{.robot = {}, .policy = {}, .config = FLAPPY_CONFIGS "/fly/escape.toml"};
+  blind::add_robot_options(*escape, escapes.robot);
+  escape->add_option("--policy", escapes.policy, "an actor (.json), TorchScript (.pt) or a C header (.h)")->required();
+  escape->add_option("--config", escapes.config, "task and controller that it was trained with")->capture_default_str();
+  escape->add_option("--draw", escapes.draw, "which of the seed's robots: that of fly, in its --json")
+      ->check(CLI::Range(std::uint64_t{0}, blind::kTries - 1))
+      ->capture_default_str();
+  escape->add_option("--count", escapes.count, "escapes, each from another start")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  escape->add_option("--out", escapes.robot.out, "folder for the logs: escape_1, escape_2, ...");
+  CLI::App* detectability =
+      program.app().add_subcommand("detectability", "finds how large effects have to be to be found");
+  benchmark::DetectabilityCommand command;
+  detectability->add_option("--vehicle", command.vehicle, "the vehicle as declared")->required();
+  detectability->add_option("--randomise", command.randomise, "what robots are drawn from")->capture_default_str();
+  detectability->add_option("--priors", command.priors, "what is uncertain of them")->capture_default_str();
+  detectability->add_option("--vehicles", command.vehicles, "how many")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  detectability->add_option("--seed", command.seed, "of the first")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 53))
+      ->capture_default_str();
+  detectability->add_option("--out", command.out, "file for what is found")->required();
+  detectability->add_option("--threads", command.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
+  CLI::App* make = program.app().add_subcommand("make", "flies the cases of a benchmark and seals what they are");
+  benchmark::MakeCommand made;
+  std::string set;
+  make->add_option("--out", made.out, "folder for the cases")->required();
+  make->add_option("--set", set, "development or reported: which seeds")
+      ->check(CLI::IsMember({"development", "reported"}))
+      ->required();
+  make->add_option("--part", made.plan.parts, "these parts alone")
+      ->check(CLI::IsMember(std::vector<std::string>(std::begin(benchmark::kParts), std::end(benchmark::kParts))));
+  make->add_option("--cases", made.plan.at_most, "of each part at most")->check(CLI::Range(1, 1000));
+  make->add_option("--vehicle", made.vehicle, "the robot as declared")->capture_default_str();
+  make->add_option("--randomise", made.randomise, "what robots are drawn from")->capture_default_str();
+  make->add_option("--detectable", made.detectable, "what is detectable of every effect")->capture_default_str();
+  make->add_option("--threads", made.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
+  CLI::App* score = program.app().add_subcommand("score", "diagnoses every case, then opens the labels and compares");
+  benchmark::ScoreCommand scored;
+  score->add_option("folder", scored.folder, "of flappy-blind make")->required();
+  score->add_option("--vehicle", scored.vehicle, "the robot as declared, where it is elsewhere now");
+  score->add_option("--priors", scored.priors, "what is uncertain of the vehicle")->capture_default_str();
+  score->add_option("--threads", scored.threads, "cases at a time; 0: one for each processor")
+      ->check(CLI::Range(0, 1024));
+  program.app().require_subcommand(1);
+  return program.run(argc, argv, [&] {
+    using blind::Programme;
+    if (*make) {
+      made.plan.reported = set == "reported";
+      const sim::Randomisation uncertain =
+          sim::read_randomisation(model::read_vehicle(made.vehicle), io::Config::load(scored.priors, {}).root());
+      made.true_values = [&](const blind::Case& c, const std::vector<blind::BlindEffect>& effects) {
+        return benchmark::true_values(c, effects, uncertain, 1);
+      };
+      if (!benchmark::make_bench(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
+    } else if (*score) {
+      const nlohmann::ordered_json scores = benchmark::score_bench(scored);
+      if (!scores.is_null()) program.write_json(scores);
+    } else if (*list)
+      for (const std::string& name : blind::effect_names()) std::printf("%s\n", name.c_str());
+    else if (*escape) program.write_json(blind::fly_escapes(escapes));
+    else if (*detectability) program.write_json(benchmark::run_detectability(command));
+    else program.write_json(blind::fly_case(robot, programme == "rich" ? Programme::rich : Programme::hover));
+  });
+}

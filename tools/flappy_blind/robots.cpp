@@ -1,0 +1,64 @@
+#include "robots.hpp"
+
+#include <filesystem>
+
+#include "io/config.hpp"
+
+namespace flappy::blind {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<BlindEffect> effects_of(const std::vector<std::string>& texts) {
+  std::vector<BlindEffect> effects;
+  for (const std::string& text : texts) {
+    const std::size_t equals = text.find('=');
+    const std::string size = equals == std::string::npos ? "" : text.substr(equals + 1);
+    char* end = nullptr;
+    const double value = std::strtod(size.c_str(), &end);
+    if (size.empty() || *end != '\0')
+      throw io::InputError("--effect " + text + ": no size; accepted: ID=SIZE, as ground_effect=1");
+    effects.push_back({text.substr(0, equals), value});
+  }
+  return effects;
+}
+
+sim::Randomisation read_spread(const model::Vehicle& declared, const std::string& path) {
+  if (path == "none") return sim::Randomisation(declared);
+  return sim::read_randomisation(declared, io::Config::load(path).root());
+}
+
+}  // namespace
+
+void add_robot_options(CLI::App& command, RobotOptions& o) {
+  command.add_option("--vehicle", o.vehicle, "the vehicle as declared")->required();
+  command.add_option("--randomise", o.randomise, "[[randomise]] tables that the robot is drawn from, or none")
+      ->capture_default_str();
+  command.add_option("--seed", o.seed, "of all that is drawn")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 53))
+      ->required();
+  command.add_option("--effect", o.effects, "ID=SIZE; 1 is typical")->allow_extra_args(false);
+  command.add_flag("--power", o.power, "log battery and currents");
+  command.add_flag("--wings", o.wings, "log wing angles");
+  command.add_flag("--no-truth", o.no_truth, "leave out truth.csv");
+}
+
+Robots::Robots(const RobotOptions& o)
+    : declared_(declared_case(o.vehicle)), seed_(o.seed), randomisation_(read_spread(declared_.vehicle, o.randomise)) {
+  declared_.sizes = Sizes(effects_of(o.effects));
+  declared_.power = o.power;
+  declared_.wings = o.wings;
+}
+
+Drawn Robots::fly(Programme programme) const {
+  Case c = declared_;
+  c.programme = programme;
+  return fly_drawn(c, randomisation_, seed_);
+}
+
+void write(const Flight& f, const fs::path& to, bool truth) {
+  flightlog::write_flight_log(to, f.log);
+  if (truth) flightlog::write_truth(to, flightlog::kMotionNames, f.truth);
+}
+
+}  // namespace flappy::blind

@@ -1,0 +1,36 @@
+// Which robot flies: what the commands of flappy-blind share.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "blind/drawn.hpp"
+#include "io/program.hpp"
+
+namespace flappy::blind {
+
+struct RobotOptions {
+  std::string vehicle, randomise = "none", out;
+  std::uint64_t seed = 0;
+  std::vector<std::string> effects;
+  bool power = false, wings = false, no_truth = false;
+};
+
+void add_robot_options(CLI::App& command, RobotOptions& o);
+
+/// The robots of a seed.
+class Robots {
+ public:
+  explicit Robots(const RobotOptions& o);
+  Case robot(std::uint64_t draw) const { return drawn_case(declared_, randomisation_, seed_, draw); }
+  Drawn fly(Programme programme) const;
+
+ private:
+  Case declared_;
+  std::uint64_t seed_;
+  sim::Randomisation randomisation_;
+};
+
+void write(const Flight& f, const std::filesystem::path& to, bool truth);
+
+}  // namespace flappy::blind
