@@ -15,6 +15,7 @@
 #include "io/files.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "io/statistics.hpp"
 #include "io/toml_writer.hpp"
 #include "model/effects/registry.hpp"
 
@@ -46,11 +47,6 @@ Development develop(const blind::Case& declared, const sim::Randomisation& robot
                        " robots in a row crashed; accepted: less randomisation");
 }
 
-double median(std::vector<double> v) {
-  std::ranges::sort(v);
-  return (v[(v.size() - 1) / 2] + v[v.size() / 2]) / 2;
-}
-
 struct Finding {
   double detectable = 0, low = 0, high = 0;  ///< median and extremes of the vehicles; infinite beyond size 4
   double gain_at_typical = 0;
@@ -80,10 +76,10 @@ std::vector<Finding> weigh(const std::vector<Development>& vehicles, const sim::
     const auto effect = static_cast<blind::Effect>(e);
     Finding& f = findings[e];
     const auto sizes = over_vehicles([&](const Oracle& o) { return o.detectable(effect, kNats); });
-    f.detectable = median(sizes);
+    f.detectable = io::median(sizes);
     f.low = *std::ranges::min_element(sizes);
     f.high = *std::ranges::max_element(sizes);
-    f.gain_at_typical = median(over_vehicles([&](const Oracle& o) { return o.gain(effect, 1); }));
+    f.gain_at_typical = io::median(over_vehicles([&](const Oracle& o) { return o.gain(effect, 1); }));
     f.undetectable = !(2 * f.detectable <= kMostSize);
     const double size = std::min(2 * f.detectable, kMostSize);
     if (in_catalogue(effect)) f.value = true_value(*vehicles[0].subject, parameters, effect, size);
@@ -92,8 +88,8 @@ std::vector<Finding> weigh(const std::vector<Development>& vehicles, const sim::
       for (std::size_t r = 0; r < blind::kEffects; ++r) {
         const auto rival = static_cast<blind::Effect>(r);
         if (r == e || !in_catalogue(rival)) continue;
-        if (median(over_vehicles([&](const Oracle& o) { return o.gain_over(effect, at, rival); })) < kNats)
-          rivals->push_back(blind::effect_names()[r]);
+        if (io::median(over_vehicles([&](const benchmark::Oracle& o) { return o.gain_over(effect, at, rival); })) < kNats)
+          rivals->push_back(effect_names()[r]);
       }
   }
   return findings;

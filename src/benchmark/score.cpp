@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <set>
 
+#include "io/statistics.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::benchmark {
@@ -202,7 +203,7 @@ ScoreLine closure_line(const Cases& cases) {
               resampled(values.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
                 std::vector<double> some;
                 for (const std::size_t i : which) some.push_back(values[i]);
-                return quantile(std::move(some), 0.5);
+                return io::median(std::move(some));
               }));
 }
 

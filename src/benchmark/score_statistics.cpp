@@ -4,10 +4,11 @@
 #include <cmath>
 #include <random>
 
+#include "io/statistics.hpp"
+
 namespace flappy::benchmark {
 namespace {
 
-constexpr double kZ95 = 1.959964;
 constexpr std::size_t kResamples = 2000, kBins = 10;
 
 /// The same draws every time, and wherever the program runs: no distribution of the standard library is.
@@ -39,10 +40,8 @@ double error_of(const std::vector<Claim>& sorted) {
 
 Score proportion(std::size_t successes, std::size_t count) {
   if (count == 0) return {};
-  const double n = static_cast<double>(count), p = static_cast<double>(successes) / n, z2 = kZ95 * kZ95;
-  const double middle = (p + z2 / (2 * n)) / (1 + z2 / n);
-  const double half = kZ95 / (1 + z2 / n) * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n));
-  return {p, std::max(0.0, middle - half), std::min(1.0, middle + half), count};
+  const io::Interval interval = io::wilson_interval(successes, count);
+  return {static_cast<double>(successes) / static_cast<double>(count), interval.low, interval.high, count};
 }
 
 Score resampled(std::size_t count,
@@ -58,8 +57,8 @@ Score resampled(std::size_t count,
     for (std::size_t& c : cases) c = draws.below(count);
     if (const auto value = statistic(cases)) values.push_back(*value);
   }
-  score.low = values.empty() ? *score.value : quantile(values, 0.025);
-  score.high = values.empty() ? *score.value : quantile(values, 0.975);
+  score.low = values.empty() ? *score.value : io::quantile(values, 0.025);
+  score.high = values.empty() ? *score.value : io::quantile(values, 0.975);
   return score;
 }
 
@@ -76,14 +75,7 @@ double calibrated_error_95(std::vector<Claim> claims) {
     for (Claim& c : claims) c.right = draws.uniform() < c.probability;
     errors.push_back(error_of(claims));
   }
-  return quantile(errors, 0.95);
-}
-
-double quantile(std::vector<double> values, double share) {
-  std::ranges::sort(values);
-  const double at = share * static_cast<double>(values.size() - 1);
-  const auto i = static_cast<std::size_t>(at);
-  return i + 1 < values.size() ? std::lerp(values[i], values[i + 1], at - static_cast<double>(i)) : values.back();
+  return io::quantile(errors, 0.95);
 }
 
 }  // namespace flappy::benchmark

@@ -36,7 +36,4 @@ double calibration_error(std::vector<Claim> claims);
 /// What of the error of a perfectly calibrated predictor with the same probabilities lies below with 95 %: 2,000 draws.
 double calibrated_error_95(std::vector<Claim> claims);
 
-/// Of at least one value, by linear interpolation between neighbours; share 0.5 is the median.
-double quantile(std::vector<double> values, double share);
-
 }  // namespace flappy::benchmark

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "identify/fit_problem.hpp"
+#include "io/statistics.hpp"
 
 namespace flappy::identify {
 namespace {
@@ -33,12 +34,6 @@ double noise(const MeasuredMap& map, std::size_t row, std::size_t channel) {
   constexpr double kUndeclared = 0.02;
   return kNoise * (map.sd.empty() ? kUndeclared * group_rms(map.wrenches)[is_force(static_cast<int>(channel)) ? 0 : 1]
                                   : map.sd[row][channel]);
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 [[noreturn]] void refuse(const MeasuredMap& map, std::size_t row, std::size_t channel, const std::string& what) {
@@ -90,10 +85,10 @@ void check_rows(const MeasuredMap& map, const std::vector<Wrench>& simulated, co
     differences.push_back(map.wrenches[i][a.channel] - simulated[i][a.channel]);
     most = std::max(most, std::abs(simulated[i][a.channel]));
   }
-  const double offset = median(differences);
+  const double offset = io::median(differences);
   std::vector<double> apart = differences;
   for (double& d : apart) d = std::abs(d - offset);
-  const double scatter = kScatter * median(apart);
+  const double scatter = kScatter * io::median(apart);
   for (std::size_t i = 0; i < map.size(); ++i) {
     const double is = map.wrenches[i][a.channel], expected = simulated[i][a.channel] + offset;
     const bool opposite = is * expected < 0 && std::min(std::abs(is), std::abs(expected)) > 0.5 * most &&

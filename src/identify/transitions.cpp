@@ -8,6 +8,7 @@
 #include "flightlog/track.hpp"
 #include "identify/force_map.hpp"
 #include "io/csv.hpp"
+#include "io/statistics.hpp"
 #include "sim/replay.hpp"
 
 namespace flappy::identify {
@@ -57,18 +58,6 @@ sim::FlapperState with_mean_rate(const sim::FlapperState& before, sim::FlapperSt
   // of a turn of 0.1 rad, exact to 4e-4
   for (int k = 0; k < 3; ++k) x.body_rate_rad_s[k] = std::copysign(2 / interval_s, turn.w()) * turn.vec()[k];
   return x;
-}
-
-/// On a line between neighbours.
-double quantile_of(std::vector<double> values, double share) {
-  if (values.empty()) return std::nan("");
-  const double at = share * static_cast<double>(values.size() - 1);
-  const auto k = static_cast<std::size_t>(at);
-  std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(k));
-  const double low = values[k];
-  if (k + 1 >= values.size() || at == static_cast<double>(k) || std::isinf(low)) return low;
-  const double high = *std::min_element(values.begin() + static_cast<std::ptrdiff_t>(k) + 1, values.end());
-  return low + (at - static_cast<double>(k)) * (high - low);
 }
 
 std::string in_ms(const std::array<double, 2>& window_s) {
@@ -191,7 +180,7 @@ struct Transitions::Flight {
   void choose_starts() {
     std::vector<double> holds;
     for (std::size_t i = 1; i < voltages.t_s.size(); ++i) holds.push_back(voltages.t_s[i] - voltages.t_s[i - 1]);
-    const double longest_s = kLongestHold * quantile_of(holds, 0.5);
+    const double longest_s = kLongestHold * io::median(holds);
     const auto commanded = [&](double from_s, double to_s) {
       const auto& t = voltages.t_s;
       if (from_s < t.front() || to_s > t.back() + longest_s) return false;
@@ -319,7 +308,7 @@ TransitionReport Transitions::run() const {
   for (std::size_t k = 0; k < noise.size(); ++k) {
     std::vector<double> values;
     for (const StateVector& r : ranges) values.push_back(r[k]);
-    report.range[k] = std::max(quantile_of(std::move(values), 0.5), noise[k]);
+    report.range[k] = std::max(io::median(std::move(values)), noise[k]);
   }
   return report;
 }
@@ -329,7 +318,7 @@ StateVector TransitionReport::quantile(int beats, double share, bool of_range) c
   for (std::size_t k = 0; k < result.size(); ++k) {
     std::vector<double> values;
     for (const StateVector& e : errors[static_cast<std::size_t>(beats - 1)]) values.push_back(e[k]);
-    result[k] = quantile_of(std::move(values), share) / (of_range ? range[k] : 1);
+    result[k] = io::quantile(std::move(values), share) / (of_range ? range[k] : 1);
   }
   return result;
 }

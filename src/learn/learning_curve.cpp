@@ -2,30 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <random>
 #include <stdexcept>
 
 #include "io/files.hpp"
 #include "io/run_program.hpp"
+#include "io/statistics.hpp"
 #include "learn/metrics.hpp"
 
 namespace flappy::learn {
 namespace {
 
 constexpr std::size_t kResamples = 10000;
-
-double mean(std::span<const double> values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-/// Between the two sorted values that `q` falls between.
-double quantile(const std::vector<double>& sorted, double q) {
-  const double place = q * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<std::size_t>(place);
-  const std::size_t above = std::min(below + 1, sorted.size() - 1);
-  return sorted[below] + (place - static_cast<double>(below)) * (sorted[above] - sorted[below]);
-}
 
 }  // namespace
 
@@ -47,10 +35,10 @@ double interquartile_mean(std::vector<double> values) {
   if (values.empty()) throw std::logic_error("interquartile mean of nothing");
   std::ranges::sort(values);
   const std::size_t cut = values.size() / 4;
-  return mean(std::span(values).subspan(cut, values.size() - 2 * cut));
+  return io::mean(std::span(values).subspan(cut, values.size() - 2 * cut));
 }
 
-Interval bootstrap_interval(std::span<const double> values) {
+io::Interval bootstrap_interval(std::span<const double> values) {
   // the standard fixes the numbers of this generator, but not how its distributions use them
   std::mt19937_64 generator(1);  // NOLINT(bugprone-random-generator-seed,cert-msc51-cpp): the same interval every time
   std::vector<double> resample(values.size()), means(kResamples);
@@ -58,8 +46,7 @@ Interval bootstrap_interval(std::span<const double> values) {
     for (double& value : resample) value = values[(generator() >> 32) * values.size() >> 32];
     each = interquartile_mean(resample);
   }
-  std::ranges::sort(means);
-  return {quantile(means, 0.025), quantile(means, 0.975)};
+  return {io::quantile(means, 0.025), io::quantile(means, 0.975)};
 }
 
 LearningCurve learning_curve(std::span<const SeedCurve> runs) {
@@ -87,9 +74,8 @@ LearningCurve learning_curve(std::span<const SeedCurve> runs) {
       row.scores.push_back(run.points[i].score);
       wall_s.push_back(run.points[i].wall_s);
     }
-    std::ranges::sort(wall_s);
-    row.median_wall_s = quantile(wall_s, 0.5);
-    row.mean = mean(row.scores);
+    row.median_wall_s = io::median(wall_s);
+    row.mean = io::mean(row.scores);
     row.iqm = interquartile_mean(row.scores);
     row.interval = bootstrap_interval(row.scores);
     curve.rows.push_back(std::move(row));

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "io/statistics.hpp"
+
 namespace flappy::learn {
 
 /// One evaluation of a run.
@@ -29,17 +31,13 @@ SeedCurve read_seed_curve(const std::filesystem::path& run, std::uint64_t seed, 
 /// Mean of what is left when a quarter (rounded down) is cut off at each end; at least one value.
 double interquartile_mean(std::vector<double> values);
 
-struct Interval {
-  double low = 0, high = 0;
-};
-
 /// 95 % percentile interval of the interquartile mean over 10,000 resamples of the values; the same bytes everywhere.
-Interval bootstrap_interval(std::span<const double> values);
+io::Interval bootstrap_interval(std::span<const double> values);
 
 struct CurveRow {
   std::uint64_t update = 0;
   double median_wall_s = 0, mean = 0, iqm = 0;
-  Interval interval;
+  io::Interval interval;
   std::vector<double> scores;  ///< one for each seed, in the order given
 };
 

@@ -83,10 +83,4 @@ FlightSummary summarise(std::span<const FlightScore> flights) {
   return s;
 }
 
-std::optional<double> quantile(std::vector<double> list, double q) {
-  if (list.empty()) return std::nullopt;
-  std::ranges::sort(list);
-  return list[static_cast<std::size_t>(q * static_cast<double>(list.size() - 1))];
-}
-
 }  // namespace flappy::rollout

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -60,8 +59,5 @@ struct FlightSummary {
 };
 /// In the order of flights, whoever flew them.
 FlightSummary summarise(std::span<const FlightScore> flights);
-
-/// The number below which a share `q` of the list lies, one of its own; nothing for an empty list.
-std::optional<double> quantile(std::vector<double> list, double q);
 
 }  // namespace flappy::rollout

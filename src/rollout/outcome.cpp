@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "rollout/flight_score.hpp"
+#include "io/statistics.hpp"
 #include "model/math.hpp"
 #include "rollout/flight_score.hpp"
 #include "sim/storage.hpp"
@@ -47,7 +49,8 @@ std::size_t largest(std::span<const double> list) {
 }
 
 Spread spread(const std::vector<double>& list) {
-  return {rollout::quantile(list, 0.1), rollout::quantile(list, 0.5), rollout::quantile(list, 0.9)};
+  if (list.empty()) return {};
+  return {io::quantile(list, 0.1), io::median(list), io::quantile(list, 0.9)};
 }
 
 }  // namespace
@@ -133,12 +136,8 @@ void Follower::finish(Outcome& outcome) const {
 
 Rate rate_of(std::size_t successes, std::size_t flights) {
   if (flights == 0) return {};
-  constexpr double kZ = 1.959963984540054, kZ2 = kZ * kZ;  // 97.5 % of a normal number
-  const auto n = static_cast<double>(flights);
-  const double p = static_cast<double>(successes) / n;
-  const double middle = (p + kZ2 / (2 * n)) / (1 + kZ2 / n);
-  const double half = kZ / (1 + kZ2 / n) * std::sqrt(p * (1 - p) / n + kZ2 / (4 * n * n));
-  return {p, successes == 0 ? 0 : middle - half, successes == flights ? 1 : middle + half};
+  const io::Interval interval = io::wilson_interval(successes, flights);
+  return {static_cast<double>(successes) / static_cast<double>(flights), interval.low, interval.high};
 }
 
 Summary summarise(std::span<const Outcome> flights) {

@@ -56,12 +56,6 @@ TEST(Proportion, HasWilsonsInterval) {
   EXPECT_NEAR(benchmark::proportion(5, 5).high, 1, 1e-12);
 }
 
-TEST(Quantile, LiesBetweenNeighbours) {
-  EXPECT_DOUBLE_EQ(benchmark::quantile({3, 1, 2}, 0.5), 2);
-  EXPECT_DOUBLE_EQ(benchmark::quantile({4, 1, 2, 3}, 0.5), 2.5);
-  EXPECT_DOUBLE_EQ(benchmark::quantile({5}, 0.95), 5);
-}
-
 TEST(Resampled, IntervalOfAMeanIsThatOfTheNormalLaw) {
   // 400 cases, half 0 and half 1: the mean's sd is 0.025, of 2,000 resamples a quantile is good to 0.003
   std::vector<double> values(400);

@@ -17,7 +17,7 @@ namespace {
 using test::refusal;
 
 void expect_interval(const std::vector<double>& values, double low, double high) {
-  const Interval interval = bootstrap_interval(values);
+  const io::Interval interval = bootstrap_interval(values);
   // sums of up to three halves, thirds or ones, rounded once each
   EXPECT_NEAR(interval.low, low, 1e-15);
   EXPECT_NEAR(interval.high, high, 1e-15);
@@ -69,7 +69,7 @@ TEST(LearningCurve, IntervalCoversTheTruth) {
   for (int trial = 0; trial < 300; ++trial) {
     std::vector<double> values(16);
     for (double& value : values) value = static_cast<double>(generator() >> 11) * 0x1p-53;
-    const Interval interval = bootstrap_interval(values);
+    const io::Interval interval = bootstrap_interval(values);
     covered += interval.low <= 0.5 && 0.5 <= interval.high;
   }
   EXPECT_GT(covered / 300.0, 0.90 - 0.052);

@@ -9,6 +9,7 @@
 #include "flappy/batch.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
+#include "io/statistics.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::bench {
@@ -77,10 +78,6 @@ nlohmann::ordered_json fly(const Job& job) {
     climb.push_back(s.position_m[2]);
     drift.push_back(std::hypot(s.position_m[0], s.position_m[1]));
   }
-  const auto quantile = [](std::vector<double> v, double q) {
-    std::ranges::sort(v);
-    return v[static_cast<std::size_t>(q * static_cast<double>(v.size() - 1))];
-  };
   const double flown = static_cast<double>(job.count) * steps;
   char hash[17];
   std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(batch.hash()));
@@ -89,10 +86,10 @@ nlohmann::ordered_json fly(const Job& job) {
               job.options.step_s * 1e6, sim::best_instruction_set().c_str());
   std::printf("  %.1f million steps/s, %.0f times real time\n", flown / wall_s / 1e6,
               flown * job.options.step_s / wall_s);
-  std::printf("  climb  10 / 50 / 90 %%  %+.3f %+.3f %+.3f m\n", quantile(climb, 0.1), quantile(climb, 0.5),
-              quantile(climb, 0.9));
-  std::printf("  drift  10 / 50 / 90 %%   %.3f  %.3f  %.3f m\n", quantile(drift, 0.1), quantile(drift, 0.5),
-              quantile(drift, 0.9));
+  std::printf("  climb  10 / 50 / 90 %%  %+.3f %+.3f %+.3f m\n", io::quantile(climb, 0.1), io::quantile(climb, 0.5),
+              io::quantile(climb, 0.9));
+  std::printf("  drift  10 / 50 / 90 %%   %.3f  %.3f  %.3f m\n", io::quantile(drift, 0.1), io::quantile(drift, 0.5),
+              io::quantile(drift, 0.9));
   std::printf("  frozen %zu, touched the ground %zu, the ceiling %zu, a wall %zu\n", batch.count_status(sim::kFrozen),
               batch.count_status(sim::kTouchedGround), batch.count_status(sim::kTouchedCeiling),
               batch.count_status(sim::kTouchedWall));
@@ -101,8 +98,8 @@ nlohmann::ordered_json fly(const Job& job) {
           {"steps", steps},
           {"wall_s", wall_s},
           {"steps_per_s", flown / wall_s},
-          {"climb_median_m", quantile(climb, 0.5)},
-          {"drift_median_m", quantile(drift, 0.5)},
+          {"climb_median_m", io::quantile(climb, 0.5)},
+          {"drift_median_m", io::quantile(drift, 0.5)},
           {"frozen", batch.count_status(sim::kFrozen)},
           {"hash", hash}};
 }

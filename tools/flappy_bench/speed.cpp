@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "flappy/batch.hpp"
+#include "io/statistics.hpp"
 #include "sim/randomise.hpp"
 #ifdef FLAPPY_HAVE_PEERS
 #include "dart_peer.hpp"
@@ -92,10 +93,8 @@ double processor_seconds() {
 }
 
 Figure summary(std::vector<double> values) {
-  std::ranges::sort(values);
-  const std::size_t n = values.size();
-  const double middle = n % 2 == 1 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
-  return {middle, values.front(), values.back()};
+  const auto [low, high] = std::ranges::minmax(values);
+  return {io::median(std::move(values)), low, high};
 }
 
 std::optional<double> SpeedReport::median(const std::string& name) const {

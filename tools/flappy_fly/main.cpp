@@ -3,11 +3,10 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <optional>
 
 #include "io/program.hpp"
 #include "io/progress.hpp"
-#include "rollout/fly.hpp"
+#include "io/statistics.hpp"
 
 namespace flappy::fly {
 namespace {
@@ -71,8 +70,8 @@ void print_success(const rollout::FlyResult& r) {
   std::printf("  captured the goal: %.2f %%; and kept it: %.2f %%\n", 100 * static_cast<double>(r.capture_s.size()) / n,
               100 * static_cast<double>(r.successes) / n);
   if (!r.capture_s.empty())
-    std::printf("  time to capture, 10 / 50 / 90 %%: %.3f %.3f %.3f s\n", *rollout::quantile(r.capture_s, 0.1),
-                *rollout::quantile(r.capture_s, 0.5), *rollout::quantile(r.capture_s, 0.9));
+    std::printf("  time to capture, 10 / 50 / 90 %%: %.3f %.3f %.3f s\n", io::quantile(r.capture_s, 0.1),
+                io::median(r.capture_s), io::quantile(r.capture_s, 0.9));
 }
 
 void print(const rollout::FlyConfig& config, const rollout::FlyOptions& options, const rollout::FlyResult& r) {
@@ -124,11 +123,10 @@ Json json_of(const rollout::FlyConfig& config, const rollout::FlyOptions& option
   for (std::size_t k = 0; k < 6; ++k) json["ended"][kEnds[k]] = r.ended[k];
   json["handed_back"] = r.handed_back;
   if (config.fleet.task.constants.success.by_s > 0) {
-    const auto or_null = [](std::optional<double> x) { return x ? Json(*x) : Json(nullptr); };
     json["success_rate"] = static_cast<double>(r.successes) / static_cast<double>(s.flights);
-    json["time_to_capture_p10_s"] = or_null(rollout::quantile(r.capture_s, 0.1));
-    json["time_to_capture_median_s"] = or_null(rollout::quantile(r.capture_s, 0.5));
-    json["time_to_capture_p90_s"] = or_null(rollout::quantile(r.capture_s, 0.9));
+    json["time_to_capture_p10_s"] = io::quantile(r.capture_s, 0.1);
+    json["time_to_capture_median_s"] = io::median(r.capture_s);
+    json["time_to_capture_p90_s"] = io::quantile(r.capture_s, 0.9);
   }
   json["hash"] = hexadecimal(r.hash);
   json["logs"] = options.log_folder.empty() ? Json(nullptr) : Json(r.logs);

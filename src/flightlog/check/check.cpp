@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "flightlog/check/check_parts.hpp"
+#include "io/statistics.hpp"
 
 namespace flappy::flightlog {
 namespace {
@@ -76,12 +77,6 @@ std::string format(const char* pattern, ...) {
   return text;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 std::size_t index_before(const std::vector<double>& times, double t) {
   const auto after = std::ranges::upper_bound(times, t);
   return after == times.begin() ? times.size() : static_cast<std::size_t>(after - times.begin()) - 1;
@@ -102,7 +97,7 @@ StreamStatistics stream_statistics(const std::string& name, const Column& t_s, s
   std::vector<double> intervals, pairs;
   for (std::size_t i = 1; i < t_s.size(); ++i) intervals.push_back(t_s[i] - t_s[i - 1]);
   for (std::size_t i = 2; i < t_s.size(); ++i) pairs.push_back((t_s[i] - t_s[i - 2]) / 2);
-  const double usual = median(pairs.empty() ? intervals : pairs);
+  const double usual = io::upper_median(pairs.empty() ? intervals : pairs);
   double sum = 0, squares = 0, count = 0;
   for (std::size_t i = 0; i < intervals.size(); ++i) {
     const double dt = intervals[i];
@@ -131,7 +126,7 @@ std::optional<double> beat_frequency(const Column& t_s, const Column& values) {
   }
   for (std::size_t i = 1; i < rises.size(); ++i) periods.push_back(rises[i] - rises[i - 1]);
   if (periods.size() < 4) return std::nullopt;
-  return 1 / median(periods);
+  return 1 / io::upper_median(periods);
 }
 
 std::size_t CheckReport::count(Verdict verdict) const {

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "flightlog/check/check_parts.hpp"
+#include "io/statistics.hpp"
 
 namespace flappy::flightlog {
 namespace {
@@ -32,7 +33,7 @@ double amplitude(Column values) {
 double median_interval(const Column& t_s) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < t_s.size(); ++i) intervals.push_back(t_s[i] - t_s[i - 1]);
-  return median(intervals);
+  return io::upper_median(intervals);
 }
 
 /// Amplitude and phase of the wave of the beat in a motor's voltage, and the share of its variance.
@@ -89,7 +90,7 @@ void check_phase(const FlightLog& log, Findings& findings) {
   Column speeds;
   for (std::size_t i = 1; i < volts.size(); ++i)
     speeds.push_back(((*u.phase_rad)[i] - (*u.phase_rad)[i - 1]) / (u.t_s[i] - u.t_s[i - 1]));
-  const double speed = median(speeds), ratio = speed / (kTurn * f);  // a wrap is one step of many
+  const double speed = io::upper_median(speeds), ratio = speed / (kTurn * f);  // a wrap is one step of many
   if (std::abs(ratio - 1) > kFrequencyTolerance) {
     const auto is = [&](double unit) { return std::abs(ratio / unit - 1) < kFrequencyTolerance; };
     const char* cause = is(360 / kTurn) ? "likely in degrees, not rad"
@@ -190,7 +191,7 @@ void check_power(const FlightLog& log, Findings& findings) {
   if (!log.power) return;
   const flightlog::PowerStream& p = *log.power;
   const flightlog::PowerHeader& h = *log.header.power;
-  const double battery = median(p.battery_V);
+  const double battery = io::upper_median(p.battery_V);
   const std::string seen = format("%.3g V in the middle, %.3g V nominal", battery, h.battery_nominal_V);
   // A lithium cell of nominally 3.7 V holds 3.0 to 4.2 V.
   const bool near = battery > 0.75 * h.battery_nominal_V && battery < 1.25 * h.battery_nominal_V;

@@ -19,8 +19,6 @@ using Findings = std::vector<Finding>;
 /// As printf.
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
 
-double median(std::vector<double> values);
-
 /// Index of the last time not after t; times.size() where there is none.
 std::size_t index_before(const std::vector<double>& times, double t);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "flightlog/check/check_parts.hpp"
+#include "io/statistics.hpp"
 
 namespace flappy::flightlog {
 namespace {
@@ -28,9 +29,8 @@ struct Stream {
 double command_rate_hz(const Column& t_s) {
   Column intervals;
   for (std::size_t i = 1; i < t_s.size(); ++i) intervals.push_back(t_s[i] - t_s[i - 1]);
-  const auto tenth = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 10);
-  std::ranges::nth_element(intervals, tenth);
-  return 1 / *tenth;
+  const std::size_t tenth = intervals.size() / 10;
+  return 1 / io::order_statistic(std::move(intervals), tenth);
 }
 
 /// Voltages, motion capture and IMU, which every diagnosis needs, then the others.
@@ -64,7 +64,7 @@ bool repeats(const Stream& s, std::size_t i) {
 std::pair<double, double> flight_of(const std::vector<Stream>& streams) {
   std::vector<double> begins, ends;
   for (std::size_t k = 0; k < 3; ++k) begins.push_back(streams[k].begin_s()), ends.push_back(streams[k].end_s());
-  return {median(begins), median(ends)};
+  return {io::median(begins), io::median(ends)};
 }
 
 std::vector<DataFault> missing(const std::vector<Stream>& streams) {

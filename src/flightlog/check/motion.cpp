@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "flightlog/check/check_parts.hpp"
 #include "flightlog/rotation.hpp"
+#include "flightlog/check/check_parts.hpp"
+#include "io/statistics.hpp"
 
 namespace flappy::flightlog {
 namespace {
@@ -12,7 +13,7 @@ namespace {
 double longest_bridged(const std::vector<double>& t_s) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < t_s.size(); ++i) intervals.push_back(t_s[i] - t_s[i - 1]);
-  return std::max(3 * median(intervals), 0.01);
+  return std::max(3 * io::upper_median(intervals), 0.01);
 }
 
 Vector3d mean_of(const std::vector<Vector3d>& values) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/statistics.hpp"
+
 namespace flappy::gap {
 namespace {
 
@@ -33,13 +35,6 @@ struct WithoutEta {
   Eigen::LLT<MatrixXd> llt;  ///< of eta's precision given the rest, in units of its prior's sd
   MatrixXd half;             ///< of the basis
 };
-
-double median(std::vector<double> v) {
-  if (v.empty()) return 0;
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::ranges::nth_element(v, middle);
-  return *middle;
-}
 
 }  // namespace
 
@@ -125,7 +120,7 @@ void Evidence::find_noise(const Signature& residual, Find what) {
     std::vector<double> sizes;
     for (std::size_t f = 0; f < flights_.size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool) { sizes.push_back(std::abs(left(f, j))); });
-    const double clip = 3 * 1.4826 * median(sizes);
+    const double clip = 3 * 1.4826 * io::upper_median(sizes);
     double product = 0, square = 0;
     for (std::size_t f = 0; f < flights_.size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) {
@@ -143,7 +138,7 @@ void Evidence::find_noise(const Signature& residual, Find what) {
     };
     for (std::size_t f = 0; f < flights_.size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) { steps.push_back(std::abs(innovation(f, j, before))); });
-    group.sd = std::max({1.4826 * median(steps), group.least_sd, 1e-9});
+    group.sd = std::max({1.4826 * io::upper_median(steps), group.least_sd, 1e-9});
     if (what == Find::declared) group.least_sd = group.sd;
     if (what != Find::weights) known = group;
     if (what == Find::declared) continue;  // of what is declared, no row is too far off

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <random>
 
+#include "io/statistics.hpp"
+
 namespace flappy::gap {
 namespace {
 
@@ -91,11 +93,7 @@ std::optional<Closure> closure_of(const Losses& refit, const Losses& effect, dou
   for (const double g : gaps) mean += g / static_cast<double>(gaps.size());
   for (const double g : gaps) square += (g - mean) * (g - mean) / static_cast<double>(gaps.size());
   if (!(*before - floor >= kLeastGapSd * std::sqrt(square)) || !(*before > floor)) return std::nullopt;
-  std::ranges::sort(closures);
-  const auto quantile = [&](double share) {
-    return closures[static_cast<std::size_t>(std::lround(share * static_cast<double>(closures.size() - 1)))];
-  };
-  return Closure{(*before - *after) / (*before - floor), quantile(0.05), quantile(0.95)};
+  return Closure{(*before - *after) / (*before - floor), io::quantile(closures, 0.05), io::quantile(closures, 0.95)};
 }
 
 }  // namespace flappy::gap

@@ -8,49 +8,15 @@
 #include <numeric>
 #include <unsupported/Eigen/FFT>
 
+#include "io/statistics.hpp"
+
 namespace flappy::gap {
 namespace {
 
 constexpr std::size_t kLeastWhiteness = 20;
 constexpr double kLeastBlocks = 5;
 
-/// Regularised incomplete beta function by its continued fraction (Abramowitz and Stegun 26.5.8, by Lentz's method).
-double incomplete_beta(double a, double b, double x) {
-  if (!(x > 0)) return 0;
-  if (!(x < 1)) return 1;
-  if (x > (a + 1) / (a + b + 2)) return 1 - incomplete_beta(b, a, 1 - x);
-  const double front =
-      std::exp(std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) + a * std::log(x) + b * std::log1p(-x)) / a;
-  const auto away_from_0 = [](double v) { return std::abs(v) < 1e-300 ? 1e-300 : v; };
-  double c = 1, d = 1 / away_from_0(1 - (a + b) * x / (a + 1)), value = d;
-  for (int m = 1; m < 500; ++m) {
-    const double even = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m));
-    d = 1 / away_from_0(1 + even * d), c = away_from_0(1 + even / c);
-    value *= d * c;
-    const double odd = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1));
-    d = 1 / away_from_0(1 + odd * d), c = away_from_0(1 + odd / c);
-    value *= d * c;
-    if (std::abs(d * c - 1) < 1e-14) break;
-  }
-  return front * value;
-}
-
 }  // namespace
-
-double t_tail(double t, double freedom) { return incomplete_beta(freedom / 2, 0.5, freedom / (freedom + t * t)); }
-
-double f_tail(double f, double above, double below) {
-  return incomplete_beta(below / 2, above / 2, below / (below + above * std::max(f, 0.0)));
-}
-
-double chi2_tail(double x, int freedom) {
-  double term = std::exp(-x / 2), sum = 0;
-  for (int k = 0; k < freedom / 2; ++k) {
-    sum += term;
-    term *= x / 2 / (k + 1);
-  }
-  return std::min(1.0, sum);
-}
 
 std::vector<int> blocks_of(const std::vector<std::size_t>& beats, int length) {
   std::vector<int> block;
@@ -81,7 +47,7 @@ std::optional<Slope> slope_test(const std::vector<double>& x, const std::vector<
     if (next != sums.end() && next->first == b->first + 1) neighbours += b->second * next->second;
   }
   const double variance = n / (n - 1) * (alone + 2 * std::max(0.0, neighbours)) / (squares * squares);
-  if (variance > 0) s.p_value = t_tail(s.slope / std::sqrt(variance), n - 1);
+  if (variance > 0) s.p_value = io::t_tail(s.slope / std::sqrt(variance), n - 1);
   else s.p_value = s.slope == 0 ? 1 : 0;
   return s;
 }
@@ -108,7 +74,7 @@ std::optional<Whiteness> whiteness_test(const std::vector<double>& y, const std:
       if (const auto later = sums.find(b + lag); later != sums.end()) products += s.first * later->second.first;
     q += products * products / (squares * squares) / (n - lag);
   }
-  w.p_value = chi2_tail(n * (n + 2) * q, kWhitenessLags);
+  w.p_value = io::chi2_tail(n * (n + 2) * q, kWhitenessLags);
   return w;
 }
 

@@ -8,13 +8,6 @@
 
 namespace flappy::gap {
 
-/// Both tails of Student's t.
-double t_tail(double t, double freedom);
-/// Upper tail of the F distribution.
-double f_tail(double f, double above, double below);
-/// Upper tail of chi squared with an even number of degrees of freedom.
-double chi2_tail(double x, int freedom);
-
 /// The block of each beat of flights that stand one behind the other: neighbours in time have consecutive numbers, and
 /// flights are far apart.
 std::vector<int> blocks_of(const std::vector<std::size_t>& beats, int length);

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "gap/localise/significance.hpp"
+#include "io/statistics.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -171,8 +172,8 @@ class ChannelRows {
       if (left.bins[b] > 0)
         add("frequency", (b == 0 ? "0" : in_short(ends[b - 1])) + " to " + in_short(ends[b]) + " Hz",
             std::sqrt(left.power[b] / static_cast<double>(beats_.size())), noise_sd(0) * std::sqrt(noise[b]),
-            f_tail(left.power[b] / noise[b] / scale, 2 * static_cast<double>(left.bins[b]),
-                   2 * static_cast<double>(left.bins[highest])),
+            io::f_tail(left.power[b] / noise[b] / scale, 2 * static_cast<double>(left.bins[b]),
+                       2 * static_cast<double>(left.bins[highest])),
             places);
   }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "io/statistics.hpp"
+
 namespace flappy::gap {
 
 BeatProjection::BeatProjection(const std::vector<double>& beat, const std::vector<char>& valid, std::size_t beats,
@@ -32,9 +34,7 @@ BeatProjection::BeatProjection(const std::vector<double>& beat, const std::vecto
     }
   }
   // a beat at an end has half a hat only
-  std::vector<double> sorted = all;
-  std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
-  const double usual = sorted.empty() ? 0 : sorted[sorted.size() / 2];
+  const double usual = io::upper_median(all);
   for (std::size_t k = 0; k < beats; ++k) covered_[k] = k >= first && there[k] > (1 - kMissing) * usual ? 1 : 0;
   for (Weight& w : weights_)
     for (double& f : w.f) f /= there[w.beat];

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "io/statistics.hpp"
 #include "sim/replay.hpp"
 
 namespace flappy::gap {
@@ -104,9 +105,7 @@ std::vector<std::pair<double, double>> Recording::undriven_s() const {
   const flightlog::Column& t_s = log.command.t_s;
   flightlog::Column intervals_s;
   for (std::size_t i = 1; i < t_s.size(); ++i) intervals_s.push_back(t_s[i] - t_s[i - 1]);
-  const auto middle = intervals_s.begin() + static_cast<std::ptrdiff_t>(intervals_s.size() / 2);
-  std::ranges::nth_element(intervals_s, middle);
-  const double longest_s = kLongestHold * *middle;
+  const double longest_s = kLongestHold * io::upper_median(intervals_s);
   std::vector<std::pair<double, double>> spans;
   for (std::size_t i = 1; i < t_s.size(); ++i)
     if (t_s[i] - t_s[i - 1] > longest_s)
