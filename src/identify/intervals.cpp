@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/statistics.hpp"
+
 namespace flappy::identify {
 namespace {
 
 using Eigen::MatrixXd, Eigen::VectorXd;
 
 constexpr double kUniformPrecision = 12;  // of a uniform distribution over [0, 1]
-constexpr double kNormal95 = 1.959964;
 constexpr double kConfounded = 0.9;
 
 struct Linear {
@@ -55,10 +56,7 @@ double variance_left(double cost, Eigen::Index residuals, Eigen::Index parameter
 }
 
 double explained_by_noise(std::size_t parameters, double noise) {
-  // 95 % quantile of chi squared (Wilson and Hilferty), within 3 %
-  const auto k = static_cast<double>(parameters);
-  const double root = 1 - 2 / (9 * k) + 1.644854 * std::sqrt(2 / (9 * k));
-  return noise * k * root * root * root;
+  return noise * io::chi2_quantile(0.95, static_cast<double>(parameters));
 }
 
 int count_agreed(const std::vector<double>& costs, Eigen::Index residuals, Eigen::Index parameters, bool declared) {
@@ -89,7 +87,8 @@ Intervals describe(const Problem& problem, const VectorXd& point, const VectorXd
   const Linear l = linearised(problem, point);
   const Eigen::JacobiSVD<MatrixXd> svd(l.slopes, Eigen::ComputeThinV);
   const MatrixXd c = covariance(l.slopes);
-  VectorXd low = point - kNormal95 * c.diagonal().cwiseSqrt(), high = point + kNormal95 * c.diagonal().cwiseSqrt();
+  VectorXd low = point - io::kNormal975 * c.diagonal().cwiseSqrt(),
+           high = point + io::kNormal975 * c.diagonal().cwiseSqrt();
   for (const End& end : ends) low = low.cwiseMin(end.point), high = high.cwiseMax(end.point);
   Intervals result;
   result.misfit = l.misfit;
@@ -115,7 +114,7 @@ Eigen::Index widest_unseen(const Problem& problem, const VectorXd& point, const 
   double most = problem.config().unseen_share;
   for (std::size_t i = 0; i < free.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    const double width = 2 * kNormal95 * std::sqrt(c(at, at));
+    const double width = 2 * io::kNormal975 * std::sqrt(c(at, at));
     if (width <= most || std::ranges::count(candidates, free[i]) == 0) continue;
     most = width;
     widest = free[i];

@@ -353,9 +353,9 @@ TEST(Intervals, HoldTheEndsThatNoiseDoesNotTellApart) {
 }
 
 TEST(Intervals, AgreementIsMeasuredInNoise) {
-  // 95 % quantiles of chi squared of 1 and of 12, which the formula meets within 3 %
-  EXPECT_NEAR(explained_by_noise(1, 1), 3.84, 0.03 * 3.84);
-  EXPECT_NEAR(explained_by_noise(12, 2), 2 * 21.03, 0.03 * 42);
+  // 95 % quantiles of chi squared of 1 and of 12
+  EXPECT_NEAR(explained_by_noise(1, 1), 3.841459, 1e-6);
+  EXPECT_NEAR(explained_by_noise(12, 2), 2 * 21.026070, 2e-6);
   EXPECT_EQ(count_agreed({210, 210.5, 213, 220}, 222, 12, true), 3);
   // costs of 1e-4 in units of the map: one more than twice the lowest is no agreement, for all that both are below 1
   EXPECT_EQ(count_agreed({1e-4, 1.002e-4, 2.5e-4}, 222, 12, false), 2);
