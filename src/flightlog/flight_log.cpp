@@ -75,6 +75,8 @@ void normalise(double length, std::initializer_list<double*> components) {
 
 FlightHeader parse_header(const io::Table& root) {
   root.integer("schema", 1, 1);
+  root.accept({"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2", "ambient", "mocap", "imu", "power",
+               "wings"});
   FlightHeader h;
   h.vehicle = root.string("vehicle");
   if (h.vehicle.empty() || h.vehicle.find_first_of("/\\") != std::string::npos)

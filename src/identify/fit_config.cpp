@@ -10,6 +10,7 @@ FitConfig read_fit_config(const std::filesystem::path& path, const model::Vehicl
                           const std::vector<std::string>& chosen) {
   const io::Table root = io::Config::load(path).root();
   root.integer("schema", 1, 1);
+  root.accept({"schema", "unseen_share", "parameter"});
   FitConfig config;
   config.unseen_share = root.number("unseen_share", io::positive(1));
   model::Vehicle copy = vehicle;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <stdexcept>
 #include <utility>
 
 #include "io/toml.hpp"
@@ -17,7 +18,7 @@ struct Section {
   Document* document;
   toml::table* table;
   std::string path;
-  std::set<std::string, std::less<>> asked;
+  std::set<std::string, std::less<>> asked, accepted{};
 };
 
 struct Document {
@@ -99,10 +100,11 @@ std::string kind(const toml::node& node) {
   refuse(entry, "is " + kind(*entry.node), accepted);
 }
 
-[[noreturn]] void refuse_unknown(const Section& section, const toml::key& key) {
+[[noreturn]] void refuse_unknown(const Section& section, const toml::key& key,
+                                 const std::set<std::string, std::less<>>& known) {
   const std::string where = place(key.source(), section.document->name);
   const std::string path = toml_path(section.path, key.str());
-  const std::vector<std::string> names(section.asked.begin(), section.asked.end());
+  const std::vector<std::string> names(known.begin(), known.end());
   const std::string same = in_another_unit(key.str(), names);
   if (!same.empty()) refuse(where, path, "unknown key; accepted here with another unit: " + toml_string(same), "");
   refuse(where, path, "unknown key", (names.empty() ? "no key here" : joined(names)) + did_you_mean(key.str(), names));
@@ -116,7 +118,7 @@ std::string kind(const toml::node& node) {
     if (!section.asked.contains(key.str())) unasked.emplace_back(key.str());
   }
   const std::string same = in_another_unit(name, unasked);
-  if (!same.empty()) refuse_unknown(section, section.table->find(same)->first);
+  if (!same.empty()) refuse_unknown(section, section.table->find(same)->first, section.asked);
   const std::string typo = nearest_name(name, unasked);
   refuse(entry, "is missing",
          std::string(accepted) + (typo.empty() ? "" : "; is it misspelt as " + toml_string(typo) + "?"));
@@ -124,7 +126,7 @@ std::string kind(const toml::node& node) {
 
 void refuse_unasked(Section& section) {
   for (auto& [key, node] : *section.table) {
-    if (!section.asked.contains(key.str())) refuse_unknown(section, key);
+    if (!section.asked.contains(key.str())) refuse_unknown(section, key, section.asked);
     const std::string path = toml_path(section.path, key.str());
     if (auto* table = node.as_table()) refuse_unasked(section.document->section(*table, path));
     auto* array = node.as_array();
@@ -147,6 +149,8 @@ Entry find(Section& top, std::string_view key) {
     // A key that the user quoted may hold dots itself.
     const std::size_t dot = section->table->contains(key) ? std::string_view::npos : key.find('.');
     const std::string_view name = key.substr(0, dot);
+    if (!section->accepted.empty() && !section->accepted.contains(name))
+      throw std::logic_error(toml_path(section->path, name) + " is asked for, but not among the keys accepted");
     section->asked.emplace(name);
     Entry entry{section, key, toml_path(section->path, name), section->table->get(name)};
     if (dot == std::string_view::npos) return entry;
@@ -479,6 +483,12 @@ std::vector<Table> Table::tables(std::string_view key) const {
     all.push_back(below(section_of(entry)));
   }
   return all;
+}
+
+void Table::accept(const std::vector<std::string>& names) const {
+  section_->accepted = {names.begin(), names.end()};
+  for (const auto& [key, node] : *section_->table)
+    if (!section_->accepted.contains(key.str())) refuse_unknown(*section_, key, section_->accepted);
 }
 
 bool Table::has(std::string_view key) const { return find(*section_, key).node != nullptr; }

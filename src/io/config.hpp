@@ -3,8 +3,9 @@
 //
 //   v.toml:3:11: torso.mass_kg: -0.01 is out of range; accepted: a number above 0, at most 1
 //
-// Keys are dotted paths below the table they are asked of. A reader asks for every key it knows, then calls
-// finish(), which refuses the rest.
+// Keys are dotted paths below the table they are asked of. A reader may first accept() the keys it knows, which refuses
+// the rest before anything that is missing or contradicts. It asks for every key, then calls finish(), which refuses what
+// nobody asked for.
 #pragma once
 
 #include <cstdint>
@@ -65,6 +66,9 @@ class Table {
   /// The tables of an array of tables; none when it is missing.
   std::vector<Table> tables(std::string_view key) const;
 
+  /// Refuses every other key of this table (not of those below), before a missing key that it may be a misspelling of. It
+  /// is a fault of the reader to ask for a key that is not among these.
+  void accept(const std::vector<std::string>& names) const;
   /// Whether a key is present; it counts as asked for.
   bool has(std::string_view key) const;
   /// Names of the keys present, sorted.

@@ -33,6 +33,9 @@ Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::s
   const io::Table root = io::Config::load(path, overrides).root();
   root.integer("schema", 1, 1);
   Vehicle vehicle;
+  std::vector<std::string> keys = {"schema", "name", "effects", "posterior"};
+  for (const Parameter& p : parameters(vehicle)) keys.push_back(p.path.substr(0, p.path.find('.')));
+  root.accept(keys);
   vehicle.name = root.string("name");
   for (const Parameter& p : parameters(vehicle)) *p.value = root.number(p.path, {p.low, p.high});
   if (const auto table = root.optional_table("effects")) read_effects(*table, vehicle);

@@ -98,6 +98,8 @@ class Reader {
 
   FlyConfig read() {
     root_.integer("schema", 1, 1);
+    root_.accept({"schema", "precision", "flight", "world", "constant_input", "excitation", "log", "vehicle", "task",
+                  "sensors", "controller", "randomisation", "actor"});
     c_.precision = root_.choice("precision", {"float", "double"});
     read_flight();
     c_.fleet.batch.world = read_world(root_);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <stdexcept>
 
 namespace flappy::io {
 namespace {
@@ -127,6 +128,22 @@ TEST(Config, RefusesUnknownKeys) {
             "v.toml:3:2: torsoo: unknown key; accepted: torso; did you mean \"torso\"?");
   EXPECT_EQ(message("  seed = 1\n", nothing), "v.toml:1:3: seed: unknown key; accepted: no key here");
   EXPECT_EQ(message("\"a\\u001b b\" = 1\n", nothing), "v.toml:1:1: \"a\\u001B b\": unknown key; accepted: no key here");
+}
+
+TEST(Config, UnknownKeysAreRefusedBeforeWhatIsMissing) {
+  const auto read = [](const Table& root) {
+    root.accept({"end", "success"});
+    root.table("end").number("time_s");
+    root.optional_table("success");
+  };
+  EXPECT_EQ(message("[end]\ntime_s = 1\n[success]\n", read), "accepted");
+  EXPECT_EQ(message("[sucess]\n", read),
+            "v.toml:1:2: sucess: unknown key; accepted: end, success; did you mean \"success\"?");
+  EXPECT_EQ(message("[success]\n", read), "v.toml: end: is missing; accepted: a table");
+  // a key that is accepted and not asked for stands there in vain
+  EXPECT_EQ(message("end = 1\n", [](const Table& root) { root.accept({"end"}); }),
+            "v.toml:1:1: end: unknown key; accepted: no key here");
+  EXPECT_THROW(message("", [](const Table& root) { root.accept({"end"}), root.has("start"); }), std::logic_error);
 }
 
 TEST(Config, RefusesUnknownKeysBelowTables) {

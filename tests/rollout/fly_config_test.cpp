@@ -119,6 +119,15 @@ TEST(FlyConfig, RefusesInOneLine) {
   EXPECT_EQ(message([&] { rollout::read_fly_config(pid); }).find(": flight"), std::string::npos);
 }
 
+TEST(FlyConfig, TellsOfAMisspeltTableOfATaskBeforeAMissingOne) {
+  const Folder folder;
+  std::string text = io::read_text(source_path("configs/tasks/hover.toml"));
+  text.resize(text.find("[end]"));
+  folder.write("task.toml", text + "[sucess]\n");
+  const std::string file = (folder / "task.toml").string(), line = refusal({"task=" + file});
+  EXPECT_TRUE(line.starts_with(file + ":") && line.ends_with("did you mean \"success\"?")) << line;
+}
+
 TEST(FlyConfig, RefusesAnActorOfAnotherTask) {
   const Folder folder;
   policy::Actor a;

@@ -107,7 +107,8 @@ function(expect_edit_refused old new line)
   expect_refused("${WORK}/bad.toml${line}" batch ${WORK}/bad.toml)
 endfunction()
 
-expect_edit_refused("seed = 1" "sed = 1" ": seed: is missing; accepted: an integer of at least 0; is it misspelt as \"sed\"?")
+expect_edit_refused("seed = 1" "sed = 1"
+  ":5:1: sed: unknown key; accepted: count, duration_s, input, precision, randomisation, schema, seed, step_s, threads, vehicle, world; did you mean \"seed\"?")
 expect_edit_refused("seed = 1" "seed = 1\nthread = 1"
   ":6:1: thread: unknown key; accepted: count, duration_s, input, precision, randomisation, schema, seed, step_s, threads, vehicle, world; did you mean \"threads\"?")
 expect_edit_refused("duration_s = 0.05" "duration_s = \"long\""

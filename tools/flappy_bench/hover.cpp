@@ -29,6 +29,8 @@ struct Job {
 Job read_job(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
   const io::Table root = io::Config::load(path, overrides).root();
   root.integer("schema", 1, 1);
+  root.accept({"schema", "vehicle", "precision", "count", "seed", "duration_s", "input", "randomisation", "step_s",
+               "threads", "world"});
   const model::Vehicle vehicle = model::read_vehicle(root.file("vehicle"));
   const model::Driver& d = vehicle.driver;
   Job job{vehicle,
