@@ -3,11 +3,15 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <cmath>
 #include <csignal>
 #include <utility>
 
 namespace flappy::io {
 namespace {
+
+constexpr std::size_t kPoints = 4;  // where the last three advances began and ended
 
 volatile std::sig_atomic_t interrupted_flag = 0;
 
@@ -38,33 +42,44 @@ void stop_on_interrupt() {
 
 bool interrupted() { return interrupted_flag != 0; }
 
-ProgressLine::ProgressLine(std::string what, double plain_every_s, std::FILE* stream)
+double steady_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void TimeLeft::add(double now_s, double done) {
+  constexpr double kWindow_s = 20, kApart_s = 0.1;
+  done_ = done;
+  if (!points_.empty() && (done <= points_.back().done || now_s < points_.back().at_s + kApart_s)) return;
+  points_.push_back({now_s, done});
+  while (points_.size() > kPoints && points_[1].at_s <= now_s - kWindow_s) points_.pop_front();
+}
+
+std::optional<double> TimeLeft::seconds(double now_s) const {
+  if (points_.size() < kPoints) return std::nullopt;
+  return (1 - done_) * (now_s - points_.front().at_s) / (done_ - points_.front().done);
+}
+
+ProgressLine::ProgressLine(std::string what, double plain_every_s, std::FILE* stream, std::function<double()> clock_s)
     : what_(std::move(what)),
       stream_(stream),
       terminal_(isatty(fileno(stream)) != 0),
-      every_(terminal_ ? 0.2 : plain_every_s),
-      start_(Clock::now()),
-      shown_(start_) {}
+      every_s_(terminal_ ? 0.2 : plain_every_s),
+      clock_s_(std::move(clock_s)),
+      shown_s_(clock_s_()) {}
 
 ProgressLine::~ProgressLine() { clear(); }
 
-bool ProgressLine::due() const { return Clock::now() - shown_ >= every_; }
+bool ProgressLine::due() const { return clock_s_() - shown_s_ >= every_s_; }
 
 void ProgressLine::show(double done, const std::string& more) {
-  const auto now = Clock::now();
-  if (done_at_start_ < 0) {
-    done_at_start_ = done;
-    start_ = now;
-  }
-  if (now - shown_ < every_) return;
-  shown_ = now;
+  const double now_s = clock_s_();
+  left_.add(now_s, done);
+  if (now_s - shown_s_ < every_s_) return;
+  shown_s_ = now_s;
   char share[16];
-  std::snprintf(share, sizeof share, " %.0f %%", 100 * done);
+  std::snprintf(share, sizeof share, " %.0f %%", std::floor(100 * done + 1e-9));  // 100 % is for what is done
   std::string text = what_ + share;
-  if (done > done_at_start_) {
-    const double spent_s = std::chrono::duration<double>(now - start_).count();
-    text += ", " + duration_text(spent_s * (1 - done) / (done - done_at_start_)) + " left";
-  }
+  if (const auto left_s = left_.seconds(now_s)) text += ", " + duration_text(*left_s) + " left";
   if (!more.empty()) text += ", " + more;
   if (terminal_) {
     std::fprintf(stream_, "\r%s\x1b[K", text.substr(0, width_of(stream_)).c_str());

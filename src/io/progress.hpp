@@ -1,8 +1,10 @@
 // What long work tells the person who waits, and how it is asked to stop.
 #pragma once
 
-#include <chrono>
 #include <cstdio>
+#include <deque>
+#include <functional>
+#include <optional>
 #include <string>
 
 namespace flappy::io {
@@ -11,11 +13,32 @@ namespace flappy::io {
 void stop_on_interrupt();
 bool interrupted();
 
+/// How long work that goes on as it did lately will take: (1 - done) / rate, the rate that of the last 20 s, or of the last
+/// three advances where those took longer.
+class TimeLeft {
+ public:
+  /// `done`: 0 to 1, at a time that does not go back.
+  void add(double now_s, double done);
+  /// Nothing before three advances.
+  std::optional<double> seconds(double now_s) const;
+
+ private:
+  struct Point {
+    double at_s, done;
+  };
+  std::deque<Point> points_;  ///< at least a tenth of a second apart
+  double done_ = 0;
+};
+
+/// Seconds since some moment, on a clock that nobody sets.
+double steady_seconds();
+
 /// "flown 43 %, 12 s left": one line on a terminal that is written over at most 5 times a second; elsewhere a line of its
 /// own at most every `plain_every_s`, none with infinity.
 class ProgressLine {
  public:
-  explicit ProgressLine(std::string what, double plain_every_s = 10, std::FILE* stream = stderr);
+  explicit ProgressLine(std::string what, double plain_every_s = 10, std::FILE* stream = stderr,
+                        std::function<double()> clock_s = steady_seconds);
   /// Clears the line.
   ~ProgressLine();
   ProgressLine(const ProgressLine&) = delete;
@@ -23,20 +46,19 @@ class ProgressLine {
 
   /// Whether show() would write now.
   bool due() const;
-  /// `done`: 0 to 1; the time left goes by what was done since the first call. `more` is written behind it.
+  /// `done`: 0 to 1. `more` is written behind the time left.
   void show(double done, const std::string& more = "");
   /// Call it before anything else is printed.
   void clear();
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   std::string what_;
   std::FILE* stream_;
   bool terminal_;
-  std::chrono::duration<double> every_;
-  Clock::time_point start_, shown_;
-  double done_at_start_ = -1;
+  double every_s_;
+  std::function<double()> clock_s_;
+  double shown_s_;
+  TimeLeft left_;
   bool visible_ = false;
 };
 

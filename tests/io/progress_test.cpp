@@ -9,13 +9,10 @@
 #include <csignal>
 #include <cstdlib>
 #include <memory>
-#include <regex>
-#include <thread>
 
 namespace flappy::io {
 namespace {
 
-using namespace std::chrono_literals;
 using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
 /// A file or a terminal, and what was written to it.
@@ -50,27 +47,63 @@ class Screen {
   int master_ = -1;
 };
 
+TEST(TimeLeft, IsThatOfTheRecentRate) {
+  // 30 s on a busy machine for a tenth, then 1 % a second
+  TimeLeft left;
+  double now_s = 0, done = 0;
+  for (; done < 0.0999; ++now_s, done += 0.1 / 30) left.add(now_s, done);
+  left.add(now_s, done);
+  EXPECT_NEAR(*left.seconds(now_s), 270, 1e-6) << "30 s for each tenth";
+  for (int i = 0; i < 10; ++i) left.add(++now_s, done += 0.01);
+  EXPECT_NEAR(*left.seconds(now_s), 0.8 / ((0.1 + 0.1 / 3) / 20), 1e-6) << "half of the last 20 s was quick";
+  for (int i = 0; i < 10; ++i) left.add(++now_s, done += 0.01);
+  EXPECT_NEAR(*left.seconds(now_s), 70, 1e-6) << "the busy time is forgotten";
+  EXPECT_NEAR(*left.seconds(now_s + 20), 140, 1e-6) << "nothing done for as long again";
+}
+
+TEST(TimeLeft, IsUnknownBeforeThreeAdvances) {
+  TimeLeft left;
+  EXPECT_FALSE(left.seconds(0));
+  left.add(0, 0.4);
+  left.add(100, 0.4);
+  left.add(100, 0.5);
+  left.add(200, 0.51);
+  EXPECT_FALSE(left.seconds(200));
+  left.add(200.05, 0.9);
+  EXPECT_FALSE(left.seconds(200.05)) << "too soon after the last to tell a rate";
+  left.add(300, 0.9);
+  EXPECT_NEAR(*left.seconds(300), 300 * 0.1 / 0.5, 1e-9);
+  // rare advances: the last three, however long they took
+  for (int i = 1; i <= 4; ++i) left.add(300 + 100 * i, 0.9 + 0.01 * i);
+  EXPECT_NEAR(*left.seconds(700), 600, 1e-6);
+}
+
 TEST(ProgressLine, WritesOverItselfOnATerminal) {
   Screen screen(true);
   ASSERT_TRUE(screen.stream && isatty(fileno(screen.stream.get())));
+  double now_s = 100;
   {
-    ProgressLine line("flown", 1000, screen.stream.get());
+    ProgressLine line("flown", 1000, screen.stream.get(), [&] { return now_s; });
     EXPECT_FALSE(line.due());
     for (int i = 0; i < 10; ++i) line.show(0);
     EXPECT_EQ(screen.written(), "") << "nothing for short work";
-    std::this_thread::sleep_for(210ms);
-    EXPECT_TRUE(line.due());
-    for (int i = 0; i < 10; ++i) line.show(0.25);
-    // a quarter took 0.2 s, or longer on a busy machine
-    EXPECT_TRUE(std::regex_match(screen.written(), std::regex("\rflown 25 %, [1-9] s left\x1b\\[K")));
-    std::this_thread::sleep_for(210ms);
+    for (const double done : {0.05, 0.1}) {
+      now_s += 5;
+      EXPECT_TRUE(line.due());
+      for (int i = 0; i < 10; ++i) line.show(done);
+    }
+    EXPECT_EQ(screen.written(), "\rflown 5 %\x1b[K\rflown 10 %\x1b[K") << "no time left while none is known";
+    now_s += 5;
+    line.show(0.15);
+    EXPECT_EQ(screen.written(), "\rflown 15 %, 85 s left\x1b[K");
+    now_s += 5;
     line.show(0.999, "and more than fits in thirty columns");
-    EXPECT_EQ(screen.written(), "\rflown 100 %, 0 s left, and mo\x1b[K");
+    EXPECT_EQ(screen.written(), "\rflown 99 %, 0 s left, and mor\x1b[K");
     line.clear();
     EXPECT_EQ(screen.written(), "\r\x1b[K");
     line.clear();
     EXPECT_EQ(screen.written(), "");
-    std::this_thread::sleep_for(210ms);
+    now_s += 0.3;
     line.show(1);
     screen.written();
   }
@@ -79,11 +112,12 @@ TEST(ProgressLine, WritesOverItselfOnATerminal) {
 
 TEST(ProgressLine, WritesPlainLinesElsewhere) {
   Screen screen(false);
+  double now_s = 100;
   {
-    ProgressLine line("trained", 0.1, screen.stream.get());
+    ProgressLine line("trained", 10, screen.stream.get(), [&] { return now_s; });
     for (int i = 0; i < 10; ++i) line.show(0.5);
     EXPECT_EQ(screen.written(), "");
-    std::this_thread::sleep_for(110ms);
+    now_s += 10;
     for (int i = 0; i < 10; ++i) line.show(0.5, "update 7");
     EXPECT_EQ(screen.written(), "trained 50 %, update 7\n") << "no time left while nothing was done";
     line.clear();
