@@ -9,7 +9,7 @@
 
 #include "identify/measured_map.hpp"
 #include "io/csv.hpp"
-#include "io/run_program.hpp"
+#include "io/gnuplot.hpp"
 
 namespace flappy::identify {
 namespace {
@@ -189,8 +189,7 @@ void write_beat_csv(const std::filesystem::path& path, const WingComparison& c) 
 
 void write_beat_svg(const std::filesystem::path& path, const WingComparison& c) {
   std::string script =
-      "set terminal svg size 720,600 dynamic background '#ffffff' font 'sans-serif,14' name 'kinematics'\n"
-      "set encoding utf8\nset border 3 lc '#444444'\nset tics nomirror\nset grid ytics lc '#dddddd' lt 1\n"
+      "set grid ytics lc '#dddddd' lt 1\n"
       "set key outside right\nset xrange [0:1]\n$rows << end_of_rows\n";
   const std::vector<double> phases = beat_phases();
   for (std::size_t i = 0; i < kBeatPoints; ++i) {
@@ -212,7 +211,7 @@ void write_beat_svg(const std::filesystem::path& path, const WingComparison& c) 
     }
   }
   script += "unset multiplot\n";
-  io::write_atomically(path, io::run_program({"gnuplot", "--default-settings"}, script, path.string()));
+  io::draw_svg(path, "kinematics", 720, 600, script);
 }
 
 }  // namespace flappy::identify

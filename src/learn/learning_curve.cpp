@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "io/files.hpp"
-#include "io/run_program.hpp"
+#include "io/gnuplot.hpp"
 #include "io/statistics.hpp"
 #include "learn/metrics.hpp"
 
@@ -99,10 +99,7 @@ void write_curve_svg(const std::filesystem::path& path, const LearningCurve& cur
   std::string label;
   for (const char c : score) label += c == '_' || c == '\'' ? ' ' : c;
   std::string script =
-      "set terminal svg size 720,432 dynamic background '#ffffff' font 'sans-serif,14' name 'learning_curve'\n"
-      "set encoding utf8\n"
-      "set border 3 lc '#444444'\nset tics nomirror\nset grid ytics lc '#dddddd' lt 1\nset key bottom right\nset "
-      "rmargin 5\n"
+      "set grid ytics lc '#dddddd' lt 1\nset key bottom right\nset rmargin 5\n"
       "set xlabel 'update'\nset ylabel '" +
       label + "'\n$rows << end_of_rows\n";
   for (const auto& row : curve.rows) {
@@ -118,8 +115,7 @@ void write_curve_svg(const std::filesystem::path& path, const LearningCurve& cur
               (i == 0 ? "title 'each seed'" : "notitle");
   script += ", $rows using 1:2 with lines lw 2.5 lc '#08519c' title 'interquartile mean of " +
             std::to_string(curve.seeds.size()) + " seeds'\n";
-  const std::string figure = io::run_program({"gnuplot", "--default-settings"}, script, path.string());
-  io::write_atomically(path, figure);
+  io::draw_svg(path, "learning_curve", 720, 432, script);
 }
 
 }  // namespace flappy::learn

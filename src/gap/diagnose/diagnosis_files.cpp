@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "io/files.hpp"
-#include "io/run_program.hpp"
+#include "io/gnuplot.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -14,23 +14,18 @@ constexpr const char* kColours[] = {"#bdbdbd", "#6baed6", "#08519c"};
 std::string digits(const std::optional<double>& value) { return value ? io::shortest_digits(*value) : ""; }
 std::string digits(double value) { return io::shortest_digits(value); }
 
-std::string style(const char* name) {
-  return "set terminal svg size 760,420 dynamic noenhanced background '#ffffff' font 'sans-serif,14' name '" +
-         std::string(name) + "'\nset encoding utf8\nset border 3 lc '#444444'\nset tics nomirror\n";
-}
-
-void draw(const std::filesystem::path& path, const std::string& script) {
-  io::write_atomically(path, io::run_program({"gnuplot", "--default-settings"}, script, path.string()));
+void draw(const std::filesystem::path& folder, const std::string& name, const std::string& script) {
+  io::draw_svg(folder / (name + ".svg"), name, 760, 420, script);
 }
 
 /// Residual over noise by channel: a group of bars for each, one for each stage.
 std::string residual_script(const Report& r) {
   const std::size_t stages = r.effect ? 3 : 2;
-  std::string script = style("residuals") +
-                       "set grid ytics lc '#dddddd' lt 1\nset key outside top center horizontal\nset style fill solid\n"
-                       "set style data histogram\nset style histogram clustered gap 1\nset boxwidth 0.9\nset logscale "
-                       "y\nset yrange [0.5:*]\n"
-                       "set ylabel 'rms of residual over noise'\nset xtics rotate by -40\n$rows << end_of_rows\n";
+  std::string script =
+      "set grid ytics lc '#dddddd' lt 1\nset key outside top center horizontal\nset style fill solid\n"
+      "set style data histogram\nset style histogram clustered gap 1\nset boxwidth 0.9\nset logscale "
+      "y\nset yrange [0.5:*]\n"
+      "set ylabel 'rms of residual over noise'\nset xtics rotate by -40\n$rows << end_of_rows\n";
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if (!(r.over_noise[0][channel] > 0)) continue;
     script += channel_name(static_cast<int>(channel));
@@ -51,10 +46,10 @@ std::string probability_script(const Report& r) {
   for (const Reported& c : r.candidates) top.push_back(&c);
   std::ranges::stable_sort(top, std::greater{}, &Reported::probability);
   if (top.size() > kMostBars) top.resize(kMostBars);
-  std::string script = style("probabilities") +
-                       "set grid xtics lc '#dddddd' lt 1\nset style fill solid\nset xrange [0:1]\nunset key\n"
-                       "set xlabel 'probability'\nset yrange [-0.6:" +
-                       digits(static_cast<double>(top.size()) - 0.4) + "]\n$rows << end_of_rows\n";
+  std::string script =
+      "set grid xtics lc '#dddddd' lt 1\nset style fill solid\nset xrange [0:1]\nunset key\n"
+      "set xlabel 'probability'\nset yrange [-0.6:" +
+      digits(static_cast<double>(top.size()) - 0.4) + "]\n$rows << end_of_rows\n";
   for (std::size_t i = 0; i < top.size(); ++i) {
     const bool effect = top[i]->kind == Answer::Kind::effect;
     script += digits(static_cast<double>(top.size() - 1 - i)) + " " + digits(top[i]->probability) + " \"" +
@@ -101,8 +96,8 @@ void write_tables(const std::filesystem::path& folder, const Report& r) {
 }
 
 void write_figures(const std::filesystem::path& folder, const Report& r) {
-  draw(folder / "residuals.svg", residual_script(r));
-  draw(folder / "probabilities.svg", probability_script(r));
+  draw(folder, "residuals", residual_script(r));
+  draw(folder, "probabilities", probability_script(r));
 }
 
 }  // namespace flappy::gap
