@@ -2,16 +2,21 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "io/files.hpp"
+#include "io/log.hpp"
 #include "io/version.hpp"  // made by the build
 
 namespace flappy::io {
 
 namespace {
+
+constexpr std::array<const char*, 4> kLevels = {"debug", "info", "warning", "error"};  // in the order of LogLevel
 
 /// Threads that wait for their team spin for milliseconds by default: whoever shares the processors with us, and then we
 /// ourselves, stand still. OpenMP reads its environment before main, so the program starts itself anew.
@@ -44,6 +49,9 @@ Program::Program(const std::string& name, const std::string& description, const 
              std::to_string(NLOHMANN_JSON_VERSION_MINOR) + "." + std::to_string(NLOHMANN_JSON_VERSION_PATCH);
   app_.set_version_flag("--version", version);
   app_.add_option("--json", json_path_, "write the results as JSON to this file");
+  app_.add_option("--log-level", log_level_, "least level of what is noted on stderr")
+      ->check(CLI::IsMember(std::vector<std::string>(kLevels.begin(), kLevels.end())))
+      ->capture_default_str();
   app_.fallthrough();
 }
 
@@ -51,6 +59,9 @@ int Program::run(int argc, char** argv, const std::function<void()>& job) {
   try {
     app_.parse(argc, argv);
     spin_briefly(argv);
+    const auto level = std::ranges::find(kLevels, log_level_) - kLevels.begin();
+    start_log(static_cast<LogLevel>(level), app_.get_name() + " " FLAPPY_VERSION ", commit " + commit() + ": " +
+                                                joined(std::vector<std::string>(argv, argv + argc), " "));
     if (!json_path_.empty()) check_output(json_path_);
     job();
     return 0;
@@ -60,10 +71,10 @@ int Program::run(int argc, char** argv, const std::function<void()>& job) {
                  app_.get_name().c_str());
     return 2;
   } catch (const InputError& e) {
-    std::fprintf(stderr, "%s\n", e.what());
+    log_error(e.what());
     return 2;
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "%s: internal fault: %s\n", app_.get_name().c_str(), e.what());
+    log_error(app_.get_name() + ": internal fault: " + e.what());
     return 1;
   }
 }

@@ -1,4 +1,4 @@
-// What every program has: --version, --json FILE, one line for each mistake of the user, exit codes.
+// What every program has: --version, --json FILE, --log-level, one line for each mistake of the user, exit codes.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -25,7 +25,7 @@ class Program {
 
  private:
   CLI::App app_;
-  std::string json_path_;
+  std::string json_path_, log_level_ = "warning";
 };
 
 }  // namespace flappy::io

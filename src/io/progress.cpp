@@ -14,6 +14,7 @@ namespace {
 constexpr std::size_t kPoints = 4;  // where the last three advances began and ended
 
 volatile std::sig_atomic_t interrupted_flag = 0;
+ProgressLine* visible_line = nullptr;  // on the terminal
 
 /// "9 s", "12 min", "3.4 h"
 std::string duration_text(double s) {
@@ -88,10 +89,16 @@ void ProgressLine::show(double done, const std::string& more) {
   }
   std::fflush(stream_);
   visible_ = terminal_;
+  if (visible_) visible_line = this;
+}
+
+void clear_progress() {
+  if (ProgressLine* line = visible_line) line->clear();
 }
 
 void ProgressLine::clear() {
   if (!std::exchange(visible_, false)) return;
+  visible_line = nullptr;
   std::fputs("\r\x1b[K", stream_);
   std::fflush(stream_);
 }

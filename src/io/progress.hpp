@@ -48,7 +48,7 @@ class ProgressLine {
   bool due() const;
   /// `done`: 0 to 1. `more` is written behind the time left.
   void show(double done, const std::string& more = "");
-  /// Call it before anything else is printed.
+  /// Call it before anything else is printed on stdout.
   void clear();
 
  private:
@@ -61,5 +61,8 @@ class ProgressLine {
   TimeLeft left_;
   bool visible_ = false;
 };
+
+/// Clears the line that is visible, if any is.
+void clear_progress();
 
 }  // namespace flappy::io

@@ -110,6 +110,21 @@ TEST(ProgressLine, WritesOverItselfOnATerminal) {
   EXPECT_EQ(screen.written(), "\r\x1b[K") << "cleared at its end";
 }
 
+TEST(ProgressLine, IsClearedForWhoKnowsItNot) {
+  Screen screen(true);
+  double now_s = 0;
+  ProgressLine line("flown", 1000, screen.stream.get(), [&] { return now_s; });
+  clear_progress();
+  EXPECT_EQ(screen.written(), "");
+  now_s = 1;
+  line.show(0.5);
+  screen.written();
+  clear_progress();
+  EXPECT_EQ(screen.written(), "\r\x1b[K");
+  clear_progress();
+  EXPECT_EQ(screen.written(), "");
+}
+
 TEST(ProgressLine, WritesPlainLinesElsewhere) {
   Screen screen(false);
   double now_s = 100;

@@ -26,6 +26,10 @@ expect_keys(${WORK}/whole.json ${figures})
 expect_keys(${WORK}/whole/summary.json ${figures})
 expect_keys(${WORK}/whole/run.json commit=STRING processor=STRING instruction_set=STRING seed=NUMBER)
 
+file(READ ${WORK}/whole/log.txt text)
+set(time "[-0-9]+T[0-9:.+-]+")
+expect_match("log.txt" "${text}" "^${time} info: flappy-train [0-9.]+, commit [^ ]+: [^\n]+--threads 1[^\n]*\n(${time} info: update [0-9]+: [^\n]+\n)+${time} info: trained, update 120000\n$")
+
 # What a run must leave, to the byte.
 function(digest folder result)
   set(all)
@@ -90,6 +94,7 @@ expect_equal("summaries" "${count}" 2)
 
 # ---- what is refused
 
+expect_refused("flappy-train: --log-level: loud not in {debug,info,warning,error}; see flappy-train --help" --log-level loud)
 expect_refused("${WORK}/whole: holds a run; accepted: a new folder, or --resume ${WORK}/whole" ${escape} ${some} --out ${WORK}/whole)
 expect_refused("flappy-train: what to train is not clear; accepted: a configuration, or --resume RUN")
 expect_refused("${WORK}/none: is no run folder; accepted: a folder that flappy-train left" --resume ${WORK}/none)

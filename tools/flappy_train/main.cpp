@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "io/log.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "learn/checkpoint.hpp"
@@ -79,17 +80,21 @@ TrainSummary train_one(const TrainConfig& config, TrainOptions options) {
   bool said = false;
   options.keep_going = [&](const TrainProgress& p) {
     if (!std::exchange(said, true)) {
+      io::log_into(options.folder);
       const TrainCosts costs = costs_of(config);
       std::printf("%s: seed %llu, %d threads, %.0f MB of memory, at most %.0f MB on disk\n", options.folder.c_str(),
                   static_cast<unsigned long long>(config.seed), config.threads,
                   static_cast<double>(costs.memory_bytes) / 1e6, static_cast<double>(costs.disk_bytes) / 1e6);
       std::fflush(stdout);
     }
+    if (p.evaluated) io::log(io::LogLevel::info, "update " + std::to_string(p.update) + ": " + words(p));
     if (line.due()) line.show(static_cast<double>(p.update) / static_cast<double>(p.updates), words(p));
     return !io::interrupted();
   };
   TrainSummary summary = learn::train(config, options);
   line.clear();
+  io::log(io::LogLevel::info,
+          (summary.stopped ? "stopped at update " : "trained, update ") + std::to_string(summary.updates));
   print(options.folder, summary);
   std::fflush(stdout);
   return summary;

@@ -3,12 +3,14 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <utility>
 
 #include "flappy/vehicle_file.hpp"
 #include "gap/diagnose/diagnosis_files.hpp"
 #include "gap/diagnose/summary.hpp"
 #include "io/config.hpp"
 #include "io/files.hpp"
+#include "io/log.hpp"
 #include "io/progress.hpp"
 #include "model/effects/registry.hpp"
 #include "model/posterior.hpp"
@@ -42,7 +44,9 @@ Diagnosis diagnose_visibly(const std::vector<CarriedFlight>& flights, const sim:
   options.threads = threads;
   options.withheld = withheld;
   io::ProgressLine line("diagnosing");
+  std::string noted;
   options.progress = [&](double share, const std::string& what) {
+    if (std::exchange(noted, what) != what) io::log(io::LogLevel::info, what);
     line.show(share, what);
     return !io::interrupted();
   };
@@ -88,7 +92,7 @@ std::string write_all(const std::filesystem::path& out, const Report& report,
   try {
     write_figures(out, report);
   } catch (const io::InputError& e) {
-    std::fprintf(stderr, "warning: %s\n", e.what());
+    io::log(io::LogLevel::warning, e.what());
   }
   for (const char* name : kFiles)
     if (name != kJson && std::filesystem::exists(out / name)) names += std::string(", ") + name;
@@ -149,6 +153,7 @@ Json run_diagnose(const DiagnoseCommand& command) {
   if (!out.empty()) {
     io::make_folder(out);
     io::check_output(out / kJson);
+    io::log_into(out);
   }
   io::stop_on_interrupt();
   Logs read = read_logs(command);
@@ -172,6 +177,9 @@ Json run_diagnose(const DiagnoseCommand& command) {
   }
   Json json = diagnosis_json(report);
   for (const std::string& line : summary_of(report, command.out)) std::printf("%s\n", line.c_str());
+  io::log(io::LogLevel::info, faulty       ? "the flights' data have faults: no diagnosis"
+                              : d.complete ? "diagnosed"
+                                           : "stopped before every effect was weighed");
   if (out.empty()) return json;
   io::write_atomically(out / kJson, json.dump(2) + "\n");
   std::printf("written to %s: %s\n", command.out.c_str(), written.c_str());
