@@ -1,13 +1,11 @@
 #include "benchmark/detectability_carry.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <cmath>
-#include <exception>
 
 #include "blind/pilot.hpp"
 #include "flightlog/rotation.hpp"
+#include "io/parallel.hpp"
 
 namespace flappy::benchmark {
 namespace {
@@ -132,20 +130,10 @@ gap::Rows carry(const gap::Recording& r, const Rider& rider, std::uint64_t fligh
 std::vector<gap::Signature> carry_all(const std::vector<gap::CarriedFlight>& flights, const std::vector<Rider>& riders,
                                       int threads) {
   std::vector<gap::Signature> result(riders.size(), gap::Signature(flights.size()));
-  std::exception_ptr failed;
-  const auto jobs = static_cast<std::ptrdiff_t>(riders.size() * flights.size());
-#pragma omp parallel for schedule(dynamic) num_threads(threads > 0 ? threads : omp_get_num_procs())
-  for (std::ptrdiff_t job = 0; job < jobs; ++job) {
-    try {
-      const std::size_t rider = static_cast<std::size_t>(job) / flights.size();
-      const std::size_t flight = static_cast<std::size_t>(job) % flights.size();
-      result[rider][flight] = carry(flights[flight].recording(), riders[rider], flight);
-    } catch (...) {  // nothing may leave a parallel loop
-#pragma omp critical
-      failed = std::current_exception();
-    }
-  }
-  if (failed) std::rethrow_exception(failed);
+  io::parallel_for(riders.size() * flights.size(), threads, [&](std::size_t job) {
+    const std::size_t rider = job / flights.size(), flight = job % flights.size();
+    result[rider][flight] = carry(flights[flight].recording(), riders[rider], flight);
+  });
   for (gap::Signature& s : result)
     if (std::ranges::any_of(s, [](const gap::Rows& rows) { return rows.empty(); })) s.clear();
   return result;

@@ -1,15 +1,13 @@
 // Flights of a robot without effects, and what moves their rows.
-#include <omp.h>
-
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <stdexcept>
 
 #include "benchmark/detectability.hpp"
 #include "flappy/vehicle.hpp"
 #include "gap/evidence/fit.hpp"
 #include "io/files.hpp"
+#include "io/parallel.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::benchmark {
@@ -33,22 +31,6 @@ Signature difference(Signature a, const Signature& b) {
   return a;
 }
 
-/// Calls job(0), ..., job(n - 1) on several threads.
-template <class Job>
-void for_all(std::size_t n, int threads, const Job& job) {
-  std::exception_ptr failed;
-#pragma omp parallel for schedule(dynamic) num_threads(threads > 0 ? threads : omp_get_num_procs())
-  for (std::size_t i = 0; i < n; ++i) {
-    try {
-      job(i);
-    } catch (...) {  // nothing may leave a parallel loop
-#pragma omp critical
-      failed = std::current_exception();
-    }
-  }
-  if (failed) std::rethrow_exception(failed);
-}
-
 }  // namespace
 
 bool acts_on_sensors(blind::Effect effect) {
@@ -62,12 +44,12 @@ bool acts_on_sensors(blind::Effect effect) {
 
 std::vector<blind::Flight> fly_all(const blind::Case& c, int threads) {
   std::vector<blind::Flight> flights(blind::kFlights);
-  for_all(blind::kFlights, threads, [&](std::size_t k) { flights[k] = fly(c, k); });
+  io::parallel_for(blind::kFlights, threads, [&](std::size_t k) { flights[k] = fly(c, k); });
   return flights;
 }
 
 Subject::Subject(blind::Case c, std::vector<blind::Flight> flights, int threads)
-    : case_(std::move(c)), threads_(threads > 0 ? threads : omp_get_num_procs()) {
+    : case_(std::move(c)), threads_(io::thread_count(threads)) {
   for (std::size_t k = 0; k < flights.size(); ++k) {
     const std::string name = "flight_" + std::to_string(k + 1);
     if (flights[k].crashed)
@@ -123,10 +105,10 @@ std::vector<Smooth> Subject::added(const std::vector<Added>& list) const {
 /// the same noise.
 std::vector<Smooth> Subject::sensed(const std::vector<Added>& list) const {
   std::vector<std::vector<flightlog::FlightLog>> logs(list.size(), std::vector<flightlog::FlightLog>(blind::kFlights));
-  for_all(list.size() * blind::kFlights, threads_, [&](std::size_t job) {
+  io::parallel_for(list.size() * blind::kFlights, threads_, [&](std::size_t job) {
     const Added& a = list[job / blind::kFlights];
     blind::Case c = case_;
-    c.sizes = blind::Sizes({{blind::effect_names()[static_cast<std::size_t>(a.effect)], a.size}});
+    c.sizes = blind::Sizes({{effect_names()[static_cast<std::size_t>(a.effect)], a.size}});
     logs[job / blind::kFlights][job % blind::kFlights] = fly(c, job % blind::kFlights).log;
   });
   std::vector<Smooth> result;

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "flight/fleet_storage.hpp"
+#include "io/parallel.hpp"
 #include "sim/kernels.hpp"
 
 namespace flappy::flight {
@@ -239,9 +240,7 @@ void Fleet<T>::end() {
 template <class T>
 void Fleet<T>::step() {
   begin(1);
-  const auto count = static_cast<std::ptrdiff_t>(blocks());
-#pragma omp parallel for schedule(static) num_threads(storage_->batch.storage().threads)
-  for (std::ptrdiff_t b = 0; b < count; ++b) fly_block(static_cast<std::size_t>(b));
+  io::parallel_for(blocks(), storage_->batch.storage().threads, [&](std::size_t b) { fly_block(b); });
   end();
 }
 

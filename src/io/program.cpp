@@ -1,11 +1,6 @@
 #include "io/program.hpp"
 
-#include <unistd.h>
-
-#include <algorithm>
-#include <array>
 #include <cstdio>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "io/files.hpp"
@@ -15,16 +10,6 @@
 namespace flappy::io {
 
 namespace {
-
-constexpr std::array<const char*, 4> kLevels = {"debug", "info", "warning", "error"};  // in the order of LogLevel
-
-/// Threads that wait for their team spin for milliseconds by default: whoever shares the processors with us, and then we
-/// ourselves, stand still. OpenMP reads its environment before main, so the program starts itself anew.
-void spin_briefly(char** argv) {
-  if (std::getenv("GOMP_SPINCOUNT") != nullptr || std::getenv("OMP_WAIT_POLICY") != nullptr) return;
-  setenv("GOMP_SPINCOUNT", "10000", 1);  // some tens of microseconds
-  execv("/proc/self/exe", argv);
-}
 
 /// Those that there are, where one is missing or is none of them.
 std::string subcommands(const CLI::App& app, const CLI::ParseError& error) {
@@ -58,10 +43,6 @@ Program::Program(const std::string& name, const std::string& description, const 
 int Program::run(int argc, char** argv, const std::function<void()>& job) {
   try {
     app_.parse(argc, argv);
-    spin_briefly(argv);
-    const auto level = std::ranges::find(kLevels, log_level_) - kLevels.begin();
-    start_log(static_cast<LogLevel>(level), app_.get_name() + " " FLAPPY_VERSION ", commit " + commit() + ": " +
-                                                joined(std::vector<std::string>(argv, argv + argc), " "));
     if (!json_path_.empty()) check_output(json_path_);
     job();
     return 0;

@@ -1,10 +1,9 @@
 #include "learn/train_config.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "io/parallel.hpp"
 #include "io/sha256.hpp"
 #include "io/toml_writer.hpp"
 
@@ -50,8 +49,7 @@ class Reader {
 
   TrainConfig read() {
     c_.seed = static_cast<std::uint64_t>(root_.integer_or("seed", 0, 0, INT32_MAX));
-    c_.threads = static_cast<int>(root_.integer_or("threads", 0, 0, 1024));
-    if (c_.threads == 0) c_.threads = omp_get_num_procs();
+    c_.threads = io::thread_count(static_cast<int>(root_.integer_or("threads", 0, 0, 1024)));
     if (c_.fly.precision != "float") root_.fail("fly", "flies in double", "precision = \"float\"");
     if (c_.fly.fleet.task.constants.success.by_s <= 0)
       root_.fail("fly", "has a task that says no success", "a task with [success.capture] and [success.keep]");

@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "io/parallel.hpp"
 #include "io/sha256.hpp"
 #include "learn/collector.hpp"
 #include "learn/metrics.hpp"
@@ -136,9 +137,7 @@ class Trainer {
       for (std::size_t k = 0; k < average_.size(); ++k)
         average_[k] += config_.policy_averaging * (actor_->weights[k] - average_[k]);
     } else {
-      const auto count = static_cast<std::ptrdiff_t>(items);
-#pragma omp parallel for schedule(dynamic) num_threads(config_.threads)
-      for (std::ptrdiff_t i = 0; i < count; ++i) collector_.run(static_cast<std::size_t>(i));
+      io::parallel_for(items, config_.threads, [&](std::size_t i) { collector_.run(i); });
     }
     collector_.end(replay_);
     ++steps_;

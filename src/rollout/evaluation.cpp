@@ -1,7 +1,5 @@
 #include "rollout/evaluation.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -9,6 +7,9 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "rollout/recorder.hpp"
+#include "rollout/settle.hpp"
+#include "io/parallel.hpp"
 #include "io/toml_writer.hpp"
 #include "rollout/recorder.hpp"
 #include "rollout/settle.hpp"
@@ -81,15 +82,11 @@ class Part {
     if (followers_.empty()) return;
     const double t_s = static_cast<double>(tick_) * fleet_.period_s();
     const flight::Target goal = fleet_.target(0);  // of all, as they started together
-    const auto n = static_cast<std::ptrdiff_t>(followers_.size());
-    const int threads = fleet_.batch().storage().threads;
-#pragma omp parallel for schedule(static) num_threads(threads)
-    for (std::ptrdiff_t k = 0; k < n; ++k) {
-      const auto i = static_cast<std::size_t>(k);
+    io::parallel_for(followers_.size(), fleet_.batch().storage().threads, [&](std::size_t i) {
       note(i);
       if (followers_[i].manoeuvring(t_s)) followers_[i].spend(energy_J(i), fleet_.period_s(), fleet_.handed_back(i));
       followers_[i].see(fleet_.truth(i), goal, t_s, outcomes_[i]);
-    }
+    });
   }
 
   void finish(Evaluation& result) {
@@ -182,7 +179,7 @@ Evaluation fly_all(const FlyConfig& config, const EvaluationOptions& options, Ho
   const bool alone = !pilot.actor && pilot.policy == nullptr, settled = config.fleet.task.start.settled;
   flight::FleetOptions o = config.fleet;
   if (alone) o.task = without_policy(o.task);
-  const int threads = o.batch.threads > 0 ? o.batch.threads : omp_get_num_procs();
+  const int threads = io::thread_count(o.batch.threads);
 
   const auto ticks = std::max<std::int64_t>(1, std::llround(config.duration_s * o.control_hz));
   const double hover_ticks = settled ? rollout::kHover_s * o.control_hz : 0;

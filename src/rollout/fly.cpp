@@ -1,15 +1,14 @@
 #include "rollout/fly.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <exception>
 #include <set>
 
 #include "rollout/recorder.hpp"
 #include "rollout/settle.hpp"
+#include "io/parallel.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::rollout {
@@ -52,9 +51,7 @@ void prepare_log_folder(const fs::path& folder, std::size_t count, const std::st
   if (!foreign.empty()) refuse("holds " + *foreign.begin());
 }
 
-int processors(const FlyConfig& config) {
-  return config.fleet.batch.threads > 0 ? config.fleet.batch.threads : omp_get_num_procs();
-}
+int processors(const FlyConfig& config) { return io::thread_count(config.fleet.batch.threads); }
 
 /// Flights that are flown together.
 template <class T>
@@ -88,15 +85,12 @@ class Part {
     const double t_s = tick_ * fleet_.period_s();
     const flight::Target target = fleet_.target(0);  // of all, as they started together
     const bool settled = t_s >= config_.settle_s - 1e-9;
-    const auto n = static_cast<std::ptrdiff_t>(scores_.size());
-    const int threads = fleet_.batch().storage().threads;
-#pragma omp parallel for schedule(static) num_threads(threads) if (n > 32)
-    for (std::ptrdiff_t k = 0; k < n; ++k) {
-      const auto i = static_cast<std::size_t>(k);
+    const std::size_t n = scores_.size();
+    io::parallel_for(n, n > 32 ? fleet_.batch().storage().threads : 1, [&](std::size_t i) {
       if (!config_.welded) scores_[i].add(fleet_.truth(i), target, fleet_.batch().status(i), t_s, settled);
       if (ended_[i] == 0) ended_[i] = fleet_.ended(i);
       if (!recorders_.empty()) recorders_[i].record();
-    }
+    });
     result.scoring_s += seconds_since(before);
   }
 
@@ -114,24 +108,14 @@ class Part {
   }
 
   std::size_t write_logs(const FlyOptions& options) const {
-    std::size_t written = 0;
-    std::exception_ptr fault;
-    const auto n = static_cast<std::ptrdiff_t>(recorders_.size());
-#pragma omp parallel for schedule(dynamic) reduction(+ : written) num_threads(processors(config_))
-    for (std::ptrdiff_t k = 0; k < n; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      try {
-        const bool alone = options.count == 1;
-        const fs::path folder = alone ? options.log_folder : options.log_folder / log_name(first_ + i, options.count);
-        if (!recorders_[i].write(folder)) continue;
-        flightlog::write_vehicle(folder, config_.vehicle_file_name, config_.vehicle_text);
-        ++written;
-      } catch (...) {
-#pragma omp critical
-        fault = std::current_exception();
-      }
-    }
-    if (fault) std::rethrow_exception(fault);
+    std::atomic<std::size_t> written = 0;
+    io::parallel_for(recorders_.size(), config_.fleet.batch.threads, [&](std::size_t i) {
+      const bool alone = options.count == 1;
+      const fs::path folder = alone ? options.log_folder : options.log_folder / log_name(first_ + i, options.count);
+      if (!recorders_[i].write(folder)) return;
+      write_vehicle(folder, config_.vehicle_file_name, config_.vehicle_text);
+      ++written;
+    });
     return written;
   }
 

@@ -1,12 +1,11 @@
 #include "flappy/batch.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
 
+#include "io/parallel.hpp"
 #include "model/derive.hpp"
 #include "model/effects/registry.hpp"
 #include "model/vehicle_dynamics.hpp"
@@ -152,7 +151,7 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
     throw std::invalid_argument("the driver's hold (" + std::to_string(vehicle.driver.hold_s) +
                                 " s) is no whole number of physics steps");
   s.count = count;
-  s.threads = options.threads > 0 ? options.threads : omp_get_num_procs();
+  s.threads = io::thread_count(options.threads);
   s.step_s = options.step_s;
   s.steps_per_update = static_cast<int>(std::llround(steps));
   s.world = options.world;
@@ -236,12 +235,9 @@ void Batch<T>::step(int steps) {
   if (steps == 0) return;
   Storage& s = *storage_;
   const StepPlan plan = s.plan();
-  const auto blocks = static_cast<std::ptrdiff_t>(s.blocks.size());
-#pragma omp parallel for schedule(static) num_threads(s.threads)
-  for (std::ptrdiff_t b = 0; b < blocks; ++b) {
-    const auto i = static_cast<std::size_t>(b);
-    s.kernel(s.blocks[i], s.effects_of(i), plan, s.steps, steps, s.block_after(i));
-  }
+  io::parallel_for(s.blocks.size(), s.threads, [&](std::size_t b) {
+    s.kernel(s.blocks[b], s.effects_of(b), plan, s.steps, steps, s.block_after(b));
+  });
   s.steps += steps;
 }
 

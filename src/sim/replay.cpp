@@ -1,13 +1,11 @@
 #include "sim/replay.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <memory>
 #include <stdexcept>
 
+#include "io/parallel.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::sim {
@@ -195,25 +193,14 @@ std::vector<Replayed> replay(const std::vector<ReplayWindow>& windows, const std
   for (const ReplayWindow& w : windows)
     if (w.voltages->t_s.empty()) throw std::invalid_argument("a window without voltages");
   std::vector<Replayed> results(windows.size());
-  const auto blocks = static_cast<std::ptrdiff_t>((windows.size() + kWindows - 1) / kWindows);
-  const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
-  std::exception_ptr failed;
-#pragma omp parallel num_threads(threads)
-  {
-    std::unique_ptr<ReplayBlock> lanes;
-#pragma omp for schedule(dynamic)
-    for (std::ptrdiff_t b = 0; b < blocks; ++b) {
-      try {
-        const std::size_t first = static_cast<std::size_t>(b) * kWindows;
-        if (!lanes) lanes = std::make_unique<ReplayBlock>(*windows[first].vehicle, options);
-        lanes->fly(windows, first, std::min(kWindows, windows.size() - first), checkpoints, recorded, &results[first]);
-      } catch (...) {  // nothing may leave a parallel loop
-#pragma omp critical
-        failed = std::current_exception();
-      }
-    }
-  }
-  if (failed) std::rethrow_exception(failed);
+  const int threads = io::thread_count(options.threads);
+  std::vector<std::unique_ptr<ReplayBlock>> lanes(static_cast<std::size_t>(threads));
+  io::parallel_for((windows.size() + kWindows - 1) / kWindows, threads, [&](std::size_t b, int thread) {
+    const std::size_t first = b * kWindows;
+    std::unique_ptr<ReplayBlock>& own = lanes[static_cast<std::size_t>(thread)];
+    if (!own) own = std::make_unique<ReplayBlock>(*windows[first].vehicle, options);
+    own->fly(windows, first, std::min(kWindows, windows.size() - first), checkpoints, recorded, &results[first]);
+  });
   return results;
 }
 

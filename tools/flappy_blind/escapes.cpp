@@ -1,11 +1,13 @@
 #include "escapes.hpp"
 
-#include <omp.h>
-
 #include <cstdio>
+#include <memory>
+#include <mutex>
 
 #include "blind/escape.hpp"
 #include "flight/constants.hpp"
+#include "rollout/fly_config.hpp"
+#include "io/parallel.hpp"
 #include "io/progress.hpp"
 #include "io/toml_writer.hpp"
 #include "policy/policy.hpp"
@@ -38,11 +40,14 @@ Policy policy_of(const fs::path& path, const rollout::FlyConfig& config) {
   }
   const std::shared_ptr<const policy::Policy> policy =
       policy::load_policy(path, static_cast<int>(config.fleet.task.observation().size()), flight::kActions);
-  return [policy, task = config.fleet.task.constants](const std::vector<double>& observation) {
+  const auto one_at_a_time = std::make_shared<std::mutex>();
+  return [policy, one_at_a_time, task = config.fleet.task.constants](const std::vector<double>& observation) {
     const std::vector<float> row(observation.begin(), observation.end());
     float action[flight::kActions];
-#pragma omp critical(policy)
-    policy->act(1, row.data(), action);
+    {
+      const std::scoped_lock lock(*one_at_a_time);
+      policy->act(1, row.data(), action);
+    }
     std::array<double, flight::kActions> adds{};
     for (std::size_t i = 0; i < adds.size(); ++i)
       adds[i] = std::clamp<double>(action[i], task.action_low[i], task.action_high[i]);
@@ -87,21 +92,18 @@ Json fly_escapes(const EscapeOptions& o) {
   io::ProgressLine progress("escapes");
   io::stop_on_interrupt();
   std::size_t done = 0;
-  std::string failed;
-#pragma omp parallel for schedule(dynamic) num_threads(omp_get_num_procs())
-  for (std::size_t i = 0; i < o.count; ++i) {
-    if (io::interrupted()) continue;
-    try {
+  std::mutex mutex;
+  try {
+    io::parallel_for(o.count, 0, [&](std::size_t i) {
+      if (io::interrupted()) return;
       escapes[i] = escape(robot, i, rules);
-    } catch (const std::exception& e) {  // of the policy: nothing may leave a parallel loop
-#pragma omp critical
-      failed = e.what();
-    }
-#pragma omp critical
-    progress.show(static_cast<double>(++done) / static_cast<double>(o.count));
+      const std::scoped_lock lock(mutex);
+      progress.show(static_cast<double>(++done) / static_cast<double>(o.count));
+    });
+  } catch (const std::exception& e) {  // of the policy
+    throw io::InputError(o.policy + ": " + e.what() + "; accepted: a policy for every observation");
   }
   progress.clear();
-  if (!failed.empty()) throw io::InputError(o.policy + ": " + failed + "; accepted: a policy for every observation");
   if (io::interrupted()) throw io::InputError("stopped: no escape was judged; accepted: all of them");
   std::vector<rollout::Outcome> outcomes;
   std::size_t crashed = 0, out_of_bounds = 0;

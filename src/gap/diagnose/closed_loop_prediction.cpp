@@ -1,15 +1,13 @@
 #include "gap/diagnose/closed_loop_prediction.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <exception>
 #include <limits>
 #include <numbers>
 
 #include "rollout/simulated_flight.hpp"
+#include "io/parallel.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -235,29 +233,20 @@ std::vector<ClosedLoop> predict_closed_loop(const std::vector<CarriedFlight>& fl
                                             const ClosedLoopOptions& options) {
   const model::Vehicle* const vehicles[] = {&nominal, &corrected};
   std::vector<std::array<Quantities, 3>> found(flights.size());  // recorded, nominal, corrected
-  const auto jobs = static_cast<std::ptrdiff_t>(2 * flights.size());
-  std::exception_ptr failed;
-#pragma omp parallel for schedule(dynamic) num_threads(options.threads > 0 ? options.threads : omp_get_num_procs())
-  for (std::ptrdiff_t job = 0; job < jobs; ++job) {
-    try {
-      const std::size_t f = static_cast<std::size_t>(job) / 2, v = static_cast<std::size_t>(job) % 2;
-      const Recording& r = flights[f].recording();
-      const double zero_s = r.log.command.t_s.front();
-      const double from_s = options.own_path ? zero_s + pilot.settle_s : -1e300;
-      const double to_s = options.own_path ? zero_s + pilot.duration_s : 1e300;
-      const std::vector<Beat> beats = beats_of(r, from_s, to_s);
-      if (v == 0) found[f][0] = quantities_of(beats);
-      Quantities& to = found[f][1 + v];
-      to.fill(kNan);
-      if (beats.size() < kLeastBeats) continue;
-      const Sortie sortie = options.own_path ? Sortie{pilot, pilot.settle_s, pilot.duration_s} : along(beats, r, pilot);
-      to = predict(sortie, r, *vehicles[v], options.copies);
-    } catch (...) {  // nothing may leave a parallel loop
-#pragma omp critical
-      failed = std::current_exception();
-    }
-  }
-  if (failed) std::rethrow_exception(failed);
+  io::parallel_for(2 * flights.size(), options.threads, [&](std::size_t job) {
+    const std::size_t f = job / 2, v = job % 2;
+    const Recording& r = flights[f].recording();
+    const double zero_s = r.log.command.t_s.front();
+    const double from_s = options.own_path ? zero_s + pilot.settle_s : -1e300;
+    const double to_s = options.own_path ? zero_s + pilot.duration_s : 1e300;
+    const std::vector<Beat> beats = beats_of(r, from_s, to_s);
+    if (v == 0) found[f][0] = quantities_of(beats);
+    Quantities& to = found[f][1 + v];
+    to.fill(kNan);
+    if (beats.size() < kLeastBeats) return;
+    const Sortie sortie = options.own_path ? Sortie{pilot, pilot.settle_s, pilot.duration_s} : along(beats, r, pilot);
+    to = predict(sortie, r, *vehicles[v], options.copies);
+  });
   std::vector<ClosedLoop> rows;
   for (std::size_t f = 0; f < flights.size(); ++f)
     for (std::size_t q = 0; q < kQuantities.size(); ++q)

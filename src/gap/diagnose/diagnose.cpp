@@ -1,17 +1,16 @@
 #include "gap/diagnose/diagnose.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <optional>
 
-#include "gap/diagnose/verdict.hpp"
+#include "gap/localise/closure.hpp"
 #include "gap/evidence/model_error.hpp"
 #include "gap/evidence/screening.hpp"
-#include "gap/localise/closure.hpp"
+#include "gap/diagnose/verdict.hpp"
+#include "io/parallel.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
@@ -47,7 +46,7 @@ class Diagnoser {
       : flights_(flights),
         uncertain_(uncertain),
         options_(options),
-        threads_(options.threads > 0 ? options.threads : omp_get_num_procs()),
+        threads_(io::thread_count(options.threads)),
         all_(flights.size(), 1),
         evidence_(flights, threads_),
         fitter_(flights, evidence_, threads_) {}

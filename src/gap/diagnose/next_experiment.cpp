@@ -1,11 +1,9 @@
 #include "gap/diagnose/next_experiment.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
-#include <exception>
 
 #include "rollout/simulated_flight.hpp"
+#include "io/parallel.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -149,18 +147,7 @@ std::vector<NextExperiment> rank_experiments(const Diagnosis& diagnosis, const s
   const std::vector<Rival> rivals = rivals_of(diagnosis, uncertain, options.most_rivals);
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
-  std::exception_ptr failed;
-  const auto n = static_cast<std::ptrdiff_t>(manoeuvres.size());
-#pragma omp parallel for schedule(dynamic) num_threads(options.threads > 0 ? options.threads : omp_get_num_procs())
-  for (std::ptrdiff_t i = 0; i < n; ++i) {
-    try {
-      found[static_cast<std::size_t>(i)] = judge(manoeuvres[static_cast<std::size_t>(i)], rivals);
-    } catch (...) {  // nothing may leave a parallel loop
-#pragma omp critical
-      failed = std::current_exception();
-    }
-  }
-  if (failed) std::rethrow_exception(failed);
+  io::parallel_for(manoeuvres.size(), options.threads, [&](std::size_t i) { found[i] = judge(manoeuvres[i], rivals); });
   std::vector<NextExperiment> list;
   for (std::optional<NextExperiment>& e : found)
     if (e) list.push_back(std::move(*e));

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/statistics.hpp"
+#include "io/parallel.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -101,10 +101,10 @@ void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
 
 void Evidence::find_noise(const Signature& residual, Find what) {
   const Index q = basis_.size();
-#pragma omp parallel for schedule(dynamic) num_threads(threads_)
-  for (int g = 0; g < kGroups; ++g) {
+  io::parallel_for(static_cast<std::size_t>(kGroups), threads_, [&](std::size_t k) {
+    const int g = static_cast<int>(k);
     const int channel = g / kCoefficients;
-    if (!has_rows(channel, g % kCoefficients)) continue;
+    if (!has_rows(channel, g % kCoefficients)) return;
     VectorXd right = VectorXd::Zero(q);
     double n = 0;
     for (std::size_t f = 0; f < flights_.size(); ++f)
@@ -112,7 +112,7 @@ void Evidence::find_noise(const Signature& residual, Find what) {
         right += residual[f][row_of(j, g)] * basis_.values(f).row(static_cast<Index>(j)).transpose();
         n += 1;
       });
-    if (n == 0) continue;
+    if (n == 0) return;
     const VectorXd eta = plain_inverse_[static_cast<std::size_t>(channel)] * right;
     const auto left = [&](std::size_t f, std::size_t j) {
       return residual[f][row_of(j, g)] - basis_.values(f).row(static_cast<Index>(j)).dot(eta);
@@ -141,13 +141,13 @@ void Evidence::find_noise(const Signature& residual, Find what) {
     group.sd = std::max({1.4826 * io::upper_median(steps), group.least_sd, 1e-9});
     if (what == Find::declared) group.least_sd = group.sd;
     if (what != Find::weights) known = group;
-    if (what == Find::declared) continue;  // of what is declared, no row is too far off
+    if (what == Find::declared) return;  // of what is declared, no row is too far off
     for (std::size_t f = 0; f < flights_.size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) {
         const double t = innovation(f, j, before) / group.sd;
         weights_[f][row_of(j, g)] = std::min(1.0, (kTail + 1) / (kTail + t * t));
       });
-  }
+  });
 }
 
 /// Calls use(beat, row of the basis, its share of the beat before, whitened) in a group.

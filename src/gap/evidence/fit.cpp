@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <map>
 
 #include "gap/replay/sensor_correction.hpp"
+#include "io/parallel.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -60,19 +60,11 @@ std::vector<Signature> residuals(const std::vector<CarriedFlight>& flights, cons
     if (sensors.empty()) compare(flights, which, threads);
     else corrected.emplace_back(sensors, which);
   }
-  std::exception_ptr failed;
-#pragma omp parallel for schedule(dynamic) num_threads(threads)
-  for (std::size_t k = 0; k < corrected.size(); ++k) {
-    try {
-      std::vector<CarriedFlight> seen;
-      for (const CarriedFlight& f : flights) seen.push_back(f.with_log(without(corrected[k].first, f.recording().log)));
-      compare(seen, corrected[k].second, 1);
-    } catch (...) {  // nothing may leave a parallel loop
-#pragma omp critical
-      failed = std::current_exception();
-    }
-  }
-  if (failed) std::rethrow_exception(failed);
+  io::parallel_for(corrected.size(), threads, [&](std::size_t k) {
+    std::vector<CarriedFlight> seen;
+    for (const CarriedFlight& f : flights) seen.push_back(f.with_log(without(corrected[k].first, f.recording().log)));
+    compare(seen, corrected[k].second, 1);
+  });
   return list;
 }
 

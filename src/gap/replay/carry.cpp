@@ -1,13 +1,11 @@
 #include "gap/replay/carry.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <random>
 
 #include "gap/replay/stream_rows.hpp"
+#include "io/parallel.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::gap {
@@ -300,24 +298,14 @@ std::vector<std::vector<Rows>> predict_all(const std::vector<CarriedFlight>& fli
                                            const std::vector<Candidate>& candidates, int threads) {
   const std::size_t blocks = (candidates.size() + kVehicles - 1) / kVehicles;
   std::vector<std::vector<Rows>> result(candidates.size(), std::vector<Rows>(flights.size()));
-  std::exception_ptr failed;
-  const auto jobs = static_cast<std::ptrdiff_t>(blocks * flights.size());
-#pragma omp parallel for schedule(dynamic) num_threads(threads > 0 ? threads : omp_get_num_procs())
-  for (std::ptrdiff_t job = 0; job < jobs; ++job) {
-    try {
-      const std::size_t flight = static_cast<std::size_t>(job) % flights.size();
-      const std::size_t first = static_cast<std::size_t>(job) / flights.size() * kVehicles;
-      std::vector<const Candidate*> group;
-      for (std::size_t i = first; i < std::min(first + kVehicles, candidates.size()); ++i)
-        group.push_back(&candidates[i]);
-      std::vector<Rows> rows = flights[flight].predict(group);
-      for (std::size_t i = 0; i < group.size(); ++i) result[first + i][flight] = std::move(rows[i]);
-    } catch (...) {  // nothing may leave a parallel loop
-#pragma omp critical
-      failed = std::current_exception();
-    }
-  }
-  if (failed) std::rethrow_exception(failed);
+  io::parallel_for(blocks * flights.size(), threads, [&](std::size_t job) {
+    const std::size_t flight = job % flights.size(), first = job / flights.size() * kVehicles;
+    std::vector<const Candidate*> group;
+    for (std::size_t i = first; i < std::min(first + kVehicles, candidates.size()); ++i)
+      group.push_back(&candidates[i]);
+    std::vector<Rows> rows = flights[flight].predict(group);
+    for (std::size_t i = 0; i < group.size(); ++i) result[first + i][flight] = std::move(rows[i]);
+  });
   return result;
 }
 

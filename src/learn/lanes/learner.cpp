@@ -1,12 +1,11 @@
 #include "learn/lanes/learner.hpp"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
 
+#include "io/parallel.hpp"
 #include "learn/lanes/update.hpp"
 #include "sim/kernels.hpp"
 #include "sim/random.hpp"
@@ -155,8 +154,8 @@ struct Learner<T>::Storage {
   }
 
   /// Gradients of part `part`: of the chunks that share it, one after the other.
-  void work_on(std::size_t part, const Replay& replay) {
-    T* place = work.data() + omp_get_thread_num() * work_size;
+  void work_on(std::size_t part, const Replay& replay, int thread) {
+    T* place = work.data() + thread * work_size;
     const std::size_t chunks = sums.size();
     bool onto = false;
     for (std::size_t c = part * chunks / parts; c < (part + 1) * chunks / parts; ++c) {
@@ -260,24 +259,18 @@ void Learner<T>::update(const Replay& replay, double actor_rate, double critic_r
   const AdamPlan<T> actor = s.adam(actor_at, actor_rate, n.actor_beta1, n.actor_beta2);
   const std::ptrdiff_t critic_shards = (actor_at + kShard - 1) / kShard;
   const std::ptrdiff_t shards = critic_shards + (s.plan.actor_learns ? (s.count - actor_at + kShard - 1) / kShard : 0);
-  const auto parts = static_cast<std::ptrdiff_t>(s.parts);
-  const std::ptrdiff_t items = parts + static_cast<std::ptrdiff_t>(beside.items);
 
-#pragma omp parallel num_threads(s.options.threads)
-  {
-#pragma omp for schedule(dynamic, 1)
-    for (std::ptrdiff_t i = 0; i < items; ++i) {
-      if (i < parts) s.work_on(static_cast<std::size_t>(i), replay);
-      else beside.run(static_cast<std::size_t>(i - parts));
-    }
-#pragma omp for schedule(static)
-    for (std::ptrdiff_t i = 0; i < shards; ++i) {
-      const bool of_actor = i >= critic_shards;
-      const std::ptrdiff_t begin = (of_actor ? i - critic_shards : i) * kShard;
-      const std::ptrdiff_t end = std::min(begin + kShard, of_actor ? s.count - actor_at : actor_at);
-      s.kernel->adam(of_actor ? actor : critics, begin, end);
-    }
-  }
+  io::parallel_for(s.parts + beside.items, s.options.threads, [&](std::size_t i, int thread) {
+    if (i < s.parts) s.work_on(i, replay, thread);
+    else beside.run(i - s.parts);
+  });
+  io::parallel_for(static_cast<std::size_t>(shards), s.options.threads, [&](std::size_t k) {
+    const auto i = static_cast<std::ptrdiff_t>(k);
+    const bool of_actor = i >= critic_shards;
+    const std::ptrdiff_t begin = (of_actor ? i - critic_shards : i) * kShard;
+    const std::ptrdiff_t end = std::min(begin + kShard, of_actor ? s.count - actor_at : actor_at);
+    s.kernel->adam(of_actor ? actor : critics, begin, end);
+  });
   ++n.updates;
   s.measure();
 }
