@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <string_view>
 
 #include "flight/fleet_storage.hpp"
 #include "io/parallel.hpp"
@@ -11,33 +10,12 @@
 
 namespace flappy::flight {
 
-#define FLAPPY_DECLARE_LOOP(isa)            \
-  inline namespace isa {                    \
-  extern const FlyBlock<float> fly_float;   \
-  extern const FlyBlock<double> fly_double; \
-  }
-FLAPPY_DECLARE_LOOP(scalar)
-FLAPPY_DECLARE_LOOP(v2)
-FLAPPY_DECLARE_LOOP(v3)
-FLAPPY_DECLARE_LOOP(v4)
-#undef FLAPPY_DECLARE_LOOP
+FLAPPY_KERNELS(FlyBlock<float>, fly_float);
+FLAPPY_KERNELS(FlyBlock<double>, fly_double);
 
 namespace {
 
 using model::Quaternion;
-
-template <class T>
-FlyBlock<T> loop_named(std::string_view instruction_set) {
-  const std::string_view name = sim::kernel_named(instruction_set).single.instruction_set;
-  const auto pick = [](FlyBlock<float> f, FlyBlock<double> d) {
-    if constexpr (sizeof(T) == sizeof(float)) return f;
-    else return d;
-  };
-  if (name == "x86-64-v4") return pick(v4::fly_float, v4::fly_double);
-  if (name == "x86-64-v3") return pick(v3::fly_float, v3::fly_double);
-  if (name == "x86-64-v2") return pick(v2::fly_float, v2::fly_double);
-  return pick(scalar::fly_float, scalar::fly_double);
-}
 
 Motion motion(const Vec3<double>& p, const Quaternion<double>& q, const Vec3<double>& v, const Vec3<double>& w) {
   return {{p.x, p.y, p.z}, {q.w, q.x, q.y, q.z}, {v.x, v.y, v.z}, {w.x, w.y, w.z}};
@@ -52,7 +30,7 @@ Fleet<T>::Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOpt
     throw std::invalid_argument("the control period is no whole number of physics steps");
   if (options.task.path.empty()) throw std::invalid_argument("the task has no path");
   storage_ = std::make_unique<Storage>(count, vehicle, options, static_cast<int>(std::lround(steps)),
-                                       loop_named<T>(options.batch.instruction_set));
+                                       sim::kernel_of<T>(fly_floats, fly_doubles, options.batch.instruction_set));
   // lanes beyond the last flapper fly along, so that no lane ever holds numbers of no flight
   Storage& s = *storage_;
   for (std::size_t i = 0; i < count; ++i) start(i, 0);

@@ -156,7 +156,7 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
   s.steps_per_update = static_cast<int>(std::llround(steps));
   s.world = options.world;
   s.hold_s = vehicle.driver.hold_s;
-  s.kernel = kernel_named(options.instruction_set).template of<T>().step;
+  s.kernel = step_kernel<T>(options.instruction_set);
   s.blocks.resize((count + kLanes<T> - 1) / kLanes<T>);
   // lanes beyond the last flapper fly along as copies, so that no lane ever holds numbers of no vehicle
   Block<T> block{};

@@ -5,10 +5,8 @@
 #include <cmath>
 
 #include "flight/fleet.hpp"
-#include "gap/replay/sensor_correction.hpp"
 #include "rollout/fly.hpp"
 #include "rollout/fly_fixture.hpp"
-#include "sim/kernels.hpp"
 
 namespace flappy::flight {
 namespace {

@@ -6,29 +6,11 @@
 
 #include "gap/replay/stream_rows.hpp"
 #include "io/parallel.hpp"
+#include "sim/kernels.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::gap {
-inline namespace scalar {
-extern const CarryBlock carry_block_kernel;
-}
-inline namespace v2 {
-extern const CarryBlock carry_block_kernel;
-}
-inline namespace v3 {
-extern const CarryBlock carry_block_kernel;
-}
-inline namespace v4 {
-extern const CarryBlock carry_block_kernel;
-}
-
-CarryBlock carry_kernel(const char* instruction_set) {
-  const std::string name = *instruction_set ? instruction_set : sim::best_instruction_set();
-  if (name == "x86-64-v4") return v4::carry_block_kernel;
-  if (name == "x86-64-v3") return v3::carry_block_kernel;
-  if (name == "x86-64-v2") return v2::carry_block_kernel;
-  return scalar::carry_block_kernel;
-}
+FLAPPY_KERNELS(CarryBlock, carry_block_kernel);
 
 namespace {
 
@@ -217,7 +199,7 @@ bool CarriedFlight::covers(std::size_t beat, int channel) const {
 
 std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& candidates) const {
   const Recording& r = recording_;
-  const CarryBlock carry = carry_kernel("");
+  const CarryBlock carry = *carry_block_kernels[sim::place_of("")];
   sim::Batch<double> batch(kVehicles, candidates.front()->vehicle, {kStep_s, 1, r.world, {}});
   if (r.log.power) batch.storage().keep_effects(0);  // the meter needs their rows
   std::vector<ShiftedVoltage> shifted;

@@ -31,7 +31,4 @@ struct CarriedBlock {
 using CarryBlock = void (*)(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
                             const double imu_position_m[3], double gravity_m_s2, CarriedBlock& kept);
 
-/// The kernel of the named instruction set, of the best for an empty name.
-CarryBlock carry_kernel(const char* instruction_set);
-
 }  // namespace flappy::gap

@@ -12,16 +12,8 @@
 
 namespace flappy::learn {
 
-#define FLAPPY_DECLARE_UPDATE(isa)                 \
-  inline namespace isa {                           \
-  extern const UpdateKernel<float> update_float;   \
-  extern const UpdateKernel<double> update_double; \
-  }
-FLAPPY_DECLARE_UPDATE(scalar)
-FLAPPY_DECLARE_UPDATE(v2)
-FLAPPY_DECLARE_UPDATE(v3)
-FLAPPY_DECLARE_UPDATE(v4)
-#undef FLAPPY_DECLARE_UPDATE
+FLAPPY_KERNELS(UpdateKernel<float>, update_float);
+FLAPPY_KERNELS(UpdateKernel<double>, update_double);
 
 namespace {
 
@@ -29,19 +21,6 @@ namespace {
 constexpr std::size_t kMostParts = 16;
 /// Numbers that a thread steps at a time.
 constexpr std::ptrdiff_t kShard = 2048;
-
-template <class T>
-const UpdateKernel<T>& kernel_for(const std::string& instruction_set) {
-  const std::string_view name = sim::kernel_named(instruction_set).single.instruction_set;
-  const auto pick = [](const UpdateKernel<float>& f, const UpdateKernel<double>& d) -> const UpdateKernel<T>& {
-    if constexpr (sizeof(T) == sizeof(float)) return f;
-    else return d;
-  };
-  if (name == "x86-64-v4") return pick(v4::update_float, v4::update_double);
-  if (name == "x86-64-v3") return pick(v3::update_float, v3::update_double);
-  if (name == "x86-64-v2") return pick(v2::update_float, v2::update_double);
-  return pick(scalar::update_float, scalar::update_double);
-}
 
 /// Numbers that begin with a line of the cache.
 template <class T>
@@ -97,7 +76,7 @@ struct Learner<T>::Storage {
 
   explicit Storage(const LearnerOptions& o, const UpdatePlan<T>& p)
       : options(o),
-        kernel(&kernel_for<T>(o.instruction_set)),
+        kernel(&sim::kernel_of<T>(update_floats, update_doubles, o.instruction_set)),
         plan(p),
         count(p.weight_count()),
         parts(std::min(kMostParts, o.batch / kChunk)),
