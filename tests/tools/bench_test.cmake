@@ -90,6 +90,19 @@ if(NOT rate GREATER 0)
   message(SEND_ERROR "the learner does ${rate} updates/s")
 endif()
 
+# ---- beside busy processors: of so short a run the figures mean nothing yet
+
+run(--rounds 1 --seconds 0.01 busy --json ${WORK}/busy.json)
+expect_equal("exit code" "${code}" 0)
+expect_keys(${WORK}/busy.json busy=ARRAY processors=NUMBER instruction_set=STRING)
+file(READ ${WORK}/busy.json json)
+foreach(row RANGE 8)
+  string(JSON ratio GET "${json}" busy ${row} ratio)
+  if(NOT ratio GREATER 0.01)
+    message(SEND_ERROR "beside busy processors nothing is done: ${ratio} of the work")
+  endif()
+endforeach()
+
 run(--version)
 expect_equal("exit code" "${code}" 0)
 foreach(line IN ITEMS "^flappy-bench [0-9]+\\.[0-9]+\\.[0-9]+\n" "\ncommit ([0-9a-f]+(-dirty)?|unknown)\n" "\ninstruction set ${set}\n"

@@ -1,6 +1,5 @@
 #include "closed_loop.hpp"
 
-#include "flight/fleet.hpp"
 #include "flight/flight_block.hpp"
 
 namespace flappy::bench {
@@ -28,7 +27,7 @@ class Loop {
  public:
   Loop(const model::Vehicle& vehicle, const std::string& configs, const std::string& sensors,
        const std::string& controller, bool actor)
-      : fleet_(kFlappers, vehicle, options(configs, sensors, controller)) {
+      : fleet_(kFlappers, vehicle, hovering(configs, sensors, controller)) {
     if (actor) fleet_.set_actor(idle_actor(fleet_.options().task));
     for (int i = 0; i < 300; ++i) fleet_.step();  // 0.6 s: everyone is in the air
   }
@@ -47,20 +46,20 @@ class Loop {
   flight::Fleet<float>& fleet() { return fleet_; }
 
  private:
-  static flight::FleetOptions options(const std::string& configs, const std::string& sensors,
-                                      const std::string& controller) {
-    flight::FleetOptions o;
-    o.sensors = flight::read_sensors(table(configs + "/sensors/" + sensors + ".toml"));
-    o.controller = flight::read_controller(table(configs + "/controllers/" + controller + ".toml"));
-    o.task = flight::read_task(table(configs + "/tasks/hover.toml"), 1 / kControl_hz);
-    o.control_hz = kControl_hz;
-    o.batch.threads = 1;
-    return o;
-  }
   flight::Fleet<float> fleet_;
 };
 
 }  // namespace
+
+flight::FleetOptions hovering(const std::string& configs, const std::string& sensors, const std::string& controller) {
+  flight::FleetOptions o;
+  o.sensors = flight::read_sensors(table(configs + "/sensors/" + sensors + ".toml"));
+  o.controller = flight::read_controller(table(configs + "/controllers/" + controller + ".toml"));
+  o.task = flight::read_task(table(configs + "/tasks/hover.toml"), 1 / kControl_hz);
+  o.control_hz = kControl_hz;
+  o.batch.threads = 1;
+  return o;
+}
 
 LoopReport measure_closed_loop(const model::Vehicle& vehicle, const std::string& configs, const SpeedOptions& options) {
   struct Candidate {

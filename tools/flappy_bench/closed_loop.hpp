@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "flappy/vehicle.hpp"
+#include "flight/fleet.hpp"
 #include "speed.hpp"
 
 namespace flappy::bench {
@@ -19,6 +20,9 @@ struct LoopReport {
   std::vector<std::pair<std::string, double>> shares;  ///< of each stage in the first row's time
   std::size_t bytes_per_flapper = 0;                   ///< beyond those of the body
 };
+
+/// A fleet that hovers with sensors, task and controller of `configs`, on one thread.
+flight::FleetOptions hovering(const std::string& configs, const std::string& sensors, const std::string& controller);
 
 /// Hovering flappers with the sensors, task and controllers of `configs`; one core, float.
 LoopReport measure_closed_loop(const model::Vehicle& vehicle, const std::string& configs, const SpeedOptions& options);

@@ -23,28 +23,6 @@ double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-Replay random_replay() {
-  std::mt19937 engine(1);
-  std::uniform_real_distribution<float> unit(-1, 1);
-  Replay replay(kShape, kTransitions);
-  std::vector<float> row(52);
-  for (std::size_t i = 0; i < kTransitions; ++i) {
-    for (float& x : row) x = unit(engine);
-    replay.add({row.data(), nullptr, &row[24], &row[28], nullptr, unit(engine), 0.99F});
-  }
-  return replay;
-}
-
-LearnerOptions options_for(std::vector<int> critic, std::size_t batch, bool td3) {
-  LearnerOptions o;
-  o.shape = kShape;
-  o.actor_input = {std::vector<double>(24, 0.0), std::vector<double>(24, 1.0), 10};
-  o.critic_hidden = std::move(critic);
-  o.batch = batch;
-  if (!td3) o.twin = false, o.policy_delay = 1, o.noise_sd = 0;
-  return o;
-}
-
 /// Weights between the layers of a network, biases included: what one sample's forward pass multiplies.
 double weights(int inputs, const std::vector<int>& hidden, int outputs) {
   double sum = 0;
@@ -95,12 +73,34 @@ class Torch {
 
 }  // namespace
 
+Replay random_replay() {
+  std::mt19937 engine(1);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  Replay replay(kShape, kTransitions);
+  std::vector<float> row(52);
+  for (std::size_t i = 0; i < kTransitions; ++i) {
+    for (float& x : row) x = unit(engine);
+    replay.add({row.data(), nullptr, &row[24], &row[28], nullptr, unit(engine), 0.99F});
+  }
+  return replay;
+}
+
+LearnerOptions learner_options(std::vector<int> critic, std::size_t batch, bool td3) {
+  LearnerOptions o;
+  o.shape = kShape;
+  o.actor_input = {std::vector<double>(24, 0.0), std::vector<double>(24, 1.0), 10};
+  o.critic_hidden = std::move(critic);
+  o.batch = batch;
+  if (!td3) o.twin = false, o.policy_delay = 1, o.noise_sd = 0;
+  return o;
+}
+
 std::vector<LearnerRow> measure_learner(const SpeedOptions& options, const std::function<void(int, int)>& progress) {
   const Replay replay = random_replay();
   std::vector<LearnerRow> rows;
   for (const std::size_t batch : {64U, 256U, 1024U, 4096U})
-    rows.push_back({"DDPG 64-64, batch " + std::to_string(batch), options_for({64, 64}, batch, false)});
-  rows.push_back({"TD3 128-128, batch 256", options_for({128, 128}, 256, true)});
+    rows.push_back({"DDPG 64-64, batch " + std::to_string(batch), learner_options({64, 64}, batch, false)});
+  rows.push_back({"TD3 128-128, batch 256", learner_options({128, 128}, 256, true)});
   int done = 0;
   for (LearnerRow& row : rows) {
     row.multiply_adds = multiply_adds(row.options);

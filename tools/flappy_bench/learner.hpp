@@ -21,6 +21,10 @@ struct LearnerRow {
   Figure two_thread_scaling;          ///< wall time, pair by pair
 };
 
+/// A replay memory of random numbers that fits learner_options(); td3: twins, delay and noise, else DDPG.
+learn::Replay random_replay();
+learn::LearnerOptions learner_options(std::vector<int> critic, std::size_t batch, bool td3);
+
 /// `progress(done, total)` is called between measurements.
 std::vector<LearnerRow> measure_learner(const SpeedOptions& options, const std::function<void(int, int)>& progress);
 

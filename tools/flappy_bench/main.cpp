@@ -4,10 +4,12 @@
 #include <nlohmann/json.hpp>
 
 #include "accuracy.hpp"
+#include "busy.hpp"
 #include "closed_loop.hpp"
 #include "flappy/batch.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "hover.hpp"
+#include "io/parallel.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "learner.hpp"
@@ -163,6 +165,33 @@ Json learner(const SpeedOptions& options) {
   return {{"learner", list}, {"peak_multiply_adds_per_s", peak}, {"instruction_set", sim::best_instruction_set()}};
 }
 
+Json busy(const model::Vehicle& vehicle, const SpeedOptions& options) {
+  io::ProgressLine progress("measured");
+  const std::vector<BusyRow> rows = measure_busy(
+      vehicle, FLAPPY_CONFIGS, options, [&](int done, int total) { progress.show(static_cast<double>(done) / total); });
+  progress.clear();
+  std::printf(
+      "work per second of processor time beside a busy loop on each of %d processors, median of %d [range], %s\n",
+      io::processors(), options.rounds, sim::best_instruction_set().c_str());
+  std::printf("  %-12s %-14s %10s %12s %12s %24s %14s\n", "", "", "threads", "quiet", "busy", "busy / quiet",
+              "in wall time");
+  Json list = Json::array();
+  for (const BusyRow& r : rows) {
+    std::printf("  %-12s %-14s %10s %12.4g %12.4g %8.2f  [%4.2f .. %4.2f] %14.2f\n", r.part.c_str(), r.unit.c_str(),
+                r.threads == 0 ? "automatic" : std::to_string(r.threads).c_str(), r.quiet_per_s.median,
+                r.busy_per_s.median, r.processor_ratio.median, r.processor_ratio.low, r.processor_ratio.high,
+                r.wall_ratio.median);
+    list.push_back({{"part", r.part},
+                    {"unit", r.unit},
+                    {"threads", r.threads},
+                    {"quiet_per_processor_s", r.quiet_per_s.median},
+                    {"busy_per_processor_s", r.busy_per_s.median},
+                    {"ratio", r.processor_ratio.median},
+                    {"wall_ratio", r.wall_ratio.median}});
+  }
+  return {{"busy", list}, {"processors", io::processors()}, {"instruction_set", sim::best_instruction_set()}};
+}
+
 }  // namespace
 }  // namespace flappy::bench
 
@@ -186,6 +215,7 @@ int main(int argc, char** argv) {
   CLI::App* convergence =
       app.add_subcommand("convergence", "error against step size, and against work for other integrators");
   CLI::App* learner = app.add_subcommand("learner", "updates per second of the learner, beside LibTorch");
+  CLI::App* busy = app.add_subcommand("busy", "work per second of processor time while others hold all processors");
   CLI::App* batch = app.add_subcommand("batch", "fly a batch at one input and summarise it");
   std::string config;
   std::vector<std::string> overrides;
@@ -197,6 +227,8 @@ int main(int argc, char** argv) {
     if (*batch) return program.write_json(bench::fly_batch(config, overrides));
     if (*learner) return program.write_json(bench::learner(options));
     const model::Vehicle v = model::read_vehicle(vehicle);
-    program.write_json(*convergence ? bench::convergence(v) : bench::speed(v, options));
+    program.write_json(*convergence ? bench::convergence(v)
+                       : *busy      ? bench::busy(v, options)
+                                    : bench::speed(v, options));
   });
 }
