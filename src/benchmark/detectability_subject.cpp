@@ -108,7 +108,7 @@ std::vector<Smooth> Subject::sensed(const std::vector<Added>& list) const {
   io::parallel_for(list.size() * blind::kFlights, threads_, [&](std::size_t job) {
     const Added& a = list[job / blind::kFlights];
     blind::Case c = case_;
-    c.sizes = blind::Sizes({{effect_names()[static_cast<std::size_t>(a.effect)], a.size}});
+    c.sizes = blind::Sizes({{blind::effect_names()[static_cast<std::size_t>(a.effect)], a.size}});
     logs[job / blind::kFlights][job % blind::kFlights] = fly(c, job % blind::kFlights).log;
   });
   std::vector<Smooth> result;

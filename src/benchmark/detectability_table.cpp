@@ -89,7 +89,7 @@ std::vector<Finding> weigh(const std::vector<Development>& vehicles, const sim::
         const auto rival = static_cast<blind::Effect>(r);
         if (r == e || !in_catalogue(rival)) continue;
         if (io::median(over_vehicles([&](const benchmark::Oracle& o) { return o.gain_over(effect, at, rival); })) < kNats)
-          rivals->push_back(effect_names()[r]);
+          rivals->push_back(blind::effect_names()[r]);
       }
   }
   return findings;

@@ -1,5 +1,7 @@
 #include "io/program.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +12,8 @@
 namespace flappy::io {
 
 namespace {
+
+constexpr std::array<const char*, 4> kLevels = {"debug", "info", "warning", "error"};  // in the order of LogLevel
 
 /// Those that there are, where one is missing or is none of them.
 std::string subcommands(const CLI::App& app, const CLI::ParseError& error) {
@@ -43,6 +47,9 @@ Program::Program(const std::string& name, const std::string& description, const 
 int Program::run(int argc, char** argv, const std::function<void()>& job) {
   try {
     app_.parse(argc, argv);
+    const auto level = std::ranges::find(kLevels, log_level_) - kLevels.begin();
+    start_log(static_cast<LogLevel>(level), app_.get_name() + " " FLAPPY_VERSION ", commit " + commit() + ": " +
+                                                joined(std::vector<std::string>(argv, argv + argc), " "));
     if (!json_path_.empty()) check_output(json_path_);
     job();
     return 0;

@@ -113,7 +113,7 @@ class Part {
       const bool alone = options.count == 1;
       const fs::path folder = alone ? options.log_folder : options.log_folder / log_name(first_ + i, options.count);
       if (!recorders_[i].write(folder)) return;
-      write_vehicle(folder, config_.vehicle_file_name, config_.vehicle_text);
+      flightlog::write_vehicle(folder, config_.vehicle_file_name, config_.vehicle_text);
       ++written;
     });
     return written;

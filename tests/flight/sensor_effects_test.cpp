@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "flight/fleet.hpp"
+#include "gap/replay/sensor_correction.hpp"
 #include "rollout/fly.hpp"
 #include "rollout/fly_fixture.hpp"
 

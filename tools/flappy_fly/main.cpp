@@ -7,6 +7,7 @@
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/statistics.hpp"
+#include "rollout/fly.hpp"
 
 namespace flappy::fly {
 namespace {

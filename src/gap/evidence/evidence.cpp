@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "io/parallel.hpp"
+#include "io/statistics.hpp"
 
 namespace flappy::gap {
 namespace {
