@@ -123,8 +123,7 @@ TEST(WingAerodynamics, AirTakesEnergyFromAWingInStillAir) {
 using V = model::Vec3<double>;
 using Angles = model::WingAngles<double>;
 
-/// A point of the wing's leading edge at span r and a direction of E, in B, from the definition of the angles
-/// alone.
+/// A direction of E, in B, by the published angles: R_y(-s Phi) R_z(s psi) R_x(s phi).
 template <int side>
 V leading_edge_direction(const Angles& a, const V& in_E) {
   const auto about = [](double angle, int axis, V v) {
@@ -133,7 +132,7 @@ V leading_edge_direction(const Angles& a, const V& in_E) {
     if (axis == 1) return V{c * v.x + s * v.z, v.y, -s * v.x + c * v.z};
     return V{c * v.x - s * v.y, s * v.x + c * v.y, v.z};
   };
-  return about(a.stroke_plane_rad, 1, about(side * a.stroke_rad, 2, about(side * a.deviation_rad, 0, in_E)));
+  return about(-side * a.stroke_plane_rad, 1, about(side * a.stroke_rad, 2, about(side * a.deviation_rad, 0, in_E)));
 }
 
 Angles plus(const Angles& a, double h, const Angles& r) {
@@ -182,6 +181,22 @@ void drive_four_angles() {
 
 TEST(WingAngles, FourDrivenAnglesOnTheLeft) { drive_four_angles<+1>(); }
 TEST(WingAngles, FourDrivenAnglesOnTheRight) { drive_four_angles<-1>(); }
+
+// A quarter turn of the stroke plane stands each wing's forward axis on its end: up on the left, down on the right. The same
+// stroke moves the wing against that axis, so the air lifts the left wing and presses the right one down.
+TEST(WingAngles, StrokePlanesOfOneAngleTiltOppositely) {
+  const auto p = model::derive(test::nominal(), 1e-4);
+  const V still{0, 0, 0};
+  const double force = 3.45 * 1e4 * p.left.force2;  // C_N(90 deg) at 100 rad/s
+  const auto lift = [&](const Angles& angles, const Angles& rates) {
+    const double left = model::air_on_driven_wing<+1>(p.left, angles, rates, still, still).force_N.z;
+    EXPECT_NEAR(model::air_on_driven_wing<-1>(p.right, angles, rates, still, still).force_N.z, -left, 1e-12 * force);
+    return left;
+  };
+  EXPECT_NEAR(lift({pi / 2, 0, 0, 0}, {0, 100, 0, 0}), force, 1e-12 * force);
+  // wings swept aft and turned flat, whose stroke planes tilt: the left one goes down
+  EXPECT_NEAR(lift({0, pi / 2, 0, pi / 2}, {100, 0, 0, 0}), force, 1e-12 * force);
+}
 
 TEST(WingAngles, RobotIsTheCaseWithoutOffsetAndDeviation) {
   const auto p = model::derive(test::nominal(), 1e-4).right;
