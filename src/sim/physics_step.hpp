@@ -184,6 +184,11 @@ FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<true, T
   find_wall(effects, s);
   effects.apply(
       a.hinges, [&](auto effect, const auto& q, const auto& state,
+                    auto& change) requires requires { effect.motor(q, s, state, change); } {
+        effect.motor(q, s, state, change);
+      });
+  effects.apply(
+      a.hinges, [&](auto effect, const auto& q, const auto& state,
                     auto& change) requires requires { effect.hinges(q, s, state, change); } {
         effect.hinges(q, s, state, change);
       });

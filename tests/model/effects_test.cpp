@@ -68,6 +68,7 @@ struct Bench {
   template <class Effect, int n>
   Sides<Hinges<One>> hinges(const One (&q)[n], double left_V, double right_V) {
     auto h = hinges(left_V, right_V);
+    if constexpr (requires { Effect::motor(q, see(), state(), h); }) Effect::motor(q, see(), state(), h);
     Effect::hinges(q, see(), state(), h);
     return h;
   }
@@ -341,6 +342,7 @@ struct Stand {
     const auto figures = effect_figures(in_air);
     effects.states = memory;
     effects.stride = 1;
+    effects.meter = meter;
     effects.kept = 0;
     for (auto& row : effects.rows) row = One(0);
     for (int k = 0; k < 2 * kRows<SideFigures>; ++k)
@@ -355,6 +357,7 @@ struct Stand {
     int row = model::effects()[static_cast<std::size_t>(e)].first_row;
     for (const double parameter : q) effects.rows[row++] = One(parameter);
   }
+  /// `left_V`, `right_V`: of the driver. Fills the meter.
   void step(double left_V, double right_V = 0) {
     const Parameters<One> p = in_lane(derive(airless, h));
     Parameters<One> own = p;
@@ -369,6 +372,7 @@ struct Stand {
   Vec3<One> com_m{};
   double h = kStep, gravity = 0;
   double memory[64] = {};
+  double meter[3] = {};  // share of the source, current of the left and of the right motor
 };
 
 TEST(StopCompliance, GivesWayByItsComplianceUnderAConstantTorque) {
@@ -449,6 +453,56 @@ TEST(GearBacklash, TellsTheMotorsRate) {
   const auto h = b.hinges<GearBacklash>(q, 5, 5);
   EXPECT_EQ(value(h.left.motor_rate_rad_s), 42);
   EXPECT_EQ(value(h.right.motor_rate_rad_s), value(b.x.right.stroke_rate_rad_s));
+}
+
+// What belongs to the motor goes by the motor's rate, which the meter's currents tell: in the first step it turns by itself,
+// before the teeth press the wing.
+struct Loose : Stand {
+  Loose(const char* id, std::initializer_list<double> q) : Stand(test::nominal()) {
+    set(id, q);
+    set("gear_backlash", {0.2});
+  }
+};
+constexpr int kLooseSteps = 10;  // of about 14, after which phi' is 100 rad/s
+
+TEST(GearBacklash, HeatsTheWindingByTheMotorsCurrent) {
+  const double rise = 1e-6, time = 0.5;  // too little to change R by more than 1e-10
+  Loose s("winding_heating", {rise, time});
+  const double R = s.airless.left.motor.resistance_ohm;
+  double dT = 0;
+  for (int i = 0; i < kLooseSteps; ++i) {
+    s.step(5);
+    dT += kStep / time * (rise * R * s.meter[1] * s.meter[1] - dT);
+    EXPECT_NEAR(s.memory[0], dT, 1e-9 * dT) << i;
+  }
+  EXPECT_LT(s.meter[1], 0.8 * 5 / R);  // back-EMF
+}
+
+TEST(GearBacklash, LoadsTheBatteryByTheMotorsCurrents) {
+  const double source = 2, nominal = 18;
+  Loose s("battery_sag", {source, 0, nominal});
+  for (int i = 0; i < kLooseSteps; ++i) {
+    s.step(5, -4);
+    const double drawn_A = 5 / nominal * s.meter[1] - 4 / nominal * s.meter[2];
+    EXPECT_NEAR(s.meter[0] * nominal, nominal - source * drawn_A, 1e-13) << i;
+  }
+  EXPECT_LT(s.meter[1], 0.8 * 5 / s.airless.left.motor.resistance_ohm);
+}
+
+TEST(GearBacklash, LetsTheMotorsOwnRateOvercomeItsStiction) {
+  const double extra = 20, stribeck = 30;
+  Loose s("coulomb_friction", {extra, stribeck});
+  const SideParameters<double> p = derive(s.airless, kStep).left;
+  const Motor& m = s.airless.left.motor;
+  double rate = 0;
+  for (int i = 0; i < kLooseSteps; ++i) {
+    s.step(5);
+    EXPECT_NEAR((5 - m.resistance_ohm * s.meter[1]) / (m.gear_ratio * m.torque_constant_Nm_A), rate, 1e-11) << i;
+    const double friction = p.stroke_friction_Nm * (1 + extra * std::exp(-rate / stribeck));
+    const double inertia = p.rotor_kg_m2 / kStep, half = p.stroke_damping_Nm_s / 2;  // damping at the mean rate
+    rate = ((inertia - half) * rate + p.stroke_torque_per_V_Nm * 5 - friction) / (inertia + half);
+  }
+  EXPECT_GT(rate, stribeck);
 }
 
 TEST(GearBacklash, TendsToTheRigidGear) {

@@ -1,7 +1,8 @@
 // A battery that gives way under load and empties, with a driver whose commands are shares d = V / nominal of its voltage:
-//   V_b = nominal - source_ohm I - fade Q     I = d_l i_l + d_r i_r     i = (d V_b - K N psi') / R     dQ/dt = I
-// solved for V_b; the motors get d V_b. I is what a pulse-width-modulated bridge draws for the currents of both motors: the
-// power is the same on both sides of it, and what a motor gives back flows back.
+//   V_b = nominal - source_ohm I - fade Q     I = d_l i_l + d_r i_r     i = (d V_b - K N phi') / R     dQ/dt = I
+// with phi' the motor's rate about the stroke axis; solved for V_b. The motors get d V_b. I is what a pulse-width-modulated
+// bridge draws for the currents of both motors: the power is the same on both sides of it, and what a motor gives back
+// flows back.
 // [1] Chen, Rincon-Mora, Accurate electrical battery model, IEEE Trans. Energy Conversion 21(2), 2006: source voltage of the
 //     charge, less a series resistance times the current; here linear in the charge, without its slow RC pairs.
 // Valid over the flat part of a discharge; an empty battery gives nothing. A flight starts with a full one.
@@ -22,8 +23,8 @@ struct BatterySag {
   static FLAPPY_INLINE void hinges(const T (&q)[3], const Surroundings<T>& s, const StateRows<T>& state,
                                    Sides<Hinges<T>>& h) {
     const T share_l = h.left.voltage_V / q[2], share_r = h.right.voltage_V / q[2];
-    const T emf_l = s.figures.left.back_emf_V_s * s.x.left.stroke_rate_rad_s;
-    const T emf_r = s.figures.right.back_emf_V_s * s.x.right.stroke_rate_rad_s;
+    const T emf_l = s.figures.left.back_emf_V_s * h.left.motor_rate_rad_s;
+    const T emf_r = s.figures.right.back_emf_V_s * h.right.motor_rate_rad_s;
     const T per_ohm_l = share_l / h.left.resistance_ohm, per_ohm_r = share_r / h.right.resistance_ohm;
     const T full = max(T(q[2] - q[1] * state.get(0)), T(0));
     const T battery_V = T(full + q[0] * T(per_ohm_l * emf_l + per_ohm_r * emf_r)) /

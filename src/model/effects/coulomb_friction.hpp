@@ -1,5 +1,5 @@
 // Dry friction of motor and stroke joint that is larger at rest than in motion (Stribeck):
-//   f (1 + extra exp(-|psi'| / stribeck))      f: friction of the base model
+//   f (1 + extra exp(-|phi'| / stribeck))      f: friction of the base model; phi': the motor's rate about the stroke axis
 // [1] Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and compensation methods for the control
 //     of machines with friction, Automatica 30(7), 1994, sec. 2: stiction, and friction falling with speed.
 // No memory of the contact (presliding, rising static friction). The larger friction sticks as the base model's does.
@@ -18,13 +18,12 @@ struct CoulombFriction {
       {{"extra", 0, 20, 1, 0, 3}, {"stribeck_rad_s", 0.1, 10000, 100, 30, 170}}};
 
   template <class T>
-  static FLAPPY_INLINE void hinges(const T (&q)[2], const Surroundings<T>& s, const StateRows<T>&,
-                                   Sides<Hinges<T>>& h) {
-    const auto stick = [&](Hinges<T>& side, const SideState<T>& x) {
-      side.friction_Nm *= T(T(1) + q[0] * exp_negative(T(abs(x.stroke_rate_rad_s) / q[1])));
+  static FLAPPY_INLINE void hinges(const T (&q)[2], const Surroundings<T>&, const StateRows<T>&, Sides<Hinges<T>>& h) {
+    const auto stick = [&](Hinges<T>& side) {
+      side.friction_Nm *= T(T(1) + q[0] * exp_negative(T(abs(side.motor_rate_rad_s) / q[1])));
     };
-    stick(h.left, s.x.left);
-    stick(h.right, s.x.right);
+    stick(h.left);
+    stick(h.right);
   }
 };
 

@@ -6,6 +6,7 @@
 // and one line in registry.hpp. Simulation, randomisation, the vehicle file and diagnosis read that one
 // description. A stage is found by its name; an effect without it costs nothing there. In the order of a step:
 //   vehicle(parameters, Vehicle&)                            the vehicle as it is built, before anything is derived
+//   motor(parameters, surroundings, state, Sides<Hinges>&)   rate of each motor, where it is not its wing's
 //   hinges(parameters, surroundings, state, Sides<Hinges>&)  motors, springs and stops of both sides
 //   wind(parameters, surroundings, state, Vec3&)             velocity of the air, in B
 //   air<side>(parameters, surroundings, state, WingWrench&)  what the air does to a wing
@@ -59,7 +60,7 @@ template <class T>
 struct Hinges {
   T source_share;      // of its nominal voltage
   T voltage_V;         // at the motor
-  T motor_rate_rad_s;  // behind its gear: the wing's, but for play
+  T motor_rate_rad_s;  // phi', about the stroke axis: the wing's psi' but for play; known from hinges() on
   T resistance_ohm, torque_per_V_Nm, damping_Nm_s, stiffening_kg_m2, friction_Nm, rotor_kg_m2;  // as in SideParameters
   T spring_positive_Nm_rad, spring_negative_Nm_rad;
   T rotation_lower_rad, rotation_upper_rad;

@@ -22,6 +22,14 @@ struct GearBacklash {
   static constexpr int kStates = 8;  // of each side: phi - psi, phi' - psi', and N/D and K/D of the step
   static constexpr double kStallDeflection_rad = 0.001, kDampingRatio = 0.1;
 
+  /// phi', which all that belongs to the motor goes by.
+  template <class T>
+  static FLAPPY_INLINE void motor(const T (&)[1], const Surroundings<T>&, const StateRows<T>& state,
+                                  Sides<Hinges<T>>& h) {
+    h.left.motor_rate_rad_s += state.get(1);
+    h.right.motor_rate_rad_s += state.get(5);
+  }
+
   template <class T>
   static FLAPPY_INLINE void hinges(const T (&q)[1], const Surroundings<T>& s, const StateRows<T>& state,
                                    Sides<Hinges<T>>& h) {
@@ -54,8 +62,7 @@ struct GearBacklash {
     const auto meshes = abs(next) > half;
     const T k = where(meshes, stiffness, T(0)), K = where(meshes, T(stiffness * s.step_s + damping), T(0));
 
-    const T psi_rate = x.stroke_rate_rad_s, phi_rate = psi_rate + slip;
-    h.motor_rate_rad_s = phi_rate;
+    const T psi_rate = x.stroke_rate_rad_s, phi_rate = h.motor_rate_rad_s;
     const T inertia = T(h.rotor_kg_m2 * s.per_step), pressed = k * T(slack - end);
     const T driven = T(T(inertia - T(0.5) * h.damping_Nm_s) * phi_rate) + T(h.torque_per_V_Nm * h.voltage_V) - pressed;
     const T friction = clamp(T(-(driven + K * psi_rate)), T(-h.friction_Nm), h.friction_Nm);

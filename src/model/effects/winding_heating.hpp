@@ -1,6 +1,7 @@
 // Windings that warm up, each by itself, and resist more:
-//   R = R_0 (1 + 0.00393 dT)     time d(dT)/dt = rise R i^2 - dT     i = (V - K N psi') / R
-// which takes from the torque per volt and from the back-EMF's share of the damping alike. A flight starts cold.
+//   R = R_0 (1 + 0.00393 dT)     time d(dT)/dt = rise R i^2 - dT     i = (V - K N phi') / R
+// with phi' the motor's rate about the stroke axis. R takes from the torque per volt and from the back-EMF's share of the
+// damping alike. A flight starts cold.
 // [1] Hughes, Drury, Electric Motors and Drives, 4th ed., 2013, ch. 3: losses and a motor's thermal time constant.
 // [2] Copper Wire Tables, Circular of the Bureau of Standards 31, 3rd ed., 1914: annealed copper, 0.00393 per K at 20 C.
 // One lump for winding and case; magnets that weaken with heat are left out. `rise` is the whole of the thermal resistance.
@@ -28,13 +29,13 @@ struct WindingHeating {
   template <class T>
   static FLAPPY_INLINE void after(const T (&q)[2], const Surroundings<T>& s, const StateRows<T>& state,
                                   const Sides<Hinges<T>>& h) {
-    const auto heat = [&](int row, const SideFigures<T>& f, const SideState<T>& x, const Hinges<T>& side) {
-      const T across = side.voltage_V - f.back_emf_V_s * x.stroke_rate_rad_s;
+    const auto heat = [&](int row, const SideFigures<T>& f, const Hinges<T>& side) {
+      const T across = side.voltage_V - f.back_emf_V_s * side.motor_rate_rad_s;
       const T power = T(across * across) / side.resistance_ohm;
       state.add(row, T(T(s.step_s / q[1]) * T(q[0] * power - state.get(row))));
     };
-    heat(0, s.figures.left, s.x.left, h.left);
-    heat(2, s.figures.right, s.x.right, h.right);
+    heat(0, s.figures.left, h.left);
+    heat(2, s.figures.right, h.right);
   }
 
  private:
