@@ -156,7 +156,7 @@ FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
                    .u[0];
     auto sample = sample_mocap(plan.mocap, truth, seen, draw(sim::Stream::mocap, index),
                                draw(sim::Stream::mocap, index + 1), chance);
-    if (s.effects.set & kMocapEffects) disturb(s.effects, sample, first);
+    if (s.effects.set & kMocapEffects) disturb(s.effects, truth.attitude, sample, first);
     seen.store(f.seen[0] + first);
     store_rows(sample, slot(s.queue, slice.mocap_slot, kMocapRows), first);
     if (s.tap.mocap != nullptr) store_rows(sample, slot(s.tap.mocap, mocap_samples, kMocapRows), first);

@@ -2,7 +2,7 @@
 //
 //   accelerometer_misalignment  force turned by e
 //   gyro_bias                   rate + drift (1 - exp(-t / warm_up)), t since the flight's start
-//   marker_offset               seen position p + R_WB d
+//   marker_offset               seen position p + R_WB d, R_WB the true attitude: the marker is where it is, however seen
 //   mocap_tilt                  seen position R(e) p, attitude R(e) q, of what the marker's offset left
 //
 // They act on what is measured, noise and all, in the lanes in which they have a size. vibration_rectification, which needs the
@@ -95,13 +95,14 @@ FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const L& time_s,
   }
 }
 
-/// What the effects of motion capture make of a pose.
+/// What the effects of motion capture make of a pose that was truly at `attitude`.
 template <class T, class L>
-FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, MocapSample<L>& y, int first) {
+FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const Quaternion<L>& attitude, MocapSample<L>& y,
+                           int first) {
   if (effects.set & kBit<MarkerOffset>) {
     const auto of = [&](int k) { return effect_parameter<MarkerOffset>(effects, k, first); };
     const Vec3<L> d{of(0), of(1), of(2)};
-    y.position_m = where(has_size(d), y.position_m + rotation_matrix(y.attitude) * d, y.position_m);
+    y.position_m = where(has_size(d), y.position_m + rotation_matrix(attitude) * d, y.position_m);
   }
   if (effects.set & kBit<MocapTilt>) {
     const auto of = [&](int k) { return effect_parameter<MocapTilt>(effects, k, first); };

@@ -19,10 +19,11 @@ const gap::EffectValues kAll = {
     {"marker_offset", {{"x_m", 0.01}, {"y_m", -0.03}, {"z_m", 0.05}}}};
 
 /// The log of a flight without a controller, so that what is seen does not change what is flown.
-flightlog::FlightLog open_loop(const gap::EffectValues& effects) {
+flightlog::FlightLog open_loop(const gap::EffectValues& effects, const std::vector<std::string>& sensors = {}) {
   const Folder folder;
   std::vector<std::string> overrides = {"flight.support=task", "flight.duration_s=1.0", "flight.settle_s=0",
                                         "world.ground_z_m=0", "constant_input.amplitude_V=10"};
+  overrides.insert(overrides.end(), sensors.begin(), sensors.end());
   for (const auto& [id, values] : effects)
     for (const auto& [name, value] : values)
       overrides.push_back("vehicle.effects." + id + "." + name + "=" + std::to_string(value));
@@ -50,11 +51,13 @@ double farthest(const flightlog::FlightLog& a, const flightlog::FlightLog& b) {
 // The lanes keep quaternions of length 1 to 1e-9, which an offset of 0.06 m sees; series are cut below 1e-13, and numbers up to
 // some hundred rounded.
 TEST(SensorEffects, AreUndoneByTheDiagnosis) {
-  const flightlog::FlightLog plain = open_loop({});
+  // the offset is taken back by the attitude that is seen, so that is seen as it is
+  const std::vector<std::string> sharp = {"sensors.mocap.attitude_noise_rad=1e-12"};
+  const flightlog::FlightLog plain = open_loop({}, sharp);
   ASSERT_GT(plain.imu.t_s.size(), 400u);
   for (const char* id : {"accelerometer_misalignment", "mocap_tilt", "marker_offset"}) {
-    const gap::EffectValues one = {*kAll.find(id)};
-    const flightlog::FlightLog seen = open_loop(one);
+    const gap::EffectValues one = {*flightlog::kAll.find(id)};
+    const flightlog::FlightLog seen = open_loop(one, sharp);
     EXPECT_GT(farthest(seen, plain), 0.009) << id;
     EXPECT_LT(farthest(gap::without(one, seen), plain), 1e-9) << id;
   }
@@ -69,7 +72,18 @@ TEST(SensorEffects, AreUndoneByTheDiagnosis) {
   EXPECT_EQ(s.accel_x_m_s2, t.accel_x_m_s2);
   // in their order, tilt of what the marker shows
   gap::EffectValues both = {*kAll.find("mocap_tilt"), *kAll.find("marker_offset")};
-  EXPECT_LT(farthest(gap::without(both, open_loop(both)), plain), 1e-9);
+  EXPECT_LT(farthest(gap::without(both, open_loop(both, sharp)), plain), 1e-9);
+}
+
+// A marker shakes as the body does, not as the tracker's estimate of its attitude: noise of that leaves the point alone.
+TEST(SensorEffects, CarryTheMarkerOnTheTrueAttitude) {
+  const gap::EffectValues offset = {*kAll.find("marker_offset")};
+  const std::string blurred = "sensors.mocap.attitude_noise_rad=0.1", sharp = "sensors.mocap.attitude_noise_rad=1e-12";
+  const FlightLog seen = open_loop(offset, {blurred}), same = open_loop(offset, {sharp});
+  EXPECT_GT(farthest(seen.mocap.qx, same.mocap.qx), 0.1);
+  EXPECT_EQ(seen.mocap.x_m, same.mocap.x_m);
+  EXPECT_EQ(seen.mocap.y_m, same.mocap.y_m);
+  EXPECT_EQ(seen.mocap.z_m, same.mocap.z_m);
 }
 
 // From 0 when the flight starts: 1 - exp(-t / warm_up).
