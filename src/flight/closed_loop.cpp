@@ -124,39 +124,71 @@ FLAPPY_INLINE L<T> flight_time_s(const FlightBlock<T>& f, const FlightPlan<T>& p
   return L<T>::load(time);
 }
 
+template <class T>
+FLAPPY_INLINE L<T> beat_phase(const sim::Block<T>& body, int first) {
+  T fraction[kWidth<T>];
+  for (int i = 0; i < kWidth<T>; ++i) fraction[i] = beat_fraction<T>(body.phase[first + i]);
+  return L<T>::load(fraction);
+}
+
+/// What the tracker makes of the truth of its sample `index`; `seen`: 0 where it is lost.
+template <class T>
+FLAPPY_INLINE MocapSample<L<T>> see(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Truth<L<T>>& truth,
+                                    const L<T>& seen, std::uint32_t index, int first) {
+  const auto draw = [&](std::uint32_t k) {
+    return sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap), 3 * index + k,
+                              s.flight.flapper + first, s.flight.flight + first);
+  };
+  auto sample = sample_mocap(plan.mocap, truth, seen, draw(0), draw(1));
+  if (s.effects.set & kMocapEffects) disturb(s.effects, truth.attitude, sample, first);
+  return sample;
+}
+
+/// The pose of `fuse` where motion capture is later than it says: of the time before, once that is known.
+template <class T>
+FLAPPY_INLINE void delay(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Fuse& fuse, int first) {
+  T* rows = s.queue + static_cast<std::ptrdiff_t>(fuse.slot) * kMocapRows * kLanes<T>;
+  const auto pose = load_rows<MocapSample<L<T>>>(slot(s.queue, fuse.slot, kMocapRows), first);
+  const L<T> late = effect_parameter<MocapDelay>(s.effects, 0, first);
+  const L<T> age = L<T>(L<T>(fuse.age_s) + late) / L<T>(plan.task.tick_s);
+  const auto truth = load_rows<Truth<L<T>>>(s.flight.truth, first);
+  const auto past = past_truth<T>(s.effects, s.flight.tick + first, truth, age, plan.task.tick_s, first);
+  const auto then = see(s, plan, past, pose.valid, fuse.index, first);
+  const L<T>*from = reinterpret_cast<const L<T>*>(&then), *prompt = reinterpret_cast<const L<T>*>(&pose);
+  for (int r = 0; r < kMocapRows; ++r) where(late == L<T>(0), prompt[r], from[r]).store(rows + r * kLanes<T> + first);
+}
+
 /// Sensors sample the true state at the end of a slice, `steps` into the period.
 template <class T>
 FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Slice& slice, std::int64_t steps,
                          int imu_samples, int mocap_samples, int first) {
   FlightBlock<T>& f = s.flight;
   const auto truth = load_rows<Truth<L<T>>>(f.truth, first);
-  const auto draw = [&](sim::Stream stream, std::uint32_t index) {
-    return sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(stream), index, f.flapper + first,
-                              f.flight + first);
-  };
   if (slice.imu) {
+    const auto draw = [&](std::uint32_t k) {
+      return sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::imu), 2 * slice.imu_index + k,
+                                f.flapper + first, f.flight + first);
+    };
     auto imu = load_rows<Imu<L<T>>>(f.imu, first);
     const L<T> interval(slice.imu_interval_s);
-    auto sample =
-        sample_imu(plan.imu, L<T>(L<T>(1) / interval), truth, imu, draw(sim::Stream::imu, 2 * slice.imu_index),
-                   draw(sim::Stream::imu, 2 * slice.imu_index + 1));
+    auto sample = sample_imu(plan.imu, L<T>(L<T>(1) / interval), truth, imu, draw(0), draw(1));
     store_rows(imu, f.imu, first);
-    if (s.effects.set & kImuEffects) disturb(s.effects, flight_time_s(f, plan, steps, first), sample, first);
+    if (s.effects.set & kImuEffects)
+      disturb(s.effects, flight_time_s(f, plan, steps, first), beat_phase(s.body, first), imu.low_passed.accel_m_s2,
+              sample, first);
     auto fusion = load_rows<Fusion<L<T>>>(f.fusion, first);
     gather(fusion.gathered, sample, interval);
     store_rows(fusion, f.fusion, first);
     if (s.tap.imu != nullptr) store_rows(sample, slot(s.tap.imu, imu_samples, kImuSampleRows), first);
   }
   if (slice.mocap) {
-    const std::uint32_t index = 3 * slice.mocap_index;
     L<T> seen = L<T>::load(f.seen[0] + first), chance(1);
     if (plan.losses)
-      chance = sim::uniforms<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap), index + 2,
+      chance = sim::uniforms<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap), 3 * slice.mocap_index + 2,
                                    f.flapper + first, f.flight + first)
                    .u[0];
-    auto sample = sample_mocap(plan.mocap, truth, seen, draw(sim::Stream::mocap, index),
-                               draw(sim::Stream::mocap, index + 1), chance);
-    if (s.effects.set & kMocapEffects) disturb(s.effects, truth.attitude, sample, first);
+    seen = next_seen(plan.mocap, seen, chance);
+    const auto sample = see(s, plan, truth, seen, slice.mocap_index, first);
     seen.store(f.seen[0] + first);
     store_rows(sample, slot(s.queue, slice.mocap_slot, kMocapRows), first);
     if (s.tap.mocap != nullptr) store_rows(sample, slot(s.tap.mocap, mocap_samples, kMocapRows), first);
@@ -186,6 +218,7 @@ FLAPPY_INLINE void fuse(const FlightSpace<T>& s, const FlightPlan<T>& plan, int 
       move(fusion.horizon, *a);
       spread(fusion.covariance, plan.fusion, L<T>(a->share * a->duration_s));
     }
+    if (s.effects.set & kBit<MocapDelay>) delay(s, plan, pose, first);
     correct(fusion, plan.fusion, load_rows<MocapSample<L<T>>>(slot(s.queue, pose.slot, kMocapRows), first));
   }
   if (plan.fuse_count > 0) fusion.now = fusion.horizon;
@@ -208,11 +241,8 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   FlightBlock<T>& f = s.flight;
   const auto truth = load_rows<Truth<L<T>>>(f.truth, first);
   auto episode = load_rows<Episode<L<T>>>(f.episode, first);
-  T time[kWidth<T>], fraction[kWidth<T>];
-  for (int i = 0; i < kWidth<T>; ++i) {
-    time[i] = static_cast<T>(++f.tick[first + i]) * plan.task.tick_s;
-    fraction[i] = beat_fraction<T>(s.body.phase[first + i]);
-  }
+  T time[kWidth<T>];
+  for (int i = 0; i < kWidth<T>; ++i) time[i] = static_cast<T>(++f.tick[first + i]) * plan.task.tick_s;
   const auto ref = setpoint(f, plan, first);
   const auto score = score_of(truth, ref);
   const Reward<T>& pays = plan.task.reward;
@@ -250,7 +280,7 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   }
   L<T> row[kMaxObservation];
   const int rows =
-      observe(plan.parts, estimate, ref, episode, L<T>::load(fraction), now, learnt_trim(f, plan, first), row);
+      observe(plan.parts, estimate, ref, episode, beat_phase(s.body, first), now, learnt_trim(f, plan, first), row);
   for (int i = 0; i < rows; ++i) row[i].store(f.observation[i] + first);
   store_rows(episode, f.episode, first);
 }
@@ -274,6 +304,10 @@ class Stopwatch {
 template <class T>
 void fly_block(const FlightSpace<T>& s, const FlightPlan<T>& plan) {
   Stopwatch watch(plan.cycles);
+  if (s.effects.set & kBit<MocapDelay>)
+    for_lanes<T>([&](int first) {
+      keep_past(s.effects, s.flight.tick + first, load_rows<Truth<L<T>>>(s.flight.truth, first), first);
+    });
   for_lanes<T>([&](int first) { steer(s, plan, first); });
   watch.lap(kSteer);
   std::int64_t step = plan.first_step;

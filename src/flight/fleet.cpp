@@ -71,6 +71,7 @@ double Fleet<T>::period_s() const {
 
 template <class T>
 void Fleet<T>::set_vehicle(std::size_t i, const model::Vehicle& vehicle) {
+  storage_->check_delay(vehicle);
   storage_->batch.set_vehicle(i, vehicle);
 }
 
@@ -374,13 +375,23 @@ template <class T>
 auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
   const Storage& s = *storage_;
   std::vector<MocapRecord> list;
-  s.template for_samples<MocapSample>(i, s.mocap_tap, s.mocap_tap_size, &Slice::mocap,
-                                      [&](double time_s, const auto& x) {
-                                        list.push_back({time_s + s.options.sensors.mocap.latency_s,
-                                                        {x.position_m.x, x.position_m.y, x.position_m.z},
-                                                        {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z},
-                                                        x.valid > 0});
-                                      });
+  const auto add = [&](double time_s, const MocapSample<double>& x) {
+    list.push_back({time_s + s.options.sensors.mocap.latency_s,
+                    {x.position_m.x, x.position_m.y, x.position_m.z},
+                    {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z},
+                    x.valid > 0});
+  };
+  const auto delays = std::uint64_t{1} << model::effect_index(model::MocapDelay::kInfo.id);
+  if (i >= size() || !(storage_->batch.storage().effects_of_lane(i) & delays)) {
+    s.template for_samples<MocapSample>(i, s.mocap_tap, s.mocap_tap_size, &Slice::mocap, add);
+  } else if (!s.mocap_tap.empty()) {
+    const T* queue = &s.queue[i / kLanes<T> * s.queue_size];
+    for (const Fuse& f : s.periods.back().fuse) {
+      const T* rows = queue + static_cast<std::ptrdiff_t>(f.slot) * kMocapRows * kLanes<T>;
+      add(f.time_s,
+          get<MocapSample<double>>(reinterpret_cast<const T(*)[kLanes<T>]>(rows), static_cast<int>(i % kLanes<T>)));
+    }
+  }
   return list;
 }
 

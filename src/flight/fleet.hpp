@@ -126,7 +126,8 @@ class Fleet {
   /// Counts processor cycles of each Stage (flight_block.hpp) into `cycles` from now on; for fleets on one thread.
   void count_cycles(std::uint64_t* cycles);
 
-  /// What a recorder sees of the last period's samples: none unless record(true) came before it.
+  /// What a recorder sees of the last period's samples: none unless record(true) came before it. Poses of a flapper with a
+  /// mocap_delay are those that arrived, as one that is early is known no sooner.
   struct ImuRecord {
     double arrival_s, gyro_rad_s[3], accel_m_s2[3];
   };

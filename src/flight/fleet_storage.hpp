@@ -62,6 +62,7 @@ struct Fleet<T>::Storage {
     ring_size = static_cast<std::size_t>(schedule.ring_slots()) * kIncrementRows * kLanes<T>;
     queue_size = static_cast<std::size_t>(schedule.queue_slots()) * kMocapRows * kLanes<T>;
     ring.assign(n * ring_size, T(0));
+    check_delay(vehicle);
     queue.assign(n * queue_size, T(0));
     for (const Segment<double>& s : o.task.path) {
       Segment<T> to{s.start_tick, {}};
@@ -91,6 +92,23 @@ struct Fleet<T>::Storage {
     plan.hold = options.task.hold;
     observed = static_cast<int>(options.task.observation().size());
     plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(k.period_s)};
+  }
+
+  /// std::invalid_argument where the sensors cannot be as late or early as the vehicle's mocap_delay has it.
+  void check_delay(const model::Vehicle& v) const {
+    const auto own = v.effects.find(model::MocapDelay::kInfo.id);
+    if (own == v.effects.end()) return;
+    const auto index = static_cast<std::size_t>(model::effect_index(model::MocapDelay::kInfo.id));
+    const double delay_s = model::effects()[index].values(own->second)[0], latency_s = options.sensors.mocap.latency_s;
+    const double period_s = period_steps * options.batch.step_s;
+    if (delay_s < -latency_s)
+      throw std::invalid_argument("effects.mocap_delay.delay_s: " + std::to_string(delay_s) +
+                                  " is before the pose was; accepted: down to -mocap.latency_s, " +
+                                  std::to_string(-latency_s));
+    if (schedule.longest_wait_s() + delay_s > (model::MocapDelay::kSlots - 1) * period_s)
+      throw std::invalid_argument("effects.mocap_delay.delay_s: " + std::to_string(delay_s) + " is more than " +
+                                  std::to_string(model::MocapDelay::kSlots) +
+                                  " control periods remember; accepted: less, a lower mocap.latency_s or control rate");
   }
 
   struct Place {

@@ -21,10 +21,10 @@ Schedule::Schedule(const Sensors& sensors, double step_s, int period_steps)
   const double period_s = step_s * period_steps;
   // a pose waits until it and the IMU's samples of its time have arrived, and for the end of the period; the ring holds what
   // the IMU gathered since the pose before it
-  const double wait_s =
+  wait_s_ =
       period_s + std::max(sensors.mocap.latency_s, sensors.imu.latency_s + lag_s_ + 1 / sensors.imu.rate_hz + period_s);
-  ring_slots_ = static_cast<int>(std::ceil((wait_s + 1 / sensors.mocap.rate_hz) / period_s)) + 2;
-  queue_slots_ = static_cast<int>(std::ceil(wait_s * sensors.mocap.rate_hz)) + 1;
+  ring_slots_ = static_cast<int>(std::ceil((wait_s_ + 1 / sensors.mocap.rate_hz) / period_s)) + 2;
+  queue_slots_ = static_cast<int>(std::ceil(wait_s_ * sensors.mocap.rate_hz)) + 1;
   horizon_s_ = present_s_ = -lag_s_;
 }
 
@@ -64,7 +64,7 @@ void Schedule::sample(std::int64_t end) {
       slice.mocap = true;
       slice.mocap_index = static_cast<std::uint32_t>(mocap_count_);
       slice.mocap_slot = static_cast<int>(mocap_count_++ % queue_slots_);
-      queue_.push_back({slice.mocap_slot, now_s(), now_s() + sensors_.mocap.latency_s});
+      queue_.push_back({slice.mocap_slot, slice.mocap_index, now_s(), now_s() + sensors_.mocap.latency_s});
     }
     period_.slices.push_back(slice);
   }
@@ -85,8 +85,9 @@ void Schedule::fuse_arrived() {
   }();
   while (!queue_.empty() && queue_.front().arrival_s <= now_s() + kSame_s &&
          queue_.front().time_s <= covered_s + kSame_s) {
-    Fuse fuse{queue_.front().slot, static_cast<int>(period_.advance.size()), 0};
     const double target = queue_.front().time_s;
+    Fuse fuse{queue_.front().slot, static_cast<int>(period_.advance.size()), 0, queue_.front().index, target,
+              now_s() - target};
     queue_.pop_front();
     while (!ring_.empty() && ring_.front().from_s < target - kSame_s) {
       const Entry& e = ring_.front();

@@ -29,6 +29,8 @@ struct Advance {
 /// Moves the horizon to the time of the pose in `slot`, by `count` advances from `first` on, and corrects.
 struct Fuse {
   int slot = 0, first = 0, count = 0;
+  std::uint32_t index = 0;       // of the sample
+  double time_s = 0, age_s = 0;  // when it was taken; from then to the end of the period
 };
 
 /// What one control period does.
@@ -54,6 +56,9 @@ class Schedule {
   int ring_slots() const { return ring_slots_; }
   int queue_slots() const { return queue_slots_; }
   double imu_lag_s() const { return lag_s_; }
+  double longest_wait_s() const {
+    return wait_s_;
+  }  // of a pose, from its sample to the end of the period that fuses it
 
   /// Increments that lie between the horizon and the end of the last period; what a new flight starts from.
   std::vector<Advance> pending() const;
@@ -71,6 +76,7 @@ class Schedule {
   };
   struct Pose {
     int slot;
+    std::uint32_t index;
     double time_s, arrival_s;
   };
   double now_s() const { return static_cast<double>(step_) * step_s_; }
@@ -80,7 +86,7 @@ class Schedule {
   void replay();
 
   Sensors sensors_;
-  double step_s_, lag_s_;
+  double step_s_, lag_s_, wait_s_;
   int period_steps_, ring_slots_, queue_slots_;
   std::int64_t step_ = 0, imu_count_ = 0, mocap_count_ = 0, pushed_ = 0;
   double last_imu_s_ = 0, horizon_s_, present_s_;

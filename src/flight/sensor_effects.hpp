@@ -1,12 +1,13 @@
 // Effects of sensors, done to samples that are taken: the forms of src/model/effects, which src/gap/sensor_effects.hpp undoes.
 //
 //   accelerometer_misalignment  force turned by e
+//   vibration_rectification     force + gain (mean square about the mean over the beat before), on every axis, of that force
 //   gyro_bias                   rate + drift (1 - exp(-t / warm_up)), t since the flight's start
 //   marker_offset               seen position p + R_WB d, R_WB the true attitude: the marker is where it is, however seen
 //   mocap_tilt                  seen position R(e) p, attitude R(e) q, of what the marker's offset left
+//   mocap_delay                 all of this of the true motion at t - delay
 //
-// They act on what is measured, noise and all, in the lanes in which they have a size. vibration_rectification, which needs the
-// beat before, and mocap_delay, which needs the poses before, do not act.
+// They act on what is measured, noise and all, in the lanes in which they have a size; what shakes is the force without its noise.
 #pragma once
 
 #include "flight/sensors.hpp"
@@ -26,7 +27,8 @@ constexpr int index_of() {
 /// Bit of an effect in a block's set.
 template <class Effect>
 inline constexpr std::uint64_t kBit = std::uint64_t{1} << index_of<Effect>();
-inline constexpr std::uint64_t kImuEffects = kBit<AccelerometerMisalignment> | kBit<GyroBias>;
+inline constexpr std::uint64_t kImuEffects =
+    kBit<AccelerometerMisalignment> | kBit<VibrationRectification> | kBit<GyroBias>;
 inline constexpr std::uint64_t kMocapEffects = kBit<MarkerOffset> | kBit<MocapTilt>;
 
 /// Parameter `k` of an effect in a register of lanes.
@@ -34,6 +36,14 @@ template <class Effect, class T>
 FLAPPY_INLINE Lanes<T, sim::kWidth<T>> effect_parameter(const sim::BlockEffects<T>& effects, int k, int first) {
   const int row = effect_rows_before<index_of<Effect>()>() + k;
   return Lanes<T, sim::kWidth<T>>::load(effects.rows + row * sim::kLanes<T> + first);
+}
+
+/// What an effect remembers in lanes in which it is `on`.
+template <class Effect, class T>
+FLAPPY_INLINE StateRows<Lanes<T, sim::kWidth<T>>> memory_of(const sim::BlockEffects<T>& effects, int first,
+                                                            typename Lanes<T, sim::kWidth<T>>::Mask on) {
+  const int row = state_rows(effects.kept & (kBit<Effect> - 1));
+  return {effects.states + row * sim::kLanes<T> + first, sim::kLanes<T>, on};
 }
 
 /// Lanes in which a vector is not 0.
@@ -79,13 +89,39 @@ FLAPPY_INLINE Quaternion<T> quaternion_of(const Vec3<T>& e) {
   return {cosine, half * e.x, half * e.y, half * e.z};
 }
 
-/// What the IMU's effects make of a sample at `time_s` since each flight's start.
+/// The bias that vibration left in the beat before; takes note of a force at `phase` of this one.
+template <class L>
+FLAPPY_INLINE Vec3<L> rectified(const L& gain, const StateRows<L>& state, const L& phase, const Vec3<L>& force) {
+  const auto over = phase < state.get(10);  // a beat: its bias is known
+  const L count = state.get(3), per_count = L(1) / max(count, L(1)), none(0);
+  const auto axis = [&](int k, const L& f) {
+    const L sum = state.get(4 + k), squares = state.get(7 + k), mean = per_count * sum;
+    const L bias = where(over, L(gain * L(per_count * squares - mean * mean)), state.get(k));
+    state.set(k, bias);
+    state.set(4 + k, L(where(over, none, sum) + f));
+    state.set(7 + k, L(where(over, none, squares) + f * f));
+    return bias;
+  };
+  state.set(3, L(where(over, none, count) + L(1)));
+  state.set(10, phase);
+  return {axis(0, force.x), axis(1, force.y), axis(2, force.z)};
+}
+
+/// What the IMU's effects make of a sample at `time_s` since each flight's start and `phase` of its beat; `force` is without noise.
 template <class T, class L>
-FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const L& time_s, ImuSample<L>& y, int first) {
+FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const L& time_s, const L& phase, Vec3<L> force,
+                           ImuSample<L>& y, int first) {
   if (effects.set & kBit<AccelerometerMisalignment>) {
     const auto of = [&](int k) { return effect_parameter<AccelerometerMisalignment>(effects, k, first); };
     const Vec3<L> e{of(0), of(1), of(2)};
     y.accel_m_s2 = where(has_size(e), turned_by(e, y.accel_m_s2), y.accel_m_s2);
+    force = where(has_size(e), turned_by(e, force), force);
+  }
+  if (effects.set & kBit<VibrationRectification>) {
+    const L gain = effect_parameter<VibrationRectification>(effects, 0, first);
+    const auto on = !(gain == L(0));
+    const Vec3<L> bias = rectified(gain, memory_of<VibrationRectification>(effects, first, on), phase, force);
+    y.accel_m_s2 = where(on, y.accel_m_s2 + bias, y.accel_m_s2);
   }
   if (effects.set & kBit<GyroBias>) {
     const auto of = [&](int k) { return effect_parameter<GyroBias>(effects, k, first); };
@@ -114,6 +150,66 @@ FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const Quaternion
     y.attitude = {where(on, q.w, y.attitude.w), where(on, q.x, y.attitude.x), where(on, q.y, y.attitude.y),
                   where(on, q.z, y.attitude.z)};
   }
+}
+
+/// Keeps the true motion at the start of a period, `tick` periods since each lane's start.
+template <class T, class L>
+FLAPPY_INLINE void keep_past(const sim::BlockEffects<T>& effects, const std::uint32_t* tick, const Truth<L>& truth,
+                             int first) {
+  static_assert(kRows<Truth> == MocapDelay::kRows);
+  const auto on = !(effect_parameter<MocapDelay>(effects, 0, first) == L(0));
+  const auto past = memory_of<MocapDelay>(effects, first, on);
+  const L* rows = reinterpret_cast<const L*>(&truth);
+  for (int i = 0; i < sim::kWidth<T>; ++i)
+    for (int r = 0; on.raw[i] && r < MocapDelay::kRows; ++r)
+      past.rows[(tick[i] % MocapDelay::kSlots * MocapDelay::kRows + r) * past.stride + i] = rows[r].raw[i];
+}
+
+/// The true pose `age` periods before the end of one, of which `now` is true and which is period `tick` of each lane's flight.
+template <class T, class L>
+FLAPPY_INLINE Truth<L> past_truth(const sim::BlockEffects<T>& effects, const std::uint32_t* tick, const Truth<L>& now,
+                                  const L& age, const T& period_s, int first) {
+  constexpr std::uint32_t kSlots = MocapDelay::kSlots;
+  const auto past = memory_of<MocapDelay>(effects, first, age == age);
+  Truth<L> older = now, newer = now;
+  L part(0);  // of a period, from newer to older
+  for (int i = 0; i < sim::kWidth<T>; ++i) {
+    const std::uint32_t kept = tick[i] + 1 < kSlots ? tick[i] + 1 : kSlots;
+    const T periods = age.raw[i] > T(0) ? age.raw[i] < T(kept) ? age.raw[i] : T(kept) : T(0);
+    const auto whole = static_cast<std::uint32_t>(periods), from = whole < kept ? whole : kept - 1;
+    part.raw[i] = periods - static_cast<T>(from);
+    const auto copy = [&](std::uint32_t back, Truth<L>& to) {
+      const T* rows = past.rows + (tick[i] + 1 - back) % kSlots * MocapDelay::kRows * past.stride + i;
+      T length2 = 0;  // of the attitude
+      for (int r = 3; r < 7; ++r) length2 += rows[r * past.stride] * rows[r * past.stride];
+      if (back == 0 || !(length2 > 0)) return;  // now, or forgotten
+      for (int r = 0; r < MocapDelay::kRows; ++r) reinterpret_cast<L*>(&to)[r].raw[i] = rows[r * past.stride];
+    };
+    copy(from, newer);
+    copy(from + 1, older);
+  }
+  const L u = L(1) - part, h(period_s), share = u * u * L(L(3) - L(2) * u), at_older = h * u * part * part,
+          at_newer = L(0) - h * u * u * part;
+  const auto between = [&](const L& a, const L& a_rate, const L& b, const L& b_rate) {
+    return a + (share * L(b - a) + (at_older * a_rate + at_newer * b_rate));
+  };
+  const auto rate = [](const Truth<L>& x) {
+    const Quaternion<L>& q = x.attitude;
+    const Vec3<L> w = L(0.5) * x.body_rate_rad_s;
+    return Quaternion<L>{L(0) - (q.x * w.x + (q.y * w.y + q.z * w.z)), q.w * w.x + (q.y * w.z - q.z * w.y),
+                         q.w * w.y + (q.z * w.x - q.x * w.z), q.w * w.z + (q.x * w.y - q.y * w.x)};
+  };
+  const auto &p = older.position_m, &p_new = newer.position_m, &v = older.velocity_m_s, &v_new = newer.velocity_m_s;
+  const Quaternion<L>&a = older.attitude, &b = newer.attitude, a_rate = rate(older), b_rate = rate(newer);
+  Quaternion<L> q{between(a.w, a_rate.w, b.w, b_rate.w), between(a.x, a_rate.x, b.x, b_rate.x),
+                  between(a.y, a_rate.y, b.y, b_rate.y), between(a.z, a_rate.z, b.z, b_rate.z)};
+  const L scale = L(1) / sqrt(L(q.w * q.w + (q.x * q.x + (q.y * q.y + q.z * q.z))));
+  q = {q.w * scale, q.x * scale, q.y * scale, q.z * scale};
+  return {
+      {between(p.x, v.x, p_new.x, v_new.x), between(p.y, v.y, p_new.y, v_new.y), between(p.z, v.z, p_new.z, v_new.z)},
+      q,
+      newer.velocity_m_s,
+      newer.body_rate_rad_s};
 }
 
 }  // namespace FLAPPY_ISA

@@ -112,12 +112,15 @@ struct MocapSample {
   T valid;
 };
 
-/// `seen`: 1 while the tracker sees the flapper, 0 in a burst of losses.
+/// 1 while the tracker sees the flapper, 0 in a burst of losses, from what it was at the sample before.
 template <class T>
-FLAPPY_INLINE MocapSample<T> sample_mocap(const MocapConstants<Element<T>>& k, const Truth<T>& t, T& seen,
-                                          const sim::Normals4<T>& a, const sim::Normals4<T>& b, const T& chance) {
-  const auto sees = seen > T(0);
-  seen = where(sees, where(chance < T(k.loss_begins), T(0), T(1)), where(chance < T(k.loss_ends), T(1), T(0)));
+FLAPPY_INLINE T next_seen(const MocapConstants<Element<T>>& k, const T& seen, const T& chance) {
+  return where(seen > T(0), where(chance < T(k.loss_begins), T(0), T(1)), where(chance < T(k.loss_ends), T(1), T(0)));
+}
+
+template <class T>
+FLAPPY_INLINE MocapSample<T> sample_mocap(const MocapConstants<Element<T>>& k, const Truth<T>& t, const T& seen,
+                                          const sim::Normals4<T>& a, const sim::Normals4<T>& b) {
   return {add_scaled(t.position_m, T(k.position_noise_m), Vec3<T>{a.n[0], a.n[1], a.n[2]}),
           turned(t.attitude, T(0.5 * k.attitude_noise_rad) * Vec3<T>{a.n[3], b.n[0], b.n[1]}), seen};
 }

@@ -153,8 +153,7 @@ class Rig {
         gather(fusion.gathered, y, interval);
       }
       if (slice.mocap) {
-        T seen = 1;
-        MocapSample<T> z = sample_mocap<T>(mocap_constants_, truth, seen, normals(), normals(), T(1));
+        MocapSample<T> z = sample_mocap<T>(mocap_constants_, truth, T(1), normals(), normals());
         if (now_s() > blind_from_s && now_s() < blind_to_s) z.valid = 0;
         queue_[static_cast<std::size_t>(slice.mocap_slot)] = z;
         pose_s_.push_back(now_s());

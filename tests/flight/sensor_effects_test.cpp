@@ -15,7 +15,9 @@ namespace {
 const gap::EffectValues kAll = {
     {"gyro_bias", {{"x_rad_s", 0.05}, {"y_rad_s", -0.3}, {"z_rad_s", 0.1}, {"warm_up_s", 0.5}}},
     {"accelerometer_misalignment", {{"x_rad", 0.3}, {"y_rad", -0.2}, {"z_rad", 0.3}}},
+    {"vibration_rectification", {{"gain_s2_m", 0.002}}},
     {"mocap_tilt", {{"x_rad", -0.3}, {"y_rad", 0.2}}},
+    {"mocap_delay", {{"delay_s", 0.0123}}},
     {"marker_offset", {{"x_m", 0.01}, {"y_m", -0.03}, {"z_m", 0.05}}}};
 
 /// The log of a flight without a controller, so that what is seen does not change what is flown.
@@ -86,6 +88,114 @@ TEST(SensorEffects, CarryTheMarkerOnTheTrueAttitude) {
   EXPECT_EQ(seen.mocap.z_m, same.mocap.z_m);
 }
 
+const std::vector<std::string> kQuiet = {"sensors.mocap.position_noise_m=1e-12",
+                                         "sensors.mocap.attitude_noise_rad=1e-12",
+                                         "sensors.imu.accel_noise_m_s2=1e-12"};
+
+// gain (mean f^2 - (mean f)^2) over the samples of the beat before, f as the turned axes have it; to the rounding of sums of some
+// 1e4 m^2/s^4, as noise is none.
+TEST(SensorEffects, RectifyTheVibrationOfTheBeatBefore) {
+  const gap::EffectValues turned = {*kAll.find("accelerometer_misalignment")},
+                          shaken = {*kAll.find("vibration_rectification")};
+  gap::EffectValues both = turned;
+  both.insert(shaken.begin(), shaken.end());
+  const FlightLog plain = open_loop(turned, kQuiet), seen = open_loop(both, kQuiet);
+  const FlyConfig c = read_fly_config(source_path("configs/fly/open_loop.toml"));
+  const auto per_hold =
+      static_cast<std::uint32_t>(std::llround(c.vehicle.driver.flapping_Hz * c.vehicle.driver.hold_s * 0x1p32));
+  for (Column ImuStream::*axis : {&ImuStream::accel_x_m_s2, &ImuStream::accel_y_m_s2, &ImuStream::accel_z_m_s2}) {
+    const Column &f = plain.imu.*axis, &y = seen.imu.*axis;
+    double bias = 0, largest = 0, mean_of_bias = 0;
+    std::vector<double> beat;
+    std::uint32_t last = 0;
+    ASSERT_EQ(f.size(), y.size());
+    for (std::size_t i = 0; i < f.size(); ++i) {
+      const double t_s = plain.imu.t_s[i] - c.fleet.sensors.imu.latency_s;
+      const auto phase = static_cast<std::uint32_t>(std::lround(t_s / c.vehicle.driver.hold_s)) * per_hold;
+      if (phase < last) {
+        double mean = 0, square = 0;
+        for (const double x : beat) mean += x / static_cast<double>(beat.size());
+        for (const double x : beat) square += (x - mean) * (x - mean) / static_cast<double>(beat.size());
+        bias = 0.002 * square;
+        beat.clear();
+      }
+      beat.push_back(f[i]);
+      last = phase;
+      EXPECT_NEAR(y[i] - f[i], bias, 1e-9) << i;
+      largest = std::max(largest, bias);
+      mean_of_bias += bias;
+    }
+    EXPECT_GT(largest, 1e-3);
+    // A diagnosis takes the variance of 14 samples around, of 14.7 of a beat, and has it in the first two beats, too.
+    const FlightLog back = gap::without(shaken, seen);
+    double taken = 0;
+    for (std::size_t i = 0; i < y.size(); ++i) taken += y[i] - (back.imu.*axis)[i];
+    EXPECT_NEAR(taken / mean_of_bias, 1, 0.1);
+  }
+}
+
+/// The poses of a log that was to be of `t_s`; every physics step's in `fine`.
+void expect_poses_of(const FlightLog& seen, const FlightLog& fine, double latency_s, double delay_s) {
+  const MocapStream &m = seen.mocap, &n = fine.mocap;
+  double position_m = 0, attitude = 0;
+  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
+    const double t_s = m.t_s[i] - latency_s - delay_s;
+    if (t_s < 1e-4) continue;  // the first of `fine`
+    const auto k = static_cast<std::size_t>(std::lround(t_s / 1e-4)) - 1;
+    ASSERT_NEAR(n.t_s[k] - latency_s, t_s, 1e-8);
+    for (Column MocapStream::*axis : {&MocapStream::x_m, &MocapStream::y_m, &MocapStream::z_m})
+      position_m = std::max(position_m, std::abs((m.*axis)[i] - (n.*axis)[k]));
+    for (Column MocapStream::*axis : {&MocapStream::qw, &MocapStream::qx, &MocapStream::qy, &MocapStream::qz})
+      attitude = std::max(attitude, std::abs((m.*axis)[i] - (n.*axis)[k]));
+  }
+  std::printf("%.3g %.3g\n", position_m, attitude);
+  EXPECT_LT(position_m, 1e-6);
+  EXPECT_LT(attitude, 1e-5);
+}
+
+TEST(SensorEffects, ShowPosesOfTheTimeBefore) {
+  std::vector<std::string> every_step = kQuiet;
+  every_step.push_back("sensors.mocap.rate_hz=10000");
+  const FlightLog plain = open_loop({}, kQuiet), fine = open_loop({}, every_step);
+  const double latency_s = plain.header.mocap.latency_s;
+  for (const double delay_s : {0.0123, 0.02, -0.0071, -0.02}) {
+    const gap::EffectValues late = {{"mocap_delay", {{"delay_s", delay_s}}}};
+    const FlightLog seen = open_loop(late, kQuiet);
+    ASSERT_GT(seen.mocap.t_s.size() + 10, plain.mocap.t_s.size());
+    for (std::size_t i = 0; i < seen.mocap.t_s.size(); ++i) ASSERT_EQ(seen.mocap.t_s[i], plain.mocap.t_s[i]);
+    expect_poses_of(seen, fine, latency_s, delay_s);
+    EXPECT_NEAR(gap::without(late, seen).header.mocap.latency_s, latency_s + delay_s, 1e-15);
+    EXPECT_EQ(seen.imu.gyro_x_rad_s, plain.imu.gyro_x_rad_s);
+  }
+  // one that would show what was before the flight shows its start
+  const FlightLog late = open_loop({*kAll.find("mocap_delay")}, kQuiet);
+  EXPECT_EQ(late.mocap.x_m[0], late.mocap.x_m[1]);
+  EXPECT_NE(late.mocap.z_m[10], late.mocap.z_m[11]);
+}
+
+TEST(SensorEffects, RefuseADelayThatCannotBe) {
+  FlyConfig c = read_fly_config(kHover);
+  const auto refusal = [&](double delay_s) -> std::string {
+    model::Vehicle v = c.vehicle;
+    v.effects["mocap_delay"]["delay_s"] = delay_s;
+    try {
+      Fleet<float>(1, v, c.fleet);
+    } catch (const std::invalid_argument& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal(-0.02), "");
+  c.fleet.sensors.mocap.latency_s = 0.01;
+  EXPECT_EQ(
+      refusal(-0.02),
+      "effects.mocap_delay.delay_s: -0.020000 is before the pose was; accepted: down to -mocap.latency_s, -0.010000");
+  c.fleet.sensors.mocap.latency_s = 0.11;
+  EXPECT_EQ(refusal(0.02),
+            "effects.mocap_delay.delay_s: 0.020000 is more than 64 control periods remember; accepted: less, a "
+            "lower mocap.latency_s or control rate");
+}
+
 // From 0 when the flight starts: 1 - exp(-t / warm_up).
 TEST(SensorEffects, WarmUpFromTheStart) {
   const flightlog::FlightLog plain = open_loop({}), seen = open_loop({*kAll.find("gyro_bias")});
@@ -98,13 +208,13 @@ TEST(SensorEffects, WarmUpFromTheStart) {
 }
 
 template <class T>
-Fleet<T> hover(std::size_t count, const std::string& set, bool beside) {
-  rollout::FlyConfig c = rollout::read_fly_config(kHover);
+Fleet<T> hover(std::size_t count, const std::string& set, bool beside, const gap::EffectValues& effects = flightlog::kAll) {
+  rollout::FlyConfig c = read_fly_config(kHover);
   c.fleet.batch.instruction_set = set;
   c.fleet.batch.threads = 1;
   Fleet<T> fleet(count, c.vehicle, c.fleet);
   model::Vehicle other = c.vehicle;
-  other.effects = kAll;
+  other.effects = effects;
   for (std::size_t i = 0; i < count; ++i) {
     if (beside && i % 2 == 1) fleet.set_vehicle(i, other);
     fleet.start(i, 0, {.position_m = {0, 0, 0.4}}, sim::Start::flying);
@@ -116,6 +226,14 @@ Fleet<T> hover(std::size_t count, const std::string& set, bool beside) {
 TEST(SensorEffects, LeaveOthersAlone) {
   const auto plain = hover<float>(20, "", false), beside = hover<float>(20, "", true);
   for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(plain.hash(i, i + 1) == beside.hash(i, i + 1), i % 2 == 0) << i;
+}
+
+TEST(SensorEffects, OfNoSizeChangeNoBit) {
+  gap::EffectValues none = kAll;
+  for (auto& [id, values] : none)
+    for (auto& [name, value] : values)
+      if (name != "warm_up_s") value = 0;
+  EXPECT_EQ(hover<float>(20, "", true, none).hash(), hover<float>(20, "", false).hash());
 }
 
 TEST(SensorEffects, HaveTheSameBitsOnEveryInstructionSet) {

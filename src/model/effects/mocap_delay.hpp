@@ -1,4 +1,6 @@
-// Poses arrive later, by a constant, than their declared latency says.
+// Poses arrive later, by a constant, than their declared latency says: one that was declared to be of the time t shows
+//   p(t - delay), R_WB(t - delay)
+// between the ends of control periods by cubics through positions and rates (Hermite); before a flight began it stood at its start.
 // [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013: the
 //     time offset between sensors.
 #pragma once
@@ -11,6 +13,8 @@ inline namespace FLAPPY_ISA {
 struct MocapDelay {
   static constexpr EffectInfo kInfo{"mocap_delay", Stage::sensor, 1, "", "Furgale, Rehder, Siegwart, IROS 2013"};
   static constexpr std::array<EffectParameter, 1> kParameters{{{"delay_s", -0.02, 0.02, 0.005, -0.012, 0.012}}};
+  static constexpr int kSlots = 64, kRows = 13,
+                       kStates = kSlots * kRows;  // true motion at the start of the last periods
 };
 
 }  // namespace FLAPPY_ISA
