@@ -127,7 +127,7 @@ void one_hash(const Case& c, std::uint64_t golden) {
   const FleetOptions o = options(c.name);
   const bool acting = std::string(c.name) == "actor";
   std::uint64_t small = 0;
-  for (const std::string& set : sim::instruction_sets())
+  for (const std::string& set : test::instruction_sets())
     for (const int threads : test::kThreads) {
       const Fleet<T> fleet = fly<T>(o, acting, 0, kFlappers, threads, set);
       EXPECT_EQ(fleet.hash(), golden) << c.name << ", " << set << ", " << threads << " threads: 0x" << std::hex
@@ -136,7 +136,7 @@ void one_hash(const Case& c, std::uint64_t golden) {
       small = 0;
       for (std::size_t i = 0; i < kSmall; ++i) small = small * 31 + fleet.hash(i, i + 1);
     }
-  for (const std::string& set : sim::instruction_sets())
+  for (const std::string& set : test::instruction_sets())
     for (const std::size_t size : test::kBatchSizes) {
       std::uint64_t all = 0;
       for (std::size_t first = 0; first < kSmall; first += size) {
@@ -181,7 +181,7 @@ Fleet<T> take_off(std::size_t count, const std::string& set) {
 
 template <class T>
 void one_take_off(std::uint64_t golden) {
-  for (const std::string& set : sim::instruction_sets()) {
+  for (const std::string& set : test::instruction_sets()) {
     const Fleet<T> fleet = take_off<T>(9, set);
     EXPECT_EQ(fleet.hash(), golden) << set << ": 0x" << std::hex << fleet.hash();
     EXPECT_EQ(take_off<T>(1, set).hash(), fleet.hash(0, 1)) << set << ", alone";

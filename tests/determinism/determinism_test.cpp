@@ -83,7 +83,7 @@ std::uint64_t hash_in_batches_of(std::size_t size, int threads, const std::strin
 template <class T>
 void one_hash(std::uint64_t golden) {
   std::uint64_t small = 0;
-  for (const std::string& set : instruction_sets())
+  for (const std::string& set : test::instruction_sets())
     for (const int threads : test::kThreads) {
       const Batch<T> batch = fly<T>(0, kFlappers, threads, set);
       EXPECT_EQ(batch.hash(), golden) << set << ", " << threads << " threads: 0x" << std::hex << batch.hash();
@@ -91,7 +91,7 @@ void one_hash(std::uint64_t golden) {
       small = 0;
       for (std::size_t i = 0; i < kSmall; ++i) small = small * 31 + batch.hash(i, i + 1);
     }
-  for (const std::string& set : instruction_sets())
+  for (const std::string& set : test::instruction_sets())
     for (const std::size_t size : test::kBatchSizes)
       EXPECT_EQ(hash_in_batches_of<T>(size, 2, set), small) << set << ", batches of " << size;
 }
@@ -149,7 +149,7 @@ template <class T>
 void one_hash_of_affected(std::uint64_t golden) {
   std::vector<std::size_t> sizes = test::kBatchSizes;
   sizes.push_back(kAffected);
-  for (const std::string& set : instruction_sets())
+  for (const std::string& set : test::instruction_sets())
     for (const std::size_t size : sizes) {
       const int threads = size == kAffected ? 3 : size == 1 ? 1 : 2;
       const std::uint64_t hash = hash_of_affected<T>(size, threads, set);
@@ -212,7 +212,7 @@ Grounded at_ground(std::size_t first, std::size_t count, const std::string& inst
 
 template <class T>
 void one_hash_at_ground(std::uint64_t golden) {
-  for (const std::string& set : instruction_sets()) {
+  for (const std::string& set : test::instruction_sets()) {
     const Grounded g = at_ground<T>(0, kGrounded, set);
     std::uint64_t all = 0;
     for (const std::uint64_t h : g.hashes) all = all * 31 + h;

@@ -5,6 +5,7 @@
 
 #include <atomic>
 
+#include "determinism/tried.hpp"
 #include "flappy/batch.hpp"
 #include "learn/lanes/learners.hpp"
 #include "sim/storage.hpp"
@@ -51,7 +52,7 @@ void one_result(const Case& c) {
   const Replay replay = random_replay(c.options.shape, 500);
   const std::uint64_t golden = sizeof(T) == sizeof(float) ? c.golden_float : c.golden_double;
   LearnerOptions o = c.options;
-  for (const std::string& set : sim::instruction_sets())
+  for (const std::string& set : test::instruction_sets())
     for (const int threads : {1, 2, 3})
       for (const std::size_t beside : {0U, 7U}) {
         // once is enough for the others, of which two emulate fused multiply-adds

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "flappy/batch.hpp"
 #include "flight/fleet.hpp"
 #include "gap/replay/sensor_correction.hpp"
 #include "rollout/fly.hpp"
@@ -208,7 +209,8 @@ TEST(SensorEffects, WarmUpFromTheStart) {
 }
 
 template <class T>
-Fleet<T> hover(std::size_t count, const std::string& set, bool beside, const gap::EffectValues& effects = flightlog::kAll) {
+Fleet<T> hover(std::size_t count, const std::string& set, bool beside,
+               const gap::EffectValues& effects = flightlog::kAll) {
   rollout::FlyConfig c = read_fly_config(kHover);
   c.fleet.batch.instruction_set = set;
   c.fleet.batch.threads = 1;
