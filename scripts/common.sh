@@ -43,12 +43,13 @@ install_packages() {
   quietly "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}"
 }
 
-# Configures a preset with the given options of cmake, and builds it.
+# Configures a preset with the given options of cmake, and builds it; what follows --target goes to the build.
 build() {
-  local preset=$1
+  local preset=$1 options=()
   shift
+  while [ $# -gt 0 ] && [ "$1" != --target ]; do options+=("$1") && shift; done
   say "building $preset"
-  (cd "$root" && quietly cmake --preset "$preset" "$@" && quietly cmake --build --preset "$preset")
+  (cd "$root" && quietly cmake --preset "$preset" "${options[@]}" && quietly cmake --build --preset "$preset" "$@")
 }
 
 # All C++ files of the project, each ended by a zero byte.
