@@ -47,6 +47,7 @@ struct Motor {
   double friction_Nm = 0;
   double damping_Nm_s = 0;
   double rotor_inertia_kg_m2 = 0;
+  double rotor_spin_sense = 0;  ///< +1: the rotor turns as its wing strokes, -1: against it; 0 leaves its spin out
   double voltage_limit_V = 0;
 };
 
@@ -111,6 +112,7 @@ struct Parameter {
   std::string path;
   double* value;
   double low, high;
+  bool optional = false;  ///< 0 where a vehicle file leaves it out
 };
 
 /// All parameters of `vehicle`, in the order of the vehicle file, those of its effects last. Pointers live as long as the

@@ -26,13 +26,17 @@ Sym3<double> second_moment(const RigidBody& b) {
   return about_com + outer(b.mass_kg, vec(b.com_m));
 }
 
+/// S of motor.hpp, and the second moment of mass of a disc about z with that inertia.
+double rotor_spin(const Motor& m) { return m.rotor_spin_sense * m.gear_ratio * m.rotor_inertia_kg_m2; }
+Sym3<double> disc(double inertia) { return {inertia / 2, inertia / 2, 0, 0, 0, 0}; }
+
 double wing_mass(const Side& s) { return s.leading_edge.mass_kg + s.wing.mass_kg; }
 
 SideParameters<double> derive_side(const Side& s, double air_density, double step_s) {
   SideParameters<double> p;
   p.shoulder_m = vec(s.shoulder_m);
   p.edge_moment_kg_m = first_moment(s.leading_edge);
-  p.edge_second_kg_m2 = second_moment(s.leading_edge);
+  p.edge_second_kg_m2 = second_moment(s.leading_edge) + disc(rotor_spin(s.motor));
   p.wing_moment_kg_m = first_moment(s.wing);
   p.wing_second_kg_m2 = second_moment(s.wing);
 
@@ -53,7 +57,7 @@ SideParameters<double> derive_side(const Side& s, double air_density, double ste
   p.stroke_torque_per_V_Nm = N * m.efficiency * K / m.resistance_ohm;
   p.stroke_damping_Nm_s = m.efficiency * N * N * (K * K / m.resistance_ohm + m.damping_Nm_s) + s.stroke.damping_Nm_s;
   p.stroke_friction_Nm = m.efficiency * N * m.friction_Nm + s.stroke.friction_Nm;
-  p.rotor_kg_m2 = m.efficiency * N * N * m.rotor_inertia_kg_m2;
+  p.rotor_kg_m2 = m.efficiency * N * N * m.rotor_inertia_kg_m2 - rotor_spin(m);
   p.voltage_limit_V = m.voltage_limit_V;
   p.spring_positive_Nm_rad = s.spring.stiffness_positive_Nm_rad;
   p.spring_negative_Nm_rad = s.spring.stiffness_negative_Nm_rad;
@@ -121,6 +125,7 @@ SideFigures<double> side_figures(const Side& s, double air_density) {
   return {m.resistance_ohm,
           K,
           m.efficiency * K * K / m.resistance_ohm,
+          rotor_spin(m),
           R,
           c,
           strip * w.z_cp0,
@@ -151,7 +156,7 @@ Parameters<double> derive(const Vehicle& vehicle, double step_s) {
   p.inverse_mass_1_kg = 1 / (v.torso.mass_kg + wing_mass(v.left) + wing_mass(v.right));
   p.fixed_moment_kg_m =
       first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
-  p.fixed_second_kg_m2 = second_moment(v.torso) +
+  p.fixed_second_kg_m2 = second_moment(v.torso) + disc(-rotor_spin(v.left.motor) - rotor_spin(v.right.motor)) +
                          (outer(wing_mass(v.left), p.left.shoulder_m) + outer(wing_mass(v.right), p.right.shoulder_m));
   p.air_density_kg_m3 = v.air_density_kg_m3;
   p.below_m = v.extent.below_m;

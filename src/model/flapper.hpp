@@ -23,7 +23,7 @@ struct SideParameters {
   T stroke_torque_per_V_Nm;     // N eta K / R
   T stroke_damping_Nm_s;        // back-EMF, motor and joint damping
   T stroke_friction_Nm;         // motor and joint
-  T rotor_kg_m2;                // eta N^2 J
+  T rotor_kg_m2;                // eta N^2 J, less S (motor.hpp)
   T voltage_limit_V;
   T spring_positive_Nm_rad, spring_negative_Nm_rad, spring_rest_rad;
   T stroke_lower_rad, stroke_upper_rad;

@@ -48,6 +48,7 @@ class Lister {
     add(path + ".friction_Nm", m.friction_Nm, 0, 1);
     add(path + ".damping_Nm_s", m.damping_Nm_s, 0, 1);
     add(path + ".rotor_inertia_kg_m2", m.rotor_inertia_kg_m2, 0, 1);
+    list_.push_back({path + ".rotor_spin_sense", &m.rotor_spin_sense, -1, 1, true});
     add(path + ".voltage_limit_V", m.voltage_limit_V, 0, 1e3);
   }
   void add(const std::string& path, Spring& s) {

@@ -37,7 +37,8 @@ Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::s
   for (const Parameter& p : parameters(vehicle)) keys.push_back(p.path.substr(0, p.path.find('.')));
   root.accept(keys);
   vehicle.name = root.string("name");
-  for (const Parameter& p : parameters(vehicle)) *p.value = root.number(p.path, {p.low, p.high});
+  for (const Parameter& p : parameters(vehicle))
+    *p.value = p.optional ? root.number_or(p.path, 0, {p.low, p.high}) : root.number(p.path, {p.low, p.high});
   if (const auto table = root.optional_table("effects")) read_effects(*table, vehicle);
   if (const auto table = root.optional_table("posterior")) vehicle.posterior = read_posterior(*table, vehicle);
   root.finish();
@@ -58,7 +59,8 @@ Vehicle read_vehicle_for_steps(const std::filesystem::path& path, double step_s)
 std::string vehicle_text(const Vehicle& vehicle) {
   std::string text = "schema = 1\nname = " + io::toml_string(vehicle.name) + "\n";
   Vehicle copy = vehicle;
-  for (const Parameter& p : parameters(copy)) text += p.path + " = " + io::toml_number(*p.value) + "\n";
+  for (const Parameter& p : parameters(copy))
+    if (!p.optional || *p.value != 0) text += p.path + " = " + io::toml_number(*p.value) + "\n";
   for (const auto& [id, values] : vehicle.effects)
     if (values.empty()) text += "effects." + id + " = {}\n";  // in force at its typical size
   if (vehicle.posterior) text += posterior_text(*vehicle.posterior);

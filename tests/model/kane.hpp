@@ -109,7 +109,17 @@ inline KaneSystem kane(const model::Vehicle& vehicle, const KaneState& x, const 
     hung(side.leading_edge, Rz, Jw_edge, w_edge, alpha_edge);
     hung(side.wing, Ry, Jw_wing, w_wing, alpha_wing);
     const model::Motor& m = side.motor;
-    s.mass(6 + column, 6 + column) += m.efficiency * m.gear_ratio * m.gear_ratio * m.rotor_inertia_kg_m2;
+    // the rotor turns as a body of its own, in place of as much of the torso that does not; of its own energy the gear leaves
+    // the share of its efficiency
+    const double N = m.gear_ratio, spin = N * m.rotor_spin_sense;
+    model::RigidBody rotor{0, {}, {0, 0, m.rotor_inertia_kg_m2, 0, 0, 0}},
+        still{0, {}, {0, 0, -m.rotor_inertia_kg_m2, 0, 0, 0}};
+    Jacobian Jw_rotor = Jw0;
+    Jw_rotor.col(6 + column) = spin * Vector3d::UnitZ();
+    add_body(rotor, Matrix3d::Identity(), shoulder, Jw_rotor, Jshoulder,
+             w0.cross(Vector3d(0, 0, spin * x.beta_rate[i])), Vector3d::Zero());
+    add_body(still, Matrix3d::Identity(), shoulder, Jw0, Jshoulder, Vector3d::Zero(), Vector3d::Zero());
+    s.mass(6 + column, 6 + column) += (m.efficiency * N * N - spin * spin) * m.rotor_inertia_kg_m2;
     s.right_side += Jshoulder.transpose() * loads.force[i] + Jw_wing.transpose() * loads.moment[i];
     s.right_side[6 + column] += loads.stroke_torque[i];
     s.right_side[8 + column] += loads.rotation_torque[i];

@@ -57,6 +57,8 @@ Case random_case(Random& random) {
     s->stroke = {-1.75, 1.75, 0, 0};
     s->rotation = {-1.75, 1.75, 0, 0};
   }
+  c.vehicle.left.motor.rotor_spin_sense = 1;
+  c.vehicle.right.motor.rotor_spin_sense = -0.6;
   for (model::Side* s : {&c.vehicle.left, &c.vehicle.right}) {  // no implicit damping: it would be part of the step
     s->planform.rotational_damping_coefficient = 0;
     s->motor.torque_constant_Nm_A = 0;

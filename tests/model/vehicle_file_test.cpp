@@ -74,6 +74,7 @@ Figures published() {
                           {"motor.friction_Nm", 2e-5},
                           {"motor.damping_Nm_s", 9.74e-9},
                           {"motor.rotor_inertia_kg_m2", 7.03e-10},
+                          {"motor.rotor_spin_sense", 0},
                           {"motor.voltage_limit_V", 18},
                           {"spring.stiffness_positive_Nm_rad", 0.013384289},
                           {"spring.stiffness_negative_Nm_rad", 0.013384289},
@@ -226,6 +227,17 @@ TEST_F(VehicleFile, TextKeepsAnEffectOfTypicalSize) {
   EXPECT_EQ(read(vehicle_text(v)).effects.at("ground_effect"), typical);
 }
 
+TEST_F(VehicleFile, MayLeaveOutTheRotorsSpin) {
+  EXPECT_EQ(nominal_text().find("rotor_spin_sense ="), std::string::npos);
+  EXPECT_EQ(vehicle_text(test::nominal()).find("rotor_spin_sense"), std::string::npos);
+  const Vehicle v = read(nominal_text(), {"right.motor.rotor_spin_sense=-1"});
+  EXPECT_EQ(v.left.motor.rotor_spin_sense, 0);
+  EXPECT_EQ(read(vehicle_text(v)).right.motor.rotor_spin_sense, -1);
+  EXPECT_EQ(message(nominal_text(), {"left.motor.rotor_spin_sense=10"}),
+            "--set left.motor.rotor_spin_sense=10: left.motor.rotor_spin_sense: 10 is out of range; "
+            "accepted: a number from -1 to 1");
+}
+
 TEST_F(VehicleFile, TakesOverrides) {
   const Vehicle v = read(nominal_text(), {"left.motor.resistance_ohm=14", "effects.body_drag.centre_z_m=0.01"});
   EXPECT_EQ(v.left.motor.resistance_ohm, 14);
@@ -236,7 +248,8 @@ TEST_F(VehicleFile, TakesOverrides) {
             "accepted: a number from 0.001 to 10000");
   EXPECT_EQ(message(nominal_text(), {"left.motor.resistence_ohm=14"}),
             "--set left.motor.resistence_ohm=14: left.motor.resistence_ohm: unknown key; accepted: damping_Nm_s, "
-            "efficiency, friction_Nm, gear_ratio, resistance_ohm, rotor_inertia_kg_m2, torque_constant_Nm_A, "
+            "efficiency, friction_Nm, gear_ratio, resistance_ohm, rotor_inertia_kg_m2, rotor_spin_sense, "
+            "torque_constant_Nm_A, "
             "voltage_limit_V; did you mean \"resistance_ohm\"?");
 }
 

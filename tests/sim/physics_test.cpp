@@ -41,7 +41,7 @@ int steps_in(double seconds, double step_s) { return static_cast<int>(std::lroun
 std::array<model::Side*, 2> sides(model::Vehicle& v) { return {&v.left, &v.right}; }
 const model::Side& side(const model::Vehicle& v, std::size_t i) { return i == 0 ? v.left : v.right; }
 
-/// The identified vehicle, whose sides differ: inertia, springs and these joints; no air, motor or friction.
+/// The identified vehicle, whose sides differ: inertia, springs, rotors that spin and these joints; no air, motor or friction.
 model::Vehicle conservative(const model::Joint& stroke, const model::Joint& rotation) {
   model::Vehicle v = test::identified();
   v.air_density_kg_m3 = 0;
@@ -50,6 +50,8 @@ model::Vehicle conservative(const model::Joint& stroke, const model::Joint& rota
     s->stroke = stroke;
     s->rotation = rotation;
   }
+  v.left.motor.rotor_spin_sense = 1;
+  v.right.motor.rotor_spin_sense = -0.5;
   return v;
 }
 

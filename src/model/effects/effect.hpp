@@ -50,6 +50,7 @@ template <class T>
 struct SideFigures {
   T resistance_ohm, back_emf_V_s;  // of the motor, the latter per stroke rate
   T electric_damping_Nm_s;         // back-EMF's share of the stroke damping
+  T rotor_spin_kg_m2;              // S of motor.hpp
   T wing_length_m, mean_chord_m;
   // added mass of strips, rho pi/4 c^2 each: its integral, and those of c/2, r, c^2/4 + c^2/32, r^2, r c/2 times it
   T added_kg, added_chord_kg_m, added_span_kg_m, added_chord2_kg_m2, added_span2_kg_m2, added_cross_kg_m2;

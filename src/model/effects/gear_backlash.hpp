@@ -8,6 +8,7 @@
 // base model's rigid gear, to which gap = 0 is set exactly.
 // [1] Nordin, Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38(10), 2002: the dead-zone model
 //     with damping. Unlike in their physical model, teeth that part may pull for a moment.
+// The body feels the rotor's spin (motor.hpp) at the wing's rate: S (phi' - psi') is neglected.
 // k is the motor's stall torque per 0.001 rad, d a damping ratio of 0.1 on J. A flight starts in the middle of the gap.
 #pragma once
 
@@ -33,8 +34,8 @@ struct GearBacklash {
   template <class T>
   static FLAPPY_INLINE void hinges(const T (&q)[1], const Surroundings<T>& s, const StateRows<T>& state,
                                    Sides<Hinges<T>>& h) {
-    mesh(q[0], s, s.p.left, s.x.left, state, 0, T(1), h.left);
-    mesh(q[0], s, s.p.right, s.x.right, state, 4, T(-1), h.right);
+    mesh(q[0], s, s.p.left, s.figures.left, s.x.left, state, 0, T(1), h.left);
+    mesh(q[0], s, s.p.right, s.figures.right, s.x.right, state, 4, T(-1), h.right);
   }
 
   template <class T>
@@ -52,18 +53,19 @@ struct GearBacklash {
  private:
   template <class T>
   static FLAPPY_INLINE void mesh(const T& gap_rad, const Surroundings<T>& s, const SideParameters<T>& p,
-                                 const SideState<T>& x, const StateRows<T>& state, int row, const T& side,
-                                 Hinges<T>& h) {
+                                 const SideFigures<T>& figures, const SideState<T>& x, const StateRows<T>& state,
+                                 int row, const T& side, Hinges<T>& h) {
     const T slack = state.get(row), slip = state.get(row + 1), half = T(0.5) * gap_rad;
     const T stiffness = T(p.stroke_torque_per_V_Nm * p.voltage_limit_V) * T(1 / kStallDeflection_rad);
-    const T damping = T(2 * kDampingRatio) * sqrt(T(stiffness * h.rotor_kg_m2));
+    const T rotor_kg_m2 = h.rotor_kg_m2 + figures.rotor_spin_kg_m2;
+    const T damping = T(2 * kDampingRatio) * sqrt(T(stiffness * rotor_kg_m2));
     const T next = slack + s.step_s * slip;
     const T end = where(next > T(0), half, T(-half));
     const auto meshes = abs(next) > half;
     const T k = where(meshes, stiffness, T(0)), K = where(meshes, T(stiffness * s.step_s + damping), T(0));
 
     const T psi_rate = x.stroke_rate_rad_s, phi_rate = h.motor_rate_rad_s;
-    const T inertia = T(h.rotor_kg_m2 * s.per_step), pressed = k * T(slack - end);
+    const T inertia = T(rotor_kg_m2 * s.per_step), pressed = k * T(slack - end);
     const T driven = T(T(inertia - T(0.5) * h.damping_Nm_s) * phi_rate) + T(h.torque_per_V_Nm * h.voltage_V) - pressed;
     const T friction = clamp(T(-(driven + K * psi_rate)), T(-h.friction_Nm), h.friction_Nm);
     const T D = inertia + (T(0.5) * h.damping_Nm_s + K), free_rate = T(driven + friction) / D, follows = K / D;
@@ -73,7 +75,7 @@ struct GearBacklash {
     const T resists = K * T(T(1) - follows);
     const T torque = pressed + T(K * free_rate) - resists * psi_rate;
     h.stroke_torque_Nm += side * torque;
-    h.rotor_kg_m2 = resists * s.step_s;
+    h.rotor_kg_m2 = resists * s.step_s - figures.rotor_spin_kg_m2;
     h.torque_per_V_Nm = h.damping_Nm_s = h.stiffening_kg_m2 = h.friction_Nm = T(0);
   }
 };
