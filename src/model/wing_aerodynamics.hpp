@@ -12,6 +12,8 @@
 //   M_rd   = -1/8 rho |theta'| theta' C_rd R c^4 z_rd                          about +y
 //   C_N  = 1.8 sin 2a cos a + 1.95 sin a - 1.5 cos 2a sin a = sin a (0.6 cos^2 a + 3.45)
 //   d_cp = 0.46 - 0.332 cos a - 0.037 cos 3a - 0.013 cos 5a, even and 2 pi periodic
+// The paper's text has the opposite signs in U_i0 and U_o0, +v_x and -v_z. These are those of its published code (Wing.cpp),
+// and of the geometry: a wing that moves along -x meets the air as one whose stroke takes it there.
 //
 // With b = sgn(U_i) pi/2 - atan(U_o/U_i), (cos b, sin b) = (U_o, U_i)/|U| for both signs of U_i: alpha = theta + b needs
 // no arc tangent. Assumes quasi-steady flow, Re about 1e4 and a rigid wing; unsteady effects are src/model/effects.
