@@ -76,11 +76,13 @@ class Batch {
   FlapperState state(std::size_t i) const;
   std::uint32_t status(std::size_t i) const;
   HeldImpulse held_impulse(std::size_t i) const;
+  /// What both motors drew since the reset, V i in every step; what they give back counts.
+  double energy_J(std::size_t i) const;
   /// What holds flapper `i` now: a standing one flies once its wings have carried it.
   Start support(std::size_t i) const;
   std::size_t count_status(std::uint32_t bits) const;
 
-  /// Hash of flapper `i`, and of flappers [first, last) in order: of every number that moves.
+  /// Hash of flapper `i`, and of flappers [first, last) in order: of every number that moves; what they drew is none.
   std::uint64_t hash(std::size_t first, std::size_t last) const;
   std::uint64_t hash() const { return hash(0, size()); }
 

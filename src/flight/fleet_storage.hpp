@@ -266,6 +266,7 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   block.phase[lane] = s.phase;
   block.phase_per_update[lane] = s.phase_per_update;
   block.status[lane] = 0;
+  block.energy_J[lane] = 0;
 
   // from where it was meant to be to where it starts now
   const std::uint32_t flapper = options.first_flapper + static_cast<std::uint32_t>(i);

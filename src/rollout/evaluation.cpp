@@ -1,14 +1,13 @@
 #include "rollout/evaluation.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 
-#include "rollout/recorder.hpp"
-#include "rollout/settle.hpp"
+#include "flight/fleet.hpp"
 #include "io/parallel.hpp"
 #include "io/toml_writer.hpp"
 #include "rollout/recorder.hpp"
@@ -38,18 +37,6 @@ Task without_policy(Task task) {
   return task;
 }
 
-/// What one motor draws, signed: V (V - K N psi')/R; what it gives back counts.
-struct MotorDraw {
-  double back_emf_V_s, per_ohm;
-  double volt = 0, stroke_rate_rad_s = 0;  // held by the driver, and of the wing, at the end of the last period
-
-  MotorDraw(const model::Motor& m, double rate_rad_s)
-      : back_emf_V_s(m.torque_constant_Nm_A * m.gear_ratio),
-        per_ohm(1 / m.resistance_ohm),
-        stroke_rate_rad_s(rate_rad_s) {}
-  double power_W(double speed_rad_s) const { return volt * (volt - back_emf_V_s * speed_rad_s) * per_ohm; }
-};
-
 /// Flights that are flown together.
 template <class T>
 class Part {
@@ -68,11 +55,8 @@ class Part {
     fleet_.set_actor(pilot.actor);
     for (std::size_t i = 0; i < count && detail == Detail::full; ++i) {
       followers_.emplace_back(options.task, fleet_.truth(i), fleet_.target(i));
-      const model::Vehicle v = vehicle(config, i);
-      const sim::FlapperState s = fleet_.batch().state(i);
-      motors_.push_back(
-          {MotorDraw(v.left.motor, s.stroke_rate_rad_s[0]), MotorDraw(v.right.motor, s.stroke_rate_rad_s[1])});
     }
+    drawn_J_.resize(count);
   }
 
   void step() {
@@ -84,7 +68,8 @@ class Part {
     const flight::Target goal = fleet_.target(0);  // of all, as they started together
     io::parallel_for(followers_.size(), fleet_.batch().storage().threads, [&](std::size_t i) {
       note(i);
-      if (followers_[i].manoeuvring(t_s)) followers_[i].spend(energy_J(i), fleet_.period_s(), fleet_.handed_back(i));
+      const double drawn_J = fleet_.batch().energy_J(i), more_J = drawn_J - std::exchange(drawn_J_[i], drawn_J);
+      if (followers_[i].manoeuvring(t_s)) followers_[i].spend(more_J, fleet_.period_s(), fleet_.handed_back(i));
       followers_[i].see(fleet_.truth(i), goal, t_s, outcomes_[i]);
     });
   }
@@ -114,34 +99,6 @@ class Part {
     o.ended = fleet_.ended(i);
   }
 
-  /// Of both motors over the period. Between its ends the wing's speed is taken to change evenly: of a beat of fourteen
-  /// periods that cuts off 1.5 % of the back-EMF's part.
-  double energy_J(std::size_t i) {
-    const auto& body = fleet_.batch().storage();
-    const auto period = static_cast<double>(std::lround(fleet_.period_s() / body.step_s));
-    const double begin = static_cast<double>(body.steps) - period;
-    const std::vector<rollout::DriverUpdate> updates = rollout::driver_updates(fleet_, i);
-    const sim::FlapperState s = fleet_.batch().state(i);
-    double energy = 0;
-    for (std::size_t side = 0; side < 2; ++side) {
-      MotorDraw& m = motors_[i][side];
-      double from = 0;  // shares of the period
-      const auto hold = [&](double until) {
-        const double middle = (from + until) / 2;
-        const double speed = m.stroke_rate_rad_s + middle * (s.stroke_rate_rad_s[side] - m.stroke_rate_rad_s);
-        energy += m.power_W(speed) * (until - from) * fleet_.period_s();
-        from = until;
-      };
-      for (const rollout::DriverUpdate& u : updates) {
-        hold((static_cast<double>(u.step) - begin) / period);
-        m.volt = side == 0 ? u.left_V : u.right_V;
-      }
-      hold(1);
-      m.stroke_rate_rad_s = s.stroke_rate_rad_s[side];
-    }
-    return energy;
-  }
-
   /// A policy from elsewhere sees what the task shows and says what is added.
   void act() {
     const auto inputs = static_cast<std::size_t>(pilot_.policy->observations());
@@ -166,7 +123,7 @@ class Part {
   const Pilot& pilot_;
   std::vector<Outcome> outcomes_;
   std::vector<Follower> followers_;
-  std::vector<std::array<MotorDraw, 2>> motors_;
+  std::vector<double> drawn_J_;  // by the motors, until the last tick
   std::vector<std::size_t> acting_;
   std::vector<float> observation_, action_;
   std::int64_t tick_ = 0, hold_;

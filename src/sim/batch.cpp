@@ -218,6 +218,7 @@ void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   drive.voltages = {0, 0};
   put(drive, block.drive, lane);
   block.phase[lane] = 0;
+  block.energy_J[lane] = 0;
   storage_->for_states(i, ~std::uint64_t{0}, [](T& number) { number = 0; });
 }
 
@@ -263,6 +264,12 @@ HeldImpulse Batch<T>::held_impulse(std::size_t i) const {
   const auto x = get<State<double>>(block.state, lane);
   return {{x.impulse_N_s.x, x.impulse_N_s.y, x.impulse_N_s.z},
           {x.angular_impulse_Nm_s.x, x.angular_impulse_Nm_s.y, x.angular_impulse_Nm_s.z}};
+}
+
+template <class T>
+double Batch<T>::energy_J(std::size_t i) const {
+  const auto [block, lane] = storage_->at(i);
+  return block.energy_J[lane];
 }
 
 template <class T>

@@ -27,6 +27,7 @@ struct ActiveEffects {
   const Wall* walls = nullptr;
   std::size_t wall_count = 0;
   Parameters<T>* own = nullptr;  // begins as those of the block
+  T* more_J = nullptr;           // than what the motors would draw at the driver's voltage, as wings of the base model
   Element<T>* meter = nullptr;   // of the first lane
   T rows[kEffectRows];           // parameters, then figures
 
@@ -175,6 +176,17 @@ FLAPPY_INLINE void read_meter(const Surroundings<T>& s, const Sides<Hinges<T>>& 
   hinges.left.source_share.store(meter);
   current(hinges.left, s.figures.left).store(meter + stride);
   current(hinges.right, s.figures.right).store(meter + 2 * stride);
+}
+
+/// What a motor draws in a step beyond what it would have at the driver's voltage `given_V` without effects: V i h, at the rate at the
+/// step's end, as that is the one that turns the wing; exactly 0 where effects leave the motor alone. `slip_rad_s`: its play's rate.
+template <class T>
+FLAPPY_INLINE T extra_work_J(const Hinges<T>& h, const SideFigures<T>& f, const T& given_V, const T& rate_rad_s,
+                             const T& slip_rad_s, const T& step_s) {
+  const auto work = [&](const T& volt, const T& rate) { return T(volt * T(volt - f.back_emf_V_s * rate)); };
+  const T share = f.resistance_ohm / h.resistance_ohm;
+  return T(step_s / f.resistance_ohm) *
+         T(share * work(h.voltage_V, T(rate_rad_s + slip_rad_s)) - work(given_V, rate_rad_s));
 }
 
 /// Stage by stage, in the order of effect.hpp.
@@ -339,6 +351,12 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
     add_hinges(acting.hinges.right, load.right, wing.right);
   }
 
+  T slip_left(0), slip_right(0);
+  if constexpr (with_effects) {
+    slip_left = acting.hinges.left.motor_rate_rad_s - x.left.stroke_rate_rad_s;
+    slip_right = acting.hinges.right.motor_rate_rad_s - x.right.stroke_rate_rad_s;
+  }
+
   // new rates
   const BodyInertia<T> inertia = body_inertia(p, x, pose, wing, whole);
   const BodyDrive<T> body_drive = drive_body(p, x, pose, wing, whole, inertia, load, acting.body, R.row_z, k.gravity);
@@ -355,7 +373,13 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
   com_m = add_scaled(com_m, k.step, x.com_velocity_m_s);
   x.attitude = turned(x.attitude, k.half_step * x.body_rate_rad_s);
   feel(p, x, pose, acting.air, force.z, k.step, held);
-  if constexpr (with_effects) remember(effects, acting);
+  if constexpr (with_effects) {
+    const auto& [left, right] = acting.s.figures;
+    *effects.more_J +=
+        extra_work_J(acting.hinges.left, left, voltages.left_V, x.left.stroke_rate_rad_s, slip_left, k.step) +
+        extra_work_J(acting.hinges.right, right, voltages.right_V, x.right.stroke_rate_rad_s, slip_right, k.step);
+    remember(effects, acting);
+  }
 }
 
 }  // namespace FLAPPY_ISA

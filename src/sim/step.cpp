@@ -108,6 +108,29 @@ FLAPPY_INLINE State<L> where(typename L::Mask m, State<L> yes, const State<L>& n
   return yes;
 }
 
+/// What motors draw while the driver holds its voltage: V i over the steps is, as a stroke advances by h psi' of its end,
+///   sum of V (V - K N psi')/R h = V (V T - K N (psi_end - psi_begin))/R
+/// without a look at the steps between.
+template <class L>
+class EnergyMeter {
+ public:
+  explicit EnergyMeter(const State<L>& x) : left_rad_(x.left.stroke_rad), right_rad_(x.right.stroke_rad) {}
+  /// After `seconds` at these voltages.
+  FLAPPY_INLINE void read(const Parameters<L>& p, const State<L>& x, const Voltages<L>& u, const L& seconds) {
+    const auto work = [&](const SideParameters<L>& side, const L& volt, const L& turned_rad) {
+      return L(volt * L(side.conductance_S * L(volt * seconds) - side.emf_current_A_s * turned_rad));
+    };
+    energy_J += work(p.left, u.left_V, L(x.left.stroke_rad - left_rad_)) +
+                work(p.right, u.right_V, L(x.right.stroke_rad - right_rad_));
+    left_rad_ = x.left.stroke_rad;
+    right_rad_ = x.right.stroke_rad;
+  }
+  L energy_J{0.0};
+
+ private:
+  L left_rad_, right_rad_;
+};
+
 /// Fetches a block from memory, a share with every step.
 class Prefetch {
  public:
@@ -127,12 +150,14 @@ class Prefetch {
 
 /// Back from the centre of mass to the torso; contact, plausibility, rows.
 template <class T, class L>
-FLAPPY_INLINE void finish(State<L> x, const Vec3<L>& com_m, const Voltages<L>& voltages, const Parameters<L>& p,
-                          const StepPlan& plan, Block<T>& block, int first) {
+FLAPPY_INLINE void finish(State<L> x, const Vec3<L>& com_m, const Voltages<L>& voltages, const L& energy_J,
+                          const Parameters<L>& p, const StepPlan& plan, Block<T>& block, int first) {
   x.position_m = where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
   look_around(x, p, plan, block, first);
   const typename L::Mask moves = freeze_implausible(x, block, first);
   store_rows(where(moves, x, load_rows<State<L>>(block.state, first)), block.state, first);
+  for (int i = 0; i < kWidth<T>; ++i)
+    if (moves.raw[i]) block.energy_J[first + i] += static_cast<double>(energy_J.raw[i]);
   auto drive = load_rows<Drive<L>>(block.drive, first);
   drive.voltages = voltages;
   store_rows(drive, block.drive, first);
@@ -157,11 +182,18 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     const auto& p = view_rows<Parameters<L>>(block.parameters, first);
     auto x = load_rows<State<L>>(block.state, first);
     Voltages<L> voltages = load_rows<Drive<L>>(block.drive, first).voltages;
+    EnergyMeter<L> meter(x);
+    int held = 0;  // steps since the meter was read
+    const auto measure = [&] {
+      meter.read(p, x, voltages, L(held * plan.step_s));
+      held = 0;
+    };
     ActiveEffects<L> effects;
     Parameters<L> own;
     if constexpr (with_effects) {
       own = p;
       effects.own = &own;
+      effects.more_J = &meter.energy_J;
       effects.set = in_force.set;
       effects.kept = in_force.kept;
       effects.states = in_force.states + first;
@@ -177,15 +209,18 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     std::int64_t until_update = (plan.steps_per_update - first_step % plan.steps_per_update) % plan.steps_per_update;
     for (int i = 0; i < steps; ++i, --until_update) {
       if (until_update == 0) {
+        measure();
         voltages = recorded_V != nullptr ? next_recorded<T, L>(recorded_V, first)
                                          : update_driver(block, p.left, p.right, first);
         until_update = plan.steps_per_update;
       }
       prefetch.step();
       physics_step<with_effects>(p, x, voltages, com_m, effects, k);
+      ++held;
       if (with_effects && effects.meter != nullptr) effects.meter += kMeterRows * kLanes<T>;
     }
-    finish(x, com_m, voltages, p, plan, block, first);
+    measure();
+    finish(x, com_m, voltages, meter.energy_J, p, plan, block, first);
     if constexpr (with_effects) forget_frozen(in_force, block, first);
   }
 }

@@ -231,24 +231,27 @@ TEST(Evaluator, AgreesWithAFlightAndItsLog) {
   EXPECT_EQ(o.captured_s > 0, !flown.capture_s.empty());
   EXPECT_EQ(o.success(), flown.successes == 1);
 
-  // Each voltage from its command to the next, the wing's speed half-way between from those of the true states around it:
-  // the log has all digits, sums of 350 doubles differ by their order alone.
+  // V^2 T - K N V (psi_end - psi_begin), over R, for each voltage of 1 ms: the log has strokes every 2 ms, of which the second half is
+  // longer by psi'' T^2 = (psi'_end - psi'_begin) T/2; what psi'' changes within is of second order in that difference, which itself is
+  // below a tenth of the stroke.
   const io::CsvTable truth = io::read_csv(folder / "log" / "truth.csv"),
                      command = io::read_csv(folder / "log" / "command.csv");
   const model::Vehicle vehicle = config.vehicle_of(12);
   double energy_J = 0;
   for (const auto& [side, motor] : {std::pair{"left", vehicle.left.motor}, std::pair{"right", vehicle.right.motor}}) {
     const auto &rate = truth.column(side + std::string("_stroke_rate_rad_s")),
+               &stroke = truth.column(side + std::string("_stroke_rad")),
                &volt = command.column(side + std::string("_voltage_V"));
     for (std::size_t k = 0; k < 350; ++k) {  // 1 ms each
       ASSERT_NEAR(command.column("t_s")[k], 0.001 * static_cast<double>(k), 1e-9);
-      const double share = k % 2 == 0 ? 0.25 : 0.75, speed = rate[k / 2] + share * (rate[k / 2 + 1] - rate[k / 2]);
+      const double more = 0.001 / 4 * (rate[k / 2 + 1] - rate[k / 2]);
+      const double turned = (stroke[k / 2 + 1] - stroke[k / 2]) / 2 + (k % 2 == 0 ? -more : more);
       energy_J +=
-          0.001 * volt[k] * (volt[k] - motor.torque_constant_Nm_A * motor.gear_ratio * speed) / motor.resistance_ohm;
+          volt[k] * (volt[k] * 0.001 - motor.torque_constant_Nm_A * motor.gear_ratio * turned) / motor.resistance_ohm;
     }
   }
   EXPECT_GT(energy_J, 0.5);
-  EXPECT_NEAR(o.energy_J / energy_J, 1, 1e-9);
+  EXPECT_NEAR(o.energy_J / energy_J, 1, 1e-3);
 }
 
 TEST(Evaluator, FliesTheNominalVehicleFromTheMiddle) {
