@@ -47,14 +47,14 @@ class Escaper {
     const bool begun = t_s > -kControl_s / 2;
     if (begun && tick_ > 0) judge(torso, seen, t_s);
     const flight::Pid<double> before = pid_;
-    model::WingBeat<double> u = flight::control(rules_.controller, pid_, seen, begun ? goal_ : start_);
+    model::WingBeat<double> u = flight::PidController::update(rules_.controller, pid_, seen, begun ? goal_ : start_);
     if (begun) {
-      const model::WingBeat<double> learnt = trim(rules_.controller, before);
+      const model::WingBeat<double> learnt = flight::PidController::trim(rules_.controller, before);
       if (episode_.handed_back == 0) {
         if (tick_ % rules_.task.hold == 0) act(seen, beat, t_s, learnt);
         if (rules_.constants.holds_trim > 0) {
           u = learnt;
-          flight::unlearn(true, before, pid_);
+          flight::PidController::unlearn(true, before, pid_);
         }
       }
       u = flight::add_action(episode_, u);

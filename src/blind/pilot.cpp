@@ -133,7 +133,7 @@ Inputs Pilot::steer(const Torso& torso, const Aim& aim, const Inputs& excitation
   wanted.acceleration_m_s2 = vec3(aim.acceleration_m_s2);
   wanted.heading = {heading.sin, heading.cos};
   wanted.heading_rate_rad_s = aim.heading_rad_s;
-  const auto u = flight::control(m.constants, m.pid, seen, wanted);
+  const auto u = flight::PidController::update(m.constants, m.pid, seen, wanted);
   return clipped({u.amplitude_V + excitation.amplitude_V, u.difference_V + excitation.difference_V,
                   u.bias_V + excitation.bias_V, u.split_cycle + excitation.split_cycle},
                  m.driver);

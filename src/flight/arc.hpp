@@ -27,7 +27,7 @@ struct Adapted {
 };
 
 template <class T>
-struct ArcConstants {
+struct ArcConstants : LoopConstants<T> {
   Sliding<T> horizontal, height, heading;
   T position_error_limit_m, velocity_error_limit_m_s, yaw_error_limit_rad;
   Adapted<T> mass_kg, roll_Nm, pitch_Nm, yaw_Nm, disturbance_m_s2;
@@ -37,8 +37,6 @@ struct ArcConstants {
   T inertia_x_kg_m2, inertia_y_kg_m2, inertia_z_kg_m2;
   T initial_mass_kg, amplitude_low_V, amplitude_high_V;
   T difference_limit_V, bias_limit_V, split_cycle_limit;
-  T velocity_share, rate_share;
-  T period_s, gravity_m_s2;
 };
 
 inline namespace FLAPPY_ISA {
@@ -52,23 +50,6 @@ struct Arc {
   Vec3<T> velocity_m_s, body_rate_rad_s;  // low-passed
 };
 
-/// The inputs that its adaptation has learnt: those of a settled vehicle.
-template <class T>
-FLAPPY_INLINE WingBeat<T> trim(const ArcConstants<Element<T>>& k, const Arc<T>& m) {
-  const T weight = T(k.gravity_m_s2) * where(m.mass_kg > T(0), m.mass_kg, T(k.initial_mass_kg));
-  return {weight / T(k.thrust_N_V) + T(k.thrust_offset_V), -T(m.roll_Nm / T(k.roll_Nm_V)),
-          -T(m.pitch_Nm / T(k.pitch_Nm_V)), -T(m.yaw_Nm / T(k.yaw_Nm_split))};
-}
-
-/// Takes back what it learnt in the last period, but for its low-passes and prediction, where `held`.
-template <class T>
-FLAPPY_INLINE void unlearn(auto held, const Arc<T>& before, Arc<T>& now) {
-  constexpr T Arc<T>::*kLearnt[] = {
-      &Arc<T>::mass_kg,           &Arc<T>::roll_Nm, &Arc<T>::pitch_Nm, &Arc<T>::yaw_Nm, &Arc<T>::disturbance_x_m_s2,
-      &Arc<T>::disturbance_y_m_s2};
-  for (const auto learnt : kLearnt) now.*learnt = where(held, before.*learnt, now.*learnt);
-}
-
 /// Projected adaptation; it stands still while it would push an input further past its limit.
 template <class T, class K>
 FLAPPY_INLINE T adapted(const Adapted<K>& k, const T& value, const T& rate, const T& period, const T& blocked_towards) {
@@ -76,9 +57,96 @@ FLAPPY_INLINE T adapted(const Adapted<K>& k, const T& value, const T& rate, cons
   return where(rate * blocked_towards > T(0), value, moved);
 }
 
+/// Its table of functions (controllers.hpp).
+struct ArcController {
+  static constexpr const char* kName = "arc";
+  template <class T>
+  using Constants = ArcConstants<T>;
+  template <class T>
+  using Memory = Arc<T>;
+
+  static void fields(ArcConstants<double>& k, const auto& add);
+
+  template <class T>
+  static void start(Arc<T>& m, const Estimate<T>& x) {
+    m.predicted_x_m_s = x.velocity_m_s.x;
+    m.predicted_y_m_s = x.velocity_m_s.y;
+    m.velocity_m_s = x.velocity_m_s;
+    m.body_rate_rad_s = x.body_rate_rad_s;
+  }
+
+  /// The inputs that its adaptation has learnt.
+  template <class T>
+  static FLAPPY_INLINE WingBeat<T> trim(const ArcConstants<Element<T>>& k, const Arc<T>& m) {
+    const T weight = T(k.gravity_m_s2) * where(m.mass_kg > T(0), m.mass_kg, T(k.initial_mass_kg));
+    return {weight / T(k.thrust_N_V) + T(k.thrust_offset_V), -T(m.roll_Nm / T(k.roll_Nm_V)),
+            -T(m.pitch_Nm / T(k.pitch_Nm_V)), -T(m.yaw_Nm / T(k.yaw_Nm_split))};
+  }
+
+  /// Low-passes and prediction go on.
+  template <class T>
+  static FLAPPY_INLINE void unlearn(auto held, const Arc<T>& before, Arc<T>& now) {
+    constexpr T Arc<T>::*kLearnt[] = {
+        &Arc<T>::mass_kg,           &Arc<T>::roll_Nm, &Arc<T>::pitch_Nm, &Arc<T>::yaw_Nm, &Arc<T>::disturbance_x_m_s2,
+        &Arc<T>::disturbance_y_m_s2};
+    for (const auto learnt : kLearnt) now.*learnt = where(held, before.*learnt, now.*learnt);
+  }
+
+  template <class T>
+  static void rotate_z(const T& sin, const T& cos, Arc<T>& m) {
+    const Vec3<T> push = turn_z(sin, cos, Vec3<T>{m.disturbance_x_m_s2, m.disturbance_y_m_s2, T(0)});
+    const Vec3<T> predicted = turn_z(sin, cos, Vec3<T>{m.predicted_x_m_s, m.predicted_y_m_s, T(0)});
+    m.disturbance_x_m_s2 = push.x, m.disturbance_y_m_s2 = push.y;
+    m.predicted_x_m_s = predicted.x, m.predicted_y_m_s = predicted.y;
+    m.velocity_m_s = turn_z(sin, cos, m.velocity_m_s);
+  }
+
+  template <class T>
+  static FLAPPY_INLINE WingBeat<T> update(const ArcConstants<Element<T>>& k, Arc<T>& m, const Estimate<T>& x,
+                                          const Setpoint<T>& ref);
+};
+
+void ArcController::fields(ArcConstants<double>& k, const auto& add) {
+  const auto sliding = [&](const std::string& path, Sliding<double>& s) {
+    add(path + ".lambda_1_s", s.lambda_1_s, io::non_negative(1000));
+    add(path + ".k_1_s", s.k_1_s, io::non_negative(1000));
+  };
+  const auto adapted = [&](const std::string& path, Adapted<double>& a) {
+    add(path + ".gain", a.gain, io::non_negative(1e6));
+    add(path + ".low", a.low, io::Range{-1e3, 1e3});
+    add(path + ".high", a.high, io::Range{-1e3, 1e3});
+  };
+  sliding("horizontal", k.horizontal);
+  sliding("height", k.height);
+  sliding("heading", k.heading);
+  add("limits.position_error_m", k.position_error_limit_m, io::positive(100));
+  add("limits.velocity_error_m_s", k.velocity_error_limit_m_s, io::positive(100));
+  add("limits.yaw_error_rad", k.yaw_error_limit_rad, io::positive(3.2));
+  adapted("adapted.mass_kg", k.mass_kg);
+  adapted("adapted.roll_Nm", k.roll_Nm);
+  adapted("adapted.pitch_Nm", k.pitch_Nm);
+  adapted("adapted.yaw_Nm", k.yaw_Nm);
+  adapted("adapted.disturbance_m_s2", k.disturbance_m_s2);
+  add("adapted.initial_mass_kg", k.initial_mass_kg, io::positive(1));
+  add("adapted.predictor_1_s", k.predictor_1_s, io::non_negative(1000));
+  add("force_map.thrust_N_V", k.thrust_N_V, io::positive(1));
+  add("force_map.thrust_offset_V", k.thrust_offset_V, io::Range{-18, 18});
+  add("force_map.roll_Nm_V", k.roll_Nm_V, io::positive(1));
+  add("force_map.pitch_Nm_V", k.pitch_Nm_V, io::positive(1));
+  add("force_map.yaw_Nm_split", k.yaw_Nm_split, io::positive(1));
+  add("inertia.x_kg_m2", k.inertia_x_kg_m2, io::positive(1));
+  add("inertia.y_kg_m2", k.inertia_y_kg_m2, io::positive(1));
+  add("inertia.z_kg_m2", k.inertia_z_kg_m2, io::positive(1));
+  add("limits.amplitude_low_V", k.amplitude_low_V, io::non_negative(18));
+  add("limits.amplitude_high_V", k.amplitude_high_V, io::non_negative(18));
+  add("limits.difference_V", k.difference_limit_V, io::positive(18));
+  add("limits.bias_V", k.bias_limit_V, io::positive(18));
+  add("limits.split_cycle", k.split_cycle_limit, io::positive(0.4));
+}
+
 template <class T>
-FLAPPY_INLINE WingBeat<T> control(const ArcConstants<Element<T>>& k, Arc<T>& m, const Estimate<T>& x,
-                                  const Setpoint<T>& ref) {
+FLAPPY_INLINE WingBeat<T> ArcController::update(const ArcConstants<Element<T>>& k, Arc<T>& m, const Estimate<T>& x,
+                                                const Setpoint<T>& ref) {
   const T dt(k.period_s), g(k.gravity_m_s2);
   const Matrix3<T> R = rotation_matrix(x.attitude);
   const SinCos<T> yaw = heading_of(R);

@@ -69,11 +69,11 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
 /// What the controller has learnt to hold; nothing without one.
 template <class T>
 FLAPPY_INLINE WingBeat<L<T>> learnt_trim(const FlightBlock<T>& f, const FlightPlan<T>& plan, int first) {
-  if (plan.controller == static_cast<int>(Controller::Kind::pid))
-    return trim(plan.pid, load_rows<Pid<L<T>>>(f.controller, first));
-  if (plan.controller == static_cast<int>(Controller::Kind::arc))
-    return trim(plan.arc, load_rows<Arc<L<T>>>(f.controller, first));
-  return {L<T>(0), L<T>(0), L<T>(0), L<T>(0)};
+  WingBeat<L<T>> trim{L<T>(0), L<T>(0), L<T>(0), L<T>(0)};
+  with_controller(plan.controller_kind, [&]<class C>(C) {
+    trim = C::trim(plan.controller.template of<C>(), load_rows<typename C::template Memory<L<T>>>(f.controller, first));
+  });
+  return trim;
 }
 
 /// Policy and controller set the inputs of the wing beat.
@@ -86,21 +86,20 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   const auto ref = setpoint(f, plan, first);
   const L<T> zero(0);
   WingBeat<L<T>> base{zero, zero, zero, zero};
-  const auto fly = [&]<template <class> class Memory>(const auto& constants, Memory<L<T>>) {
-    const auto before = load_rows<Memory<L<T>>>(f.controller, first);
+  with_controller(plan.controller_kind, [&]<class C>(C) {
+    const auto& constants = plan.controller.template of<C>();
+    const auto before = load_rows<typename C::template Memory<L<T>>>(f.controller, first);
     auto memory = before;
-    base = control(constants, memory, estimate, ref);
+    base = C::update(constants, memory, estimate, ref);
     if (plan.task.holds_trim > 0) {
       const auto held = episode.handed_back <= zero;
-      const WingBeat<L<T>> learnt = trim(constants, before);
+      const WingBeat<L<T>> learnt = C::trim(constants, before);
       base = {where(held, learnt.amplitude_V, base.amplitude_V), where(held, learnt.difference_V, base.difference_V),
               where(held, learnt.bias_V, base.bias_V), where(held, learnt.split_cycle, base.split_cycle)};
-      unlearn(held, before, memory);
+      C::unlearn(held, before, memory);
     }
     store_rows(memory, f.controller, first);
-  };
-  if (plan.controller == static_cast<int>(Controller::Kind::pid)) fly(plan.pid, Pid<L<T>>{});
-  else if (plan.controller == static_cast<int>(Controller::Kind::arc)) fly(plan.arc, Arc<L<T>>{});
+  });
   auto drive = load_rows<sim::Drive<L<T>>>(s.body.drive, first);
   drive.input = add_action(episode, base);
   store_rows(drive, s.body.drive, first);

@@ -32,18 +32,13 @@ FlightConstants flight_constants(const FleetOptions& options) {
        square(s.mocap.position_noise_m),
        gravity,
        {at.x, at.y, at.z}},
-      c.pid,
-      c.arc,
+      c.constants,
       options.task.constants};
-  const auto fill = [&](auto& constants) {
-    constants.velocity_share = low_pass_share(c.velocity_low_pass_hz, period_s);
-    constants.rate_share = low_pass_share(c.body_rate_low_pass_hz, period_s);
-    constants.period_s = period_s;
-    constants.gravity_m_s2 = gravity;
-  };
-  fill(k.pid);
-  k.pid.per_period_Hz = 1 / period_s;
-  fill(k.arc);
+  with_controller(c.kind, [&]<class C>(C) {
+    static_cast<LoopConstants<double>&>(k.controller.of<C>()) = {low_pass_share(c.velocity_low_pass_hz, period_s),
+                                                                 low_pass_share(c.body_rate_low_pass_hz, period_s),
+                                                                 period_s, 1 / period_s, gravity};
+  });
   TaskConstants<double>& task = k.task;
   task.tick_s = period_s;
   // half-way between ticks, so that rounding cannot move an end by one

@@ -20,8 +20,7 @@ struct FlightConstants {
   ImuConstants<double> imu;
   MocapConstants<double> mocap;
   FusionConstants<double> fusion;
-  PidConstants<double> pid;
-  ArcConstants<double> arc;
+  ControllerConstants<double> controller;
   TaskConstants<double> task;
 };
 

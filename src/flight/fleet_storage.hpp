@@ -82,11 +82,8 @@ struct Fleet<T>::Storage {
     plan.imu = rounded<T>(k.imu);
     plan.mocap = rounded<T>(k.mocap);
     plan.fusion = rounded<T>(k.fusion);
-    options.controller.pid = k.pid;
-    options.controller.arc = k.arc;
-    plan.controller = static_cast<int>(options.controller.kind);
-    plan.pid = rounded<T>(k.pid);
-    plan.arc = rounded<T>(k.arc);
+    plan.controller_kind = options.controller.kind;
+    plan.controller = rounded<T>(k.controller);
     plan.task = rounded<T>(k.task);
     plan.parts = options.task.parts;
     plan.hold = options.task.hold;
@@ -135,6 +132,16 @@ struct Fleet<T>::Storage {
   double scaled(int k, double action) const {
     using L = model::Lanes<T, 1>;
     return L(scaled_action(plan.task, k, L(action))).raw[0];
+  }
+
+  /// Calls `change(table of functions, memory)` for the controller of flapper `i`; not at all where there is none.
+  void change_controller(std::size_t i, const auto& change) {
+    const auto [f, lane] = at(i);
+    with_controller(options.controller.kind, [&, &f = f, lane = lane]<class C>(C table) {
+      auto memory = get<typename C::template Memory<double>>(f.controller, lane);
+      change(table, memory);
+      put(memory, f.controller, lane);
+    });
   }
 
   /// Calls `add(time taken, sample)` for what the tap holds of flapper `i`; `taken`: by which slices.
@@ -203,10 +210,8 @@ void Fleet<T>::Storage::observe_as(std::size_t i, const Estimate<double>& x, T* 
   using L = model::Lanes<T, 1>;
   const auto [f, lane] = at(i);
   WingBeat<L> learnt{L(0), L(0), L(0), L(0)};
-  if (options.controller.kind == Controller::Kind::pid)
-    learnt = trim(plan.pid, rounded<L>(get<Pid<double>>(f.controller, lane)));
-  else if (options.controller.kind == Controller::Kind::arc)
-    learnt = trim(plan.arc, rounded<L>(get<Arc<double>>(f.controller, lane)));
+  change_controller(
+      i, [&]<class C>(C, auto& memory) { learnt = C::trim(plan.controller.template of<C>(), rounded<L>(memory)); });
   std::uint32_t segment = f.segment[lane];
   const auto ref = setpoint_at<L>(plan.path, &f.tick[lane], &segment);
   const T fraction = model::beat_fraction<T>(batch.storage().at(i).block.phase[lane]);
@@ -228,19 +233,7 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const sim::F
   const auto [f, lane] = at(i);
   const auto x = get<Estimate<double>>(f.estimate, lane);
   for (auto& row : f.controller) row[lane] = 0;
-  if (options.controller.kind == Controller::Kind::pid) {
-    Pid<double> pid{};
-    pid.velocity_m_s = x.velocity_m_s;
-    pid.body_rate_rad_s = x.body_rate_rad_s;
-    put(pid, f.controller, lane);
-  } else if (options.controller.kind == Controller::Kind::arc) {
-    Arc<double> arc{};
-    arc.predicted_x_m_s = x.velocity_m_s.x;
-    arc.predicted_y_m_s = x.velocity_m_s.y;
-    arc.velocity_m_s = x.velocity_m_s;
-    arc.body_rate_rad_s = x.body_rate_rad_s;
-    put(arc, f.controller, lane);
-  }
+  change_controller(i, [&]<class C>(C, auto& memory) { C::start(memory, x); });
   show(i);
 }
 
@@ -304,22 +297,7 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   fusion.covariance.gyro_bias = learnt.covariance.gyro_bias;
   fusion.covariance.accel_bias = learnt.covariance.accel_bias;
   put(fusion, f.fusion, lane);
-  if (options.controller.kind == Controller::Kind::pid) {
-    auto pid = get<Pid<double>>(f.controller, lane);
-    const Vec3<double> integral = turned_z({pid.integral_x, pid.integral_y, 0});
-    pid.integral_x = integral.x;
-    pid.integral_y = integral.y;
-    pid.velocity_m_s = turned_z(pid.velocity_m_s);
-    put(pid, f.controller, lane);
-  } else if (options.controller.kind == Controller::Kind::arc) {
-    auto arc = get<Arc<double>>(f.controller, lane);
-    const Vec3<double> push = turned_z({arc.disturbance_x_m_s2, arc.disturbance_y_m_s2, 0});
-    const Vec3<double> predicted = turned_z({arc.predicted_x_m_s, arc.predicted_y_m_s, 0});
-    arc.disturbance_x_m_s2 = push.x, arc.disturbance_y_m_s2 = push.y;
-    arc.predicted_x_m_s = predicted.x, arc.predicted_y_m_s = predicted.y;
-    arc.velocity_m_s = turned_z(arc.velocity_m_s);
-    put(arc, f.controller, lane);
-  }
+  change_controller(i, [&]<class C>(C, auto& memory) { C::rotate_z(turn.sin, turn.cos, memory); });
   show(i);
 }
 

@@ -1,7 +1,7 @@
 // What flies a block of flappers: one row for each number, beside the block of their bodies.
 #pragma once
 
-#include "flight/arc.hpp"
+#include "flight/controllers.hpp"
 #include "flight/episode.hpp"
 #include "flight/schedule.hpp"
 #include "policy/actor.hpp"
@@ -13,8 +13,6 @@ using sim::kLanes;
 
 inline constexpr int kImuRows = model::kRows<Imu>, kFusionRows = model::kRows<Fusion>, kTruthRows = model::kRows<Truth>;
 inline constexpr int kEstimateRows = model::kRows<Estimate>, kEpisodeRows = model::kRows<Episode>;
-inline constexpr int kPidRows = model::kRows<Pid>, kArcRows = model::kRows<Arc>;
-inline constexpr int kControllerRows = kPidRows > kArcRows ? kPidRows : kArcRows;
 inline constexpr int kIncrementRows = model::kRows<Increment>, kMocapRows = model::kRows<MocapSample>;
 inline constexpr int kImuSampleRows = model::kRows<ImuSample>;
 
@@ -73,9 +71,8 @@ struct FlightPlan {
   ImuConstants<T> imu;
   MocapConstants<T> mocap;
   FusionConstants<T> fusion;
-  int controller;  // a Controller::Kind
-  PidConstants<T> pid;
-  ArcConstants<T> arc;
+  int controller_kind;
+  ControllerConstants<T> controller;
   TaskConstants<T> task;
   std::uint32_t parts;  // observed
   PathView<T> path;

@@ -8,7 +8,11 @@
 // the low-passed velocity. Integrators are clamped, and stand still while what they drive is at its limit.
 #pragma once
 
+#include <string>
+
+#include "flight/controller_loop.hpp"
 #include "flight/path.hpp"
+#include "io/config.hpp"
 #include "model/wing_beat.hpp"
 
 namespace flappy::flight {
@@ -20,15 +24,13 @@ struct PidGains {
 };
 
 template <class T>
-struct PidConstants {
+struct PidConstants : LoopConstants<T> {
   T position_xy_1_s, position_z_1_s, speed_limit_m_s, climb_limit_m_s;
   PidGains<T> forward, left, up;  // m/s -> m/s^2, m/s^2, V
   T acceleration_limit_m_s2, roll_limit_rad, pitch_limit_rad, yaw_error_limit_rad;
   PidGains<T> roll, pitch, yaw;  // rad -> V, V, split cycle
   T hover_V, lower_V, upper_V;   // V_amp = hover_V + clip(.., lower_V, upper_V)
   T difference_limit_V, bias_limit_V, split_cycle_limit;
-  T velocity_share, rate_share;  // of a new value in the low-passed one
-  T period_s, per_period_Hz, gravity_m_s2;
 };
 
 inline namespace FLAPPY_ISA {
@@ -51,20 +53,6 @@ FLAPPY_INLINE SinCos<T> heading_of(const Matrix3<T>& R) {
   return {s * scale, c * scale};
 }
 
-/// The inputs that its integrators have learnt: those of a settled vehicle.
-template <class T>
-FLAPPY_INLINE WingBeat<T> trim(const PidConstants<Element<T>>& k, const Pid<T>& m) {
-  return {T(k.hover_V) + m.integral_z, m.integral_roll, m.integral_pitch, m.integral_yaw};
-}
-
-/// Takes back what it learnt in the last period, but for its low-passes, where `held`.
-template <class T>
-FLAPPY_INLINE void unlearn(auto held, const Pid<T>& before, Pid<T>& now) {
-  constexpr T Pid<T>::*kLearnt[] = {&Pid<T>::integral_x,    &Pid<T>::integral_y,     &Pid<T>::integral_z,
-                                    &Pid<T>::integral_roll, &Pid<T>::integral_pitch, &Pid<T>::integral_yaw};
-  for (const auto learnt : kLearnt) now.*learnt = where(held, before.*learnt, now.*learnt);
-}
-
 /// Adds to an integral in the unit of the output, within its limit, and not further out while `blocked`.
 template <class T>
 FLAPPY_INLINE T integrated(const T& integral, const T& gain_and_time, const T& error, const T& limit,
@@ -80,9 +68,81 @@ FLAPPY_INLINE T saturation(const T& value, const T& low, const T& high) {
   return where(value > high, T(1), where(value < low, T(-1), T(0)));
 }
 
+/// Its table of functions (controllers.hpp).
+struct PidController {
+  static constexpr const char* kName = "pid";
+  template <class T>
+  using Constants = PidConstants<T>;
+  template <class T>
+  using Memory = Pid<T>;
+
+  static void fields(PidConstants<double>& k, const auto& add);
+
+  template <class T>
+  static void start(Pid<T>& m, const Estimate<T>& x) {
+    m.velocity_m_s = x.velocity_m_s;
+    m.body_rate_rad_s = x.body_rate_rad_s;
+  }
+
+  /// The inputs that its integrators have learnt.
+  template <class T>
+  static FLAPPY_INLINE WingBeat<T> trim(const PidConstants<Element<T>>& k, const Pid<T>& m) {
+    return {T(k.hover_V) + m.integral_z, m.integral_roll, m.integral_pitch, m.integral_yaw};
+  }
+
+  /// Low-passes go on.
+  template <class T>
+  static FLAPPY_INLINE void unlearn(auto held, const Pid<T>& before, Pid<T>& now) {
+    constexpr T Pid<T>::*kLearnt[] = {&Pid<T>::integral_x,    &Pid<T>::integral_y,     &Pid<T>::integral_z,
+                                      &Pid<T>::integral_roll, &Pid<T>::integral_pitch, &Pid<T>::integral_yaw};
+    for (const auto learnt : kLearnt) now.*learnt = where(held, before.*learnt, now.*learnt);
+  }
+
+  template <class T>
+  static void rotate_z(const T& sin, const T& cos, Pid<T>& m) {
+    const Vec3<T> integral = turn_z(sin, cos, Vec3<T>{m.integral_x, m.integral_y, T(0)});
+    m.integral_x = integral.x;
+    m.integral_y = integral.y;
+    m.velocity_m_s = turn_z(sin, cos, m.velocity_m_s);
+  }
+
+  template <class T>
+  static FLAPPY_INLINE WingBeat<T> update(const PidConstants<Element<T>>& k, Pid<T>& m, const Estimate<T>& x,
+                                          const Setpoint<T>& ref);
+};
+
+void PidController::fields(PidConstants<double>& k, const auto& add) {
+  const auto gains = [&](const std::string& path, PidGains<double>& g) {
+    add(path + ".p", g.p, io::non_negative(1000));
+    add(path + ".i", g.i, io::non_negative(1000));
+    add(path + ".d", g.d, io::non_negative(1000));
+    add(path + ".integral_limit", g.integral_limit, io::non_negative(1000));
+  };
+  add("position.xy_1_s", k.position_xy_1_s, io::non_negative(100));
+  add("position.z_1_s", k.position_z_1_s, io::non_negative(100));
+  add("position.speed_limit_m_s", k.speed_limit_m_s, io::positive(100));
+  add("position.climb_limit_m_s", k.climb_limit_m_s, io::positive(100));
+  gains("velocity.forward", k.forward);
+  gains("velocity.left", k.left);
+  gains("velocity.up", k.up);
+  gains("attitude.roll", k.roll);
+  gains("attitude.pitch", k.pitch);
+  gains("attitude.yaw", k.yaw);
+  add("limits.acceleration_m_s2", k.acceleration_limit_m_s2, io::positive(100));
+  add("limits.roll_rad", k.roll_limit_rad, io::positive(1.5));
+  add("limits.pitch_rad", k.pitch_limit_rad, io::positive(1.5));
+  add("limits.yaw_error_rad", k.yaw_error_limit_rad, io::positive(3.2));
+  add("hover_V", k.hover_V, io::non_negative(18));
+  add("limits.amplitude_below_V", k.lower_V, io::Range{-18, 0});
+  add("limits.amplitude_above_V", k.upper_V, io::Range{0, 18});
+  add("limits.difference_V", k.difference_limit_V, io::positive(18));
+  add("limits.bias_V", k.bias_limit_V, io::positive(18));
+  add("limits.split_cycle", k.split_cycle_limit, io::positive(0.4));
+}
+
 template <class T>
-FLAPPY_INLINE WingBeat<T> control(const PidConstants<Element<T>>& k, Pid<T>& m, const Estimate<T>& x,
-                                  const Setpoint<T>& ref) {
+FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& k, Pid<T>& m, const Estimate<T>& x,
+                                                const Setpoint<T>& ref) {
   const T dt(k.period_s);
   const Matrix3<T> R = rotation_matrix(x.attitude);
   const SinCos<T> yaw = heading_of(R);

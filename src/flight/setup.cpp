@@ -49,101 +49,38 @@ Sensors read_sensors(const io::Table& table) {
   return s;
 }
 
-namespace {
-
-using List = std::vector<ControllerField>;
-
-void add_pid_gains(List& list, const std::string& path, PidGains<double>& g) {
-  list.push_back({path + ".p", &g.p, io::non_negative(1000)});
-  list.push_back({path + ".i", &g.i, io::non_negative(1000)});
-  list.push_back({path + ".d", &g.d, io::non_negative(1000)});
-  list.push_back({path + ".integral_limit", &g.integral_limit, io::non_negative(1000)});
-}
-
-void add_limits(List& list, auto& k) {
-  list.push_back({"limits.difference_V", &k.difference_limit_V, io::positive(18)});
-  list.push_back({"limits.bias_V", &k.bias_limit_V, io::positive(18)});
-  list.push_back({"limits.split_cycle", &k.split_cycle_limit, io::positive(0.4)});
-}
-
-List pid_fields(PidConstants<double>& k) {
-  List list = {{"position.xy_1_s", &k.position_xy_1_s, io::non_negative(100)},
-               {"position.z_1_s", &k.position_z_1_s, io::non_negative(100)},
-               {"position.speed_limit_m_s", &k.speed_limit_m_s, io::positive(100)},
-               {"position.climb_limit_m_s", &k.climb_limit_m_s, io::positive(100)}};
-  add_pid_gains(list, "velocity.forward", k.forward);
-  add_pid_gains(list, "velocity.left", k.left);
-  add_pid_gains(list, "velocity.up", k.up);
-  add_pid_gains(list, "attitude.roll", k.roll);
-  add_pid_gains(list, "attitude.pitch", k.pitch);
-  add_pid_gains(list, "attitude.yaw", k.yaw);
-  list.push_back({"limits.acceleration_m_s2", &k.acceleration_limit_m_s2, io::positive(100)});
-  list.push_back({"limits.roll_rad", &k.roll_limit_rad, io::positive(1.5)});
-  list.push_back({"limits.pitch_rad", &k.pitch_limit_rad, io::positive(1.5)});
-  list.push_back({"limits.yaw_error_rad", &k.yaw_error_limit_rad, io::positive(3.2)});
-  list.push_back({"hover_V", &k.hover_V, io::non_negative(18)});
-  list.push_back({"limits.amplitude_below_V", &k.lower_V, {-18, 0}});
-  list.push_back({"limits.amplitude_above_V", &k.upper_V, {0, 18}});
-  add_limits(list, k);
-  return list;
-}
-
-List arc_fields(ArcConstants<double>& k) {
-  List list;
-  const auto sliding = [&](const std::string& path, Sliding<double>& s) {
-    list.push_back({path + ".lambda_1_s", &s.lambda_1_s, io::non_negative(1000)});
-    list.push_back({path + ".k_1_s", &s.k_1_s, io::non_negative(1000)});
-  };
-  const auto adapted = [&](const std::string& path, Adapted<double>& a) {
-    list.push_back({path + ".gain", &a.gain, io::non_negative(1e6)});
-    list.push_back({path + ".low", &a.low, {-1e3, 1e3}});
-    list.push_back({path + ".high", &a.high, {-1e3, 1e3}});
-  };
-  sliding("horizontal", k.horizontal);
-  sliding("height", k.height);
-  sliding("heading", k.heading);
-  list.push_back({"limits.position_error_m", &k.position_error_limit_m, io::positive(100)});
-  list.push_back({"limits.velocity_error_m_s", &k.velocity_error_limit_m_s, io::positive(100)});
-  list.push_back({"limits.yaw_error_rad", &k.yaw_error_limit_rad, io::positive(3.2)});
-  adapted("adapted.mass_kg", k.mass_kg);
-  adapted("adapted.roll_Nm", k.roll_Nm);
-  adapted("adapted.pitch_Nm", k.pitch_Nm);
-  adapted("adapted.yaw_Nm", k.yaw_Nm);
-  adapted("adapted.disturbance_m_s2", k.disturbance_m_s2);
-  list.push_back({"adapted.initial_mass_kg", &k.initial_mass_kg, io::positive(1)});
-  list.push_back({"adapted.predictor_1_s", &k.predictor_1_s, io::non_negative(1000)});
-  list.push_back({"force_map.thrust_N_V", &k.thrust_N_V, io::positive(1)});
-  list.push_back({"force_map.thrust_offset_V", &k.thrust_offset_V, {-18, 18}});
-  list.push_back({"force_map.roll_Nm_V", &k.roll_Nm_V, io::positive(1)});
-  list.push_back({"force_map.pitch_Nm_V", &k.pitch_Nm_V, io::positive(1)});
-  list.push_back({"force_map.yaw_Nm_split", &k.yaw_Nm_split, io::positive(1)});
-  list.push_back({"inertia.x_kg_m2", &k.inertia_x_kg_m2, io::positive(1)});
-  list.push_back({"inertia.y_kg_m2", &k.inertia_y_kg_m2, io::positive(1)});
-  list.push_back({"inertia.z_kg_m2", &k.inertia_z_kg_m2, io::positive(1)});
-  list.push_back({"limits.amplitude_low_V", &k.amplitude_low_V, io::non_negative(18)});
-  list.push_back({"limits.amplitude_high_V", &k.amplitude_high_V, io::non_negative(18)});
-  add_limits(list, k);
-  return list;
-}
-
-}  // namespace
-
 std::vector<ControllerField> fields(Controller& c) {
-  List list;
-  if (c.kind == Controller::Kind::pid) list = pid_fields(c.pid);
-  if (c.kind == Controller::Kind::arc) list = arc_fields(c.arc);
-  if (c.kind != Controller::Kind::none) {
-    list.push_back({"low_pass.velocity_hz", &c.velocity_low_pass_hz, io::non_negative(1e4)});
-    list.push_back({"low_pass.body_rate_hz", &c.body_rate_low_pass_hz, io::non_negative(1e4)});
-  }
+  std::vector<ControllerField> list;
+  const auto add = [&](const std::string& path, double& value, io::Range range) {
+    list.push_back({path, &value, range});
+  };
+  with_controller(c.kind, [&]<class C>(C) {
+    C::fields(c.constants.of<C>(), add);
+    add("low_pass.velocity_hz", c.velocity_low_pass_hz, io::non_negative(1e4));
+    add("low_pass.body_rate_hz", c.body_rate_low_pass_hz, io::non_negative(1e4));
+  });
   return list;
+}
+
+std::string controller_name(int kind) {
+  std::string name = "none";
+  with_controller(kind, [&]<class C>(C) { name = C::kName; });
+  return name;
+}
+
+int controller_kind(const std::string& name) {
+  int kind = kNoController;
+  for (int i = 0; i < kControllers; ++i)
+    if (controller_name(i) == name) kind = i;
+  return kind;
 }
 
 Controller read_controller(const io::Table& table) {
   table.integer("schema", 1, 1);
-  const std::string kind = table.choice("kind", {"none", "pid", "arc"});
+  std::vector<std::string> names;
+  for (int i = kNoController; i < kControllers; ++i) names.push_back(controller_name(i));
   Controller c;
-  c.kind = kind == "pid" ? Controller::Kind::pid : kind == "arc" ? Controller::Kind::arc : Controller::Kind::none;
+  c.kind = controller_kind(table.choice("kind", names));
   for (const ControllerField& f : fields(c)) *f.value = table.number(f.path, f.range);
   table.finish();
   return c;

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "flappy/vehicle.hpp"
-#include "flight/arc.hpp"
+#include "flight/controllers.hpp"
 #include "io/config.hpp"
 
 namespace flappy::flight {
@@ -45,9 +45,8 @@ double low_pass_share(double cutoff_hz, double interval_s);
 double low_pass_lag_s(const ImuSensor& imu);
 
 struct Controller {
-  enum class Kind { none, pid, arc } kind = Kind::none;
-  PidConstants<double> pid{};
-  ArcConstants<double> arc{};
+  int kind = kNoController;  ///< of controllers.hpp
+  ControllerConstants<double> constants{};
   double velocity_low_pass_hz = 0, body_rate_low_pass_hz = 0;  ///< 0: none
 };
 
@@ -60,6 +59,9 @@ struct ControllerField {
 
 /// All numbers of a controller of its kind. Pointers live as long as the controller.
 std::vector<ControllerField> fields(Controller& controller);
+/// As configurations have it; "none" for kNoController, and the other way round.
+std::string controller_name(int kind);
+int controller_kind(const std::string& name);
 
 /// io::InputError where a key is missing, unknown or out of range.
 Sensors read_sensors(const io::Table& table);

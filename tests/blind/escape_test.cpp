@@ -22,7 +22,7 @@ Case identified() {
 EscapeRules shipped(Policy policy) {
   const rollout::FlyConfig config = rollout::read_fly_config(test::source_path("configs/fly/escape.toml"));
   const flight::FlightConstants k = flight::flight_constants(config.fleet);
-  return {config.fleet.task, k.task, k.pid, std::move(policy)};
+  return {config.fleet.task, k.task, k.controller.of<flight::PidController>(), std::move(policy)};
 }
 
 using Rows = std::vector<std::vector<double>>;

@@ -56,7 +56,7 @@ std::shared_ptr<const policy::Actor> actor(const Task& task) {
 FleetOptions options(const std::string& name) {
   const bool adaptive = name == "arc";
   Controller c;
-  c.kind = adaptive ? Controller::Kind::arc : Controller::Kind::pid;
+  c.kind = controller_kind(name);
   double gain = 0.5;
   for (ControllerField& f : fields(c)) {
     *f.value = std::min(std::max(gain, f.range.low + 0.01), f.range.high);
@@ -64,11 +64,12 @@ FleetOptions options(const std::string& name) {
   }
   c.velocity_low_pass_hz = 20, c.body_rate_low_pass_hz = 30;
   if (adaptive) {
-    c.arc.inertia_x_kg_m2 = c.arc.inertia_y_kg_m2 = 5e-6, c.arc.inertia_z_kg_m2 = 3e-6;
-    c.arc.roll_Nm_V = 1e-3, c.arc.pitch_Nm_V = 6e-4, c.arc.yaw_Nm_split = 4e-3, c.arc.thrust_N_V = 0.0165;
-    c.arc.initial_mass_kg = 0.0125, c.arc.mass_kg = {0.05, 0.008, 0.02};
-    for (auto* a : {&c.arc.roll_Nm, &c.arc.pitch_Nm, &c.arc.yaw_Nm}) *a = {1e-4, -1e-5, 1e-5};
-    c.arc.disturbance_m_s2 = {5, -0.5, 0.5};
+    ArcConstants<double>& k = c.constants.of<ArcController>();
+    k.inertia_x_kg_m2 = k.inertia_y_kg_m2 = 5e-6, k.inertia_z_kg_m2 = 3e-6;
+    k.roll_Nm_V = 1e-3, k.pitch_Nm_V = 6e-4, k.yaw_Nm_split = 4e-3, k.thrust_N_V = 0.0165;
+    k.initial_mass_kg = 0.0125, k.mass_kg = {0.05, 0.008, 0.02};
+    for (auto* a : {&k.roll_Nm, &k.pitch_Nm, &k.yaw_Nm}) *a = {1e-4, -1e-5, 1e-5};
+    k.disturbance_m_s2 = {5, -0.5, 0.5};
   }
   Sensors s;
   s.imu = {333, 0.0005, 90, {0.01, 0, -0.005}, 0.05235987755982989, 0.5, {0.02, 0.03, 0.015}};

@@ -45,7 +45,7 @@ PidConstants<double> pid_constants() {
 U once(const PidConstants<double>& k, const Estimate<double>& x, const Setpoint<double>& ref) {
   Pid<double> m{};
   m.velocity_m_s = x.velocity_m_s;
-  return control(k, m, x, ref);
+  return PidController::update(k, m, x, ref);
 }
 
 TEST(Pid, SignsAndGainsOfEveryChannel) {
@@ -140,7 +140,7 @@ TEST(Pid, IsTheSameInEveryHeadingAndAcrossPi) {
     const auto [x, ref] = busy(yaw);
     Pid<double> m{};
     U u{};
-    for (int i = 0; i < 100; ++i) u = control(k, m, x, ref);
+    for (int i = 0; i < 100; ++i) u = PidController::update(k, m, x, ref);
     return u;
   });
 }
@@ -189,14 +189,14 @@ TEST(Pid, IntegratesWithinItsLimitsInUnitsOfTheOutput) {
   Pid<double> m{};
   x.velocity_m_s = ahead(-0.2, 0.1, yaw - 0.1);
   x.velocity_m_s.z = -0.1;
-  for (int i = 0; i < 500; ++i) control(k, m, x, ref);  // 1 s of constant errors
+  for (int i = 0; i < 500; ++i) PidController::update(k, m, x, ref);  // 1 s of constant errors
   const auto forward = [&] { return m.integral_x * std::cos(yaw - 0.1) + m.integral_y * std::sin(yaw - 0.1); };
   const auto left = [&] { return m.integral_y * std::cos(yaw - 0.1) - m.integral_x * std::sin(yaw - 0.1); };
   EXPECT_NEAR(forward(), 0.5 * 0.2, 1e-9);
   EXPECT_NEAR(left(), -0.25 * 0.1, 1e-9);
   EXPECT_NEAR(m.integral_z, 2 * 0.1, 1e-9);
   EXPECT_NEAR(m.integral_yaw, std::min(0.1 * 0.1, 0.05), 1e-9);
-  for (int i = 0; i < 100000; ++i) control(k, m, x, ref);
+  for (int i = 0; i < 100000; ++i) PidController::update(k, m, x, ref);
   EXPECT_NEAR(forward(), 4, 1e-9);
   EXPECT_NEAR(left(), -3, 1e-9);
   EXPECT_NEAR(m.integral_z, 2, 1e-9);
@@ -213,7 +213,7 @@ TEST(Pid, DoesNotWindUp) {
   Setpoint<double> ref = here(0.3);
   ref.position_m = {1, 1, 1};
   Pid<double> m{};
-  for (int i = 0; i < 5000; ++i) control(k, m, level(), ref);
+  for (int i = 0; i < 5000; ++i) PidController::update(k, m, level(), ref);
   for (const double integral :
        {m.integral_x, m.integral_y, m.integral_z, m.integral_roll, m.integral_pitch, m.integral_yaw})
     EXPECT_NEAR(integral, 0, 0.02);  // no more than on the first tick
@@ -222,7 +222,7 @@ TEST(Pid, DoesNotWindUp) {
   ref.position_m = {0, 0, 0};
   Estimate<double> x = level();
   x.velocity_m_s = {0.1, 0.1, 0.1};
-  for (int i = 0; i < 500; ++i) control(k, m, x, ref);
+  for (int i = 0; i < 500; ++i) PidController::update(k, m, x, ref);
   EXPECT_NEAR(m.integral_x, 8 - 2 * 0.1, 1e-6);
   EXPECT_NEAR(m.integral_y, 8 - 2 * 0.1, 1e-6);
   EXPECT_NEAR(m.integral_z, 9 - 2 * 0.1, 1e-6);
@@ -233,9 +233,9 @@ TEST(Pid, DampsByTheVelocitysSlope) {
   k.up.d = 0.5, k.forward.d = 0.4;
   Pid<double> m{};
   Estimate<double> x = level();
-  control(k, m, x, here());
+  PidController::update(k, m, x, here());
   x.velocity_m_s = {0.002, 0, 0.002};  // 1 m/s^2
-  const U u = control(k, m, x, here());
+  const U u = PidController::update(k, m, x, here());
   EXPECT_NEAR(u.amplitude_V, 10 - 8 * 0.002 - 0.5, 1e-9);
   EXPECT_NEAR(u.bias_V, -5 * std::atan((3 * 0.002 + 0.4) / kGravity), 1e-9);
 }
@@ -286,7 +286,7 @@ ArcConstants<double> arc_constants() {
 U once(const ArcConstants<double>& k, const Estimate<double>& x, const Setpoint<double>& ref) {
   Arc<double> m{};
   m.predicted_x_m_s = x.velocity_m_s.x, m.predicted_y_m_s = x.velocity_m_s.y;
-  return control(k, m, x, ref);
+  return ArcController::update(k, m, x, ref);
 }
 
 TEST(Arc, SignsOfEveryChannel) {
@@ -328,7 +328,7 @@ TEST(Arc, IsTheSameInEveryHeadingAndTurnsTheShorterWay) {
     Arc<double> m{};
     m.predicted_x_m_s = x.velocity_m_s.x, m.predicted_y_m_s = x.velocity_m_s.y;
     U u{};
-    for (int i = 0; i < 100; ++i) u = control(k, m, x, ref);
+    for (int i = 0; i < 100; ++i) u = ArcController::update(k, m, x, ref);
     return u;
   });
   EXPECT_GT(once(k, level(M_PI - 0.05), here(-M_PI + 0.05)).split_cycle, 0);
@@ -342,12 +342,12 @@ TEST(Arc, AdaptsTowardsWhatItSeesWithinItsBounds) {
     x.position_m = {0.02 * sign, 0.02 * sign, -0.02 * sign};  // pushed forward, to the left, and down
     x.attitude = euler(0, 0, 0.02 * sign);
     Arc<double> m{};
-    for (int i = 0; i < 50; ++i) control(k, m, x, here());
+    for (int i = 0; i < 50; ++i) ArcController::update(k, m, x, here());
     EXPECT_GT(sign * m.pitch_Nm, 0);
     EXPECT_LT(sign * m.roll_Nm, 0);
     EXPECT_GT(sign * m.yaw_Nm, 0);
     EXPECT_GT(sign * (m.mass_kg - k.initial_mass_kg), 0);
-    for (int i = 0; i < 200000; ++i) control(k, m, x, here());
+    for (int i = 0; i < 200000; ++i) ArcController::update(k, m, x, here());
     EXPECT_EQ(m.pitch_Nm, sign * 3e-4);
     EXPECT_EQ(m.roll_Nm, -sign * 3e-4);
     EXPECT_EQ(m.yaw_Nm, sign * 3e-4);
@@ -355,11 +355,11 @@ TEST(Arc, AdaptsTowardsWhatItSeesWithinItsBounds) {
     Arc<double> d{};
     x = level();
     for (int i = 0; i < 50; ++i)
-      x.velocity_m_s = x.velocity_m_s + V{sign * 1e-3, -sign * 1e-3, 0}, control(k, d, x, here());
+      x.velocity_m_s = x.velocity_m_s + V{sign * 1e-3, -sign * 1e-3, 0}, ArcController::update(k, d, x, here());
     EXPECT_GT(sign * d.disturbance_x_m_s2, 0);
     EXPECT_LT(sign * d.disturbance_y_m_s2, 0);
     for (int i = 0; i < 20000; ++i)
-      x.velocity_m_s = x.velocity_m_s + V{sign * 0.1, -sign * 0.1, 0}, control(k, d, x, here());
+      x.velocity_m_s = x.velocity_m_s + V{sign * 0.1, -sign * 0.1, 0}, ArcController::update(k, d, x, here());
     EXPECT_EQ(d.disturbance_x_m_s2, sign * 2);
     EXPECT_EQ(d.disturbance_y_m_s2, -sign * 2);
   }
@@ -369,7 +369,7 @@ TEST(Arc, AdaptsTowardsWhatItSeesWithinItsBounds) {
   x.position_m = {0.3, 0.3, -0.3};
   x.attitude = euler(0, 0, 0.3);
   Arc<double> m{};
-  for (int i = 0; i < 1000; ++i) control(k, m, x, here());
+  for (int i = 0; i < 1000; ++i) ArcController::update(k, m, x, here());
   for (const double learnt : {m.pitch_Nm, m.roll_Nm, m.yaw_Nm}) EXPECT_EQ(learnt, 0);
   EXPECT_EQ(m.mass_kg, k.initial_mass_kg);
 }
@@ -396,7 +396,7 @@ TEST(Arc, SlidingErrorDecaysAsItSays) {
   const auto heading = [&] { return x.body_rate_rad_s.z + 5 * 2 * x.attitude.z; };
   const double sx = sliding(0), sy = sliding(1), sz = height(), sh = heading();
   for (int tick = 1; tick <= 150; ++tick) {
-    body.fly(x, control(k, m, x, here()), kPeriod_s);
+    body.fly(x, ArcController::update(k, m, x, here()), kPeriod_s);
     const double t = tick * kPeriod_s;
     if (tick % 25 != 0) continue;
     EXPECT_NEAR(sliding(0) / sx, std::exp(-7 * t), 0.03) << t;
@@ -404,7 +404,7 @@ TEST(Arc, SlidingErrorDecaysAsItSays) {
     EXPECT_NEAR(height() / sz, std::exp(-8 * t), 0.03) << t;
     EXPECT_NEAR(heading() / sh, std::exp(-9 * t), 0.03) << t;
   }
-  for (int tick = 0; tick < 2000; ++tick) body.fly(x, control(k, m, x, here()), kPeriod_s);
+  for (int tick = 0; tick < 2000; ++tick) body.fly(x, ArcController::update(k, m, x, here()), kPeriod_s);
   for (const double e : {x.position_m.x, x.position_m.y, x.position_m.z}) EXPECT_NEAR(e, 0, 1e-7);
 }
 
@@ -420,7 +420,7 @@ TEST(Arc, LeavesNoErrorUnderConstantTorquePushAndMass) {
   ref.position_m = {0.1, 0.2, 0.3};
   double farthest = 0;
   for (int tick = 0; tick < 30000; ++tick) {
-    body.fly(x, control(k, m, x, ref), kPeriod_s);
+    body.fly(x, ArcController::update(k, m, x, ref), kPeriod_s);
     farthest = std::max(farthest, std::sqrt(dot(x.position_m - ref.position_m, x.position_m - ref.position_m)));
   }
   EXPECT_LT(farthest, 1.5);

@@ -34,7 +34,7 @@ TEST(FlyConfig, OverridesReachTheFileTheyName) {
   EXPECT_EQ(c.vehicle.left.motor.resistance_ohm, 14);
   EXPECT_EQ(c.vehicle_sha256, "");
   EXPECT_EQ(c.fleet.sensors.mocap.loss_probability, 0.1);
-  EXPECT_EQ(c.fleet.controller.pid.pitch.p, 4.25);
+  EXPECT_EQ(c.fleet.controller.constants.of<PidController>().pitch.p, 4.25);
   EXPECT_EQ(c.fleet.task.constants.limits.time_s, 7);
   EXPECT_EQ(c.fleet.seed, 9u);
   ASSERT_EQ(c.fleet.batch.world.walls.size(), 1u);
@@ -42,8 +42,8 @@ TEST(FlyConfig, OverridesReachTheFileTheyName) {
 
   const rollout::FlyConfig arc =
       rollout::read_fly_config(kHover, {"controller=../controllers/arc.toml", "controller.heading.k_1_s=3"});
-  EXPECT_EQ(arc.fleet.controller.kind, Controller::Kind::arc);
-  EXPECT_EQ(arc.fleet.controller.arc.heading.k_1_s, 3);
+  EXPECT_EQ(arc.fleet.controller.kind, kind_of<ArcController>());
+  EXPECT_EQ(arc.fleet.controller.constants.of<ArcController>().heading.k_1_s, 3);
 
   const rollout::FlyConfig random = rollout::read_fly_config(kHover, {"randomisation=../randomisation/published.toml"});
   EXPECT_EQ(random.vehicle_sha256, "");

@@ -66,12 +66,13 @@ class OwnFlight {
       for (int k = 0; k < 6; ++k) goal.coefficients[i][k] = static_cast<float>(task.path[0].coefficients[i][k]);
     const flight::PathView<float> path{&goal, 1, static_cast<float>(fleet_.period_s())};
     const auto ref = flight::setpoint_at<L>(path, f.tick, f.segment);
-    const auto pid = flight::rounded<float>(flight::flight_constants(fleet_.options()).pid);
+    const auto pid =
+        flight::rounded<float>(flight::flight_constants(fleet_.options()).controller.of<flight::PidController>());
     L row[flight::kMaxObservation];
     const int rows =
         flight::observe(task.parts, lanes_of<flight::Estimate>(f.estimate), ref, lanes_of<flight::Episode>(f.episode),
                         L(model::beat_fraction<float>(fleet_.snapshot(0).phase)), L(0),
-                        flight::trim(pid, lanes_of<flight::Pid>(f.controller)), row);
+                        flight::PidController::trim(pid, lanes_of<flight::Pid>(f.controller)), row);
     for (int i = 0; i < rows; ++i) f.observation[i][0] = row[i].raw[0];
   }
   Fleet<float>& fleet() { return fleet_; }

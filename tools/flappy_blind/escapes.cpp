@@ -65,13 +65,13 @@ EscapeRules rules_of(const EscapeOptions& o) {
   if (kind == ".json") overrides.push_back("actor=" + io::toml_string(fs::absolute(path).string()));
   const rollout::FlyConfig config = rollout::read_fly_config(o.config, overrides);
   const flight::FleetOptions& fleet = config.fleet;
-  if (fleet.controller.kind != flight::Controller::Kind::pid || fleet.task.path.size() != 1 ||
+  if (fleet.controller.kind != flight::kind_of<flight::PidController>() || fleet.task.path.size() != 1 ||
       fleet.task.constants.success.by_s <= 0 || std::abs(fleet.control_hz * kControl_s - 1) > 1e-9)
     throw io::InputError(o.config +
                          ": is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal "
                          "that stands still and a success");
   const flight::FlightConstants k = flight::flight_constants(fleet);
-  return {fleet.task, k.task, k.pid, policy_of(path, config)};
+  return {fleet.task, k.task, k.controller.of<flight::PidController>(), policy_of(path, config)};
 }
 
 rollout::Outcome outcome_of(const Escape& e) {

@@ -279,8 +279,7 @@ Json json_of(const Request& request, const FlyConfig& config, const std::vector<
 
 /// The controller of this name: the one that is flown with where it is of that kind.
 Controller controller_named(const std::string& name, const FlyConfig& config) {
-  const auto kind = name == "pid" ? Controller::Kind::pid : Controller::Kind::arc;
-  if (config.fleet.controller.kind == kind) return config.fleet.controller;
+  if (config.fleet.controller.kind == flight::controller_kind(name)) return config.fleet.controller;
   return flight::read_controller(io::Config::load(fs::path(FLAPPY_CONFIGS "/controllers") / (name + ".toml")).root());
 }
 

@@ -10,8 +10,7 @@
 namespace {
 
 std::string controller_text(flappy::flight::Controller c, const std::string& origin) {
-  std::string text = "# " + origin + "\nschema = 1\nkind = \"" +
-                     std::string(c.kind == flappy::flight::Controller::Kind::pid ? "pid" : "arc") + "\"\n";
+  std::string text = "# " + origin + "\nschema = 1\nkind = \"" + flappy::flight::controller_name(c.kind) + "\"\n";
   for (const auto& f : flappy::flight::fields(c)) {
     const std::string number = flappy::io::shortest_digits(*f.value);
     text += f.path + " = " + number + (number.find_first_of(".en") == std::string::npos ? ".0\n" : "\n");

@@ -58,7 +58,7 @@ class Constants {
 /// Members of flappy_controller_constants.
 void add_constants(const rollout::FlyConfig& config, Constants& to) {
   const flight::FlightConstants all = flight::flight_constants(config.fleet);
-  const auto k = flight::rounded<float>(all.pid);
+  const auto k = flight::rounded<float>(all.controller.of<flight::PidController>());
   const auto f = flight::rounded<float>(all.fusion);
   const auto task = flight::rounded<float>(all.task);
   const auto start = flight::rounded<float>(flight::start_covariance(config.fleet.sensors));
@@ -224,7 +224,7 @@ std::string about(const rollout::FlyConfig& config, const policy::RunInfo& run, 
 std::string controller_header(const rollout::FlyConfig& config, const policy::RunInfo& run,
                               const ControllerTrace& trace) {
   const flight::FleetOptions& o = config.fleet;
-  if (o.controller.kind != flight::Controller::Kind::pid)
+  if (o.controller.kind != flight::kind_of<flight::PidController>())
     throw io::InputError("controller: is none that can be exported; accepted: kind = \"pid\"");
   if (trace.ring.empty() || trace.imu.empty() || trace.frames.empty() || trace.updates.empty())
     throw io::InputError("controller: its test flight has no samples; accepted: sensors and a driver that are faster");

@@ -119,7 +119,7 @@ Seen fly_beside(const FlyConfig& config, std::size_t count, int periods, bool fe
     return rows(s.flight, offsetof(FlightBlock<float>, estimate), flight::kEstimateRows);
   };
   const auto pid_of = [](const auto& s) {
-    return rows(s.flight, offsetof(FlightBlock<float>, controller), flight::kPidRows);
+    return rows(s.flight, offsetof(FlightBlock<float>, controller), model::kRows<flight::Pid>);
   };
   for (std::size_t l = 0; l < all.size(); ++l)
     for (std::size_t i = 0; i < count; ++i) {
@@ -192,7 +192,8 @@ Seen fly_beside(const FlyConfig& config, std::size_t count, int periods, bool fe
             EXPECT_TRUE(c.pose(c.at(), zero_us + static_cast<std::uint32_t>(s.taken_us), s.valid, s.x.data()));
         const bool back = c.tick(c.at(), zero_us + static_cast<std::uint32_t>(end_us)) != 0;
         if (fail("hand-back", testing::AssertionResult(back == fleet.handed_back(i)))) return seen;
-        std::vector<float> estimator(flight::kFusionRows), estimate(flight::kEstimateRows), pid(flight::kPidRows);
+        std::vector<float> estimator(flight::kFusionRows), estimate(flight::kEstimateRows),
+            pid(model::kRows<flight::Pid>);
         c.state(c.at(), estimator.data(), estimate.data(), pid.data());
         if (fail("estimator", same_bits(estimator, estimator_of(now))) ||
             fail("estimate", same_bits(estimate, estimate_of(now))) || fail("PID", same_bits(pid, pid_of(now))))
