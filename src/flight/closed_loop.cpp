@@ -244,25 +244,13 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   for (int i = 0; i < kWidth<T>; ++i) time[i] = static_cast<T>(++f.tick[first + i]) * plan.task.tick_s;
   const auto ref = setpoint(f, plan, first);
   const auto score = score_of(truth, ref);
-  const Reward<T>& pays = plan.task.reward;
-  episode.reward = reward_of(pays, score, truth, episode);
   const L<T> now = L<T>::load(time);
   const auto estimate = load_rows<Estimate<L<T>>>(f.estimate, first);
   const bool by_estimate = plan.task.hand_back.on_estimate > 0;
   const auto done = by_estimate ? arrived(plan.task.hand_back, score_of(estimate, ref), estimate.body_rate_rad_s, now)
                                 : arrived(plan.task.hand_back, score, truth.body_rate_rad_s, now);
   note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode);
-  const auto flies_on = episode.handed_back > L<T>(0), captured = episode.captured_s > L<T>(0);
-  if (pays.goal != 0 || pays.arrival != 0) {
-    const L<T> just = where(done & !flies_on, L<T>(pays.arrival), L<T>(0));
-    episode.reward += L<T>(L<T>(pays.goal) + just) * closeness(pays, score, truth);
-  }
-  if (pays.until_s > 0) {
-    const auto then = (now > L<T>(pays.until_s)) & (now < L<T>(pays.until_s + plan.task.tick_s));
-    const auto kept = captured & (episode.lost_s == L<T>(0));
-    episode.reward += where(then & kept, L<T>(pays.kept), L<T>(0));
-    episode.reward = where(flies_on & !captured, L<T>(0), episode.reward);
-  }
+  episode.reward = reward_of(plan.task.reward, score, truth, now, L<T>(plan.task.tick_s), done, episode);
   episode.gain += episode.reward;
   episode.handed_back = where(done, L<T>(1), episode.handed_back);
   for (int i = 0; i < kActions; ++i) episode.previous[i] = episode.action[i];

@@ -61,8 +61,9 @@ FLAPPY_INLINE Score<T> score_of(const Truth<T>& t, const Setpoint<T>& ref) {
           facing / sqrt(max(T(facing * facing + aside * aside), T(1e-12)))};
 }
 
+/// What every period earns: the sum r in task.hpp, but for goal G.
 template <class T>
-FLAPPY_INLINE T reward_of(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t, const Episode<T>& e) {
+FLAPPY_INLINE T running_reward(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t, const Episode<T>& e) {
   T effort(0), change(0);
   for (int i = 0; i < kActions; ++i) {
     const T step = e.action[i] - e.previous[i];
@@ -82,11 +83,6 @@ FLAPPY_INLINE T reward_of(const Reward<Element<T>>& k, const Score<T>& s, const 
           T(k.near) / T(T(1) + T(k.near_1_m) * T(k.near_1_m) * dot(s.position_m, s.position_m)));
 }
 
-template <class T>
-FLAPPY_INLINE auto shorter(const Vec3<T>& v, const Element<T>& limit) {
-  return dot(v, v) < T(limit) * T(limit);
-}
-
 /// 1 at the goal and at rest there, falling off with every error: G in task.hpp.
 template <class T>
 FLAPPY_INLINE T closeness(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t) {
@@ -99,6 +95,31 @@ FLAPPY_INLINE T closeness(const Reward<Element<T>>& k, const Score<T>& s, const 
   T product(1);
   for (const T& x : square) product *= T(1) + x;
   return T(1) / product;
+}
+
+/// The reward of the period that ends at `time_s`, as task.hpp has it. `done`: lanes where the policy's work is done by then;
+/// `e` knows already whether the goal is captured and kept, and not yet that it is handed back now.
+template <class T>
+FLAPPY_INLINE T reward_of(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t, const T& time_s,
+                          const T& tick_s, auto done, const Episode<T>& e) {
+  const auto handed_back = e.handed_back > T(0), captured = e.captured_s > T(0);
+  T reward = running_reward(k, s, t, e);
+  if (k.goal != 0 || k.arrival != 0) {
+    const T arrival = where(done & !handed_back, T(k.arrival), T(0));
+    reward += T(T(k.goal) + arrival) * closeness(k, s, t);
+  }
+  if (k.until_s > 0) {
+    const auto then = (time_s > T(k.until_s)) & (time_s < T(T(k.until_s) + tick_s));
+    const auto kept = captured & (e.lost_s == T(0));
+    reward += where(then & kept, T(k.kept), T(0));
+    reward = where(handed_back & !captured, T(0), reward);
+  }
+  return reward;
+}
+
+template <class T>
+FLAPPY_INLINE auto shorter(const Vec3<T>& v, const Element<T>& limit) {
+  return dot(v, v) < T(limit) * T(limit);
 }
 
 /// Lanes where the policy's work is done.

@@ -77,7 +77,7 @@ TEST(Reward, IsItsFormula) {
     EXPECT_NEAR(score.facing, R(0, 0), 1e-13);
     EXPECT_NEAR(score.upright, R(2, 2), 1e-13);
     // a difference of 1e-12 in C, where the terms cancel to a small one, comes out 1e12 x larger in 1/(C^2 + 1e-6) at most
-    EXPECT_NEAR(reward_of(k, score, s.truth, s.episode), expected,
+    EXPECT_NEAR(running_reward(k, score, s.truth, s.episode), expected,
                 1e-9 * (1 + std::abs(expected)) + 1e-12 * std::abs(2 * c) / std::pow(c * c + 1e-6, 2));
   }
 }
@@ -99,6 +99,27 @@ TEST(Reward, ClosenessFallsOffWithEveryError) {
     for (const double x : errors) expected /= 1 + x * x;
     EXPECT_NEAR(closeness(k, score, s.truth), expected, 1e-10 * expected);  // acos near its ends
   }
+}
+
+TEST(Reward, PaysArrivalOnceAndAfterTheHandBackOnlyWhoCaptured) {
+  std::mt19937 engine(4);
+  const Sample s = random_sample(engine);
+  const Score<double> score = score_of(s.truth, s.ref);
+  Reward<double> k{};
+  k.alive = 0.3, k.goal = 0.7, k.arrival = 11, k.kept = 5, k.goal_1_m = 1;
+  const double G = closeness(k, score, s.truth), tick_s = 0.002;
+  for (const double until_s : {0.0, 0.5})
+    for (int bits = 0; bits < 32; ++bits) {
+      const bool done = bits & 1, handed_back = bits & 2, captured = bits & 4, lost = bits & 8, then = bits & 16;
+      Episode<double> e{};
+      e.handed_back = handed_back, e.captured_s = captured ? 0.2 : 0, e.lost_s = lost ? 0.3 : 0;
+      k.until_s = until_s;
+      double expected = 0.3 + (0.7 + (done && !handed_back ? 11 : 0)) * G;
+      if (until_s > 0 && then && captured && !lost) expected += 5;
+      if (until_s > 0 && handed_back && !captured) expected = 0;
+      for (const double time_s : {then ? 0.501 : 0.499, then ? 0.5011 : 0.503})
+        EXPECT_NEAR(reward_of(k, score, s.truth, time_s, tick_s, done, e), expected, 1e-14) << bits << " " << until_s;
+    }
 }
 
 TEST(Reward, SeesHowTheActionChanges) {
