@@ -78,6 +78,31 @@ struct PidController {
 
   static void fields(PidConstants<double>& k, const auto& add);
 
+  /// The C code that flies it on board: src/deploy/c/controller_pid.h. Members of its constants there, in their order.
+  static constexpr const char* kSource = "controller_pid";
+  static void exported(const PidConstants<float>& k, const auto& add) {
+    add("position_xy_1_s", k.position_xy_1_s);
+    add("position_z_1_s", k.position_z_1_s);
+    add("speed_limit_m_s", k.speed_limit_m_s);
+    add("climb_limit_m_s", k.climb_limit_m_s);
+    add("forward", k.forward);
+    add("left", k.left);
+    add("up", k.up);
+    add("acceleration_limit_m_s2", k.acceleration_limit_m_s2);
+    add("roll_limit_rad", k.roll_limit_rad);
+    add("pitch_limit_rad", k.pitch_limit_rad);
+    add("yaw_error_limit_rad", k.yaw_error_limit_rad);
+    add("roll", k.roll);
+    add("pitch", k.pitch);
+    add("yaw", k.yaw);
+    add("hover_V", k.hover_V);
+    add("lower_V", k.lower_V);
+    add("upper_V", k.upper_V);
+    add("difference_limit_V", k.difference_limit_V);
+    add("bias_limit_V", k.bias_limit_V);
+    add("split_cycle_limit", k.split_cycle_limit);
+  }
+
   template <class T>
   static void start(Pid<T>& m, const Estimate<T>& x) {
     m.velocity_m_s = x.velocity_m_s;

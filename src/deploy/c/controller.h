@@ -1,3 +1,18 @@
+/* Driver. Within a beat of fraction t in [0, 1):
+     V = A cos(pi t / s) + V_0              for t < s
+     V = A cos(pi (t - 1) / (1 - s)) + V_0  after
+     left:  A = V_amp + V_d, s = 0.5 - d_sigma      right: A = V_amp - V_d, s = 0.5 + d_sigma */
+static inline float flappy_voltage(float side, const flappy_wing_beat *u, float fraction, float limit) {
+  const float s = 0.5F - side * u->split_cycle;
+  const float t = fraction < 0.0F ? fraction + 1.0F : fraction;
+  const float x = t < s ? t / s : (t - 1.0F) / (1.0F - s);
+  const float amplitude = flappy_fma(side, u->difference_V, u->amplitude_V);
+  return flappy_within(flappy_fma(amplitude, flappy_cos_pi(x), u->bias_V), limit);
+}
+
+/* Of the beat, in [-1/2, 1/2). */
+static inline float flappy_beat_fraction(uint32_t phase) { return (float)(int32_t)phase * 0x1p-32F; }
+
 /* Hand-back. */
 
 static inline int flappy_shorter(flappy_vector v, float limit) { return flappy_dot(v, v) < limit * limit; }
@@ -107,9 +122,7 @@ static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us
   c->estimate.position_m = position_m;
   c->estimate.attitude = attitude;
   c->estimate.velocity_m_s = c->estimate.body_rate_rad_s = none;
-  c->pid.integral_x = c->pid.integral_y = c->pid.integral_z = 0.0F;
-  c->pid.integral_roll = c->pid.integral_pitch = c->pid.integral_yaw = 0.0F;
-  c->pid.velocity_m_s = c->pid.body_rate_rad_s = none;
+  flappy_feedback_start(&c->feedback, &c->estimate);
   c->input.amplitude_V = c->input.difference_V = c->input.bias_V = c->input.split_cycle = 0.0F;
   c->phase = 0;
   c->now_us = c->last_imu_us = c->pushed_us = now_us;
@@ -193,7 +206,7 @@ static inline void flappy_controller_observe(const flappy_controller *c, float o
   const uint32_t parts = FLAPPY_CONTROLLER_PARTS;
   const flappy_motion *x = &c->estimate;
   const flappy_matrix R = flappy_rotation_matrix(x->attitude);
-  const flappy_wing_beat trim = flappy_pid_trim(&c->pid);
+  const flappy_wing_beat trim = flappy_feedback_trim(&c->feedback);
   uint32_t segment = c->segment;
   const flappy_setpoint ref = flappy_controller_reference(c, &segment);
   const float cos = ref.heading.cos, sin = ref.heading.sin;
@@ -239,14 +252,11 @@ static inline void flappy_controller_act(flappy_controller *c, const float added
 /* Start of a control period: sets the inputs of the wing beat. */
 static inline void flappy_controller_steer(flappy_controller *c) {
   const flappy_setpoint ref = flappy_controller_reference(c, &c->segment);
-  const flappy_pid before = c->pid;
-  flappy_wing_beat u = flappy_pid_control(&c->pid, &c->estimate, &ref);
+  const flappy_feedback before = c->feedback;
+  flappy_wing_beat u = flappy_feedback_update(&c->feedback, &c->estimate, &ref);
   if (FLAPPY_CONTROLLER_HOLDS_TRIM && !c->handed_back) {
-    const flappy_pid low_passed = c->pid;
-    u = flappy_pid_trim(&before);
-    c->pid = before;
-    c->pid.velocity_m_s = low_passed.velocity_m_s;
-    c->pid.body_rate_rad_s = low_passed.body_rate_rad_s;
+    u = flappy_feedback_trim(&before);
+    flappy_feedback_unlearn(&before, &c->feedback);
   }
   c->input.amplitude_V = u.amplitude_V + (0.0F + (c->handed_back ? 0.0F : c->added[0]));
   c->input.difference_V = u.difference_V + (0.0F + (c->handed_back ? 0.0F : c->added[1]));

@@ -1,36 +1,3 @@
-/* Set points: quintic segments in x, y, z and heading over whole control ticks; the last one holds for ever. */
-
-typedef struct {
-  flappy_vector position_m, velocity_m_s, acceleration_m_s2; /* in W */
-  flappy_sin_cos heading;
-  float heading_rate_rad_s;
-} flappy_setpoint;
-
-/* At a tick; segment: where it was last, moved on here. */
-static inline flappy_setpoint flappy_controller_setpoint(uint32_t tick, uint32_t *segment) {
-  const float *a;
-  float t, value[4], rate[4], bend[4];
-  flappy_setpoint s;
-  uint32_t i;
-  while (*segment + 1 < FLAPPY_CONTROLLER_SEGMENTS && tick >= (uint32_t)flappy_controller_path_start[*segment + 1])
-    ++*segment;
-  t = (float)(tick - (uint32_t)flappy_controller_path_start[*segment]) * flappy_controller_k.period_s;
-  a = flappy_controller_path + 24 * *segment;
-  for (i = 0; i < 4; ++i, a += 6) {
-    value[i] = flappy_fma(flappy_fma(flappy_fma(a[5], t, a[4]), t, a[3]), t, a[2]);
-    value[i] = flappy_fma(flappy_fma(value[i], t, a[1]), t, a[0]);
-    rate[i] = flappy_fma(flappy_fma(5.0F * a[5], t, 4.0F * a[4]), t, 3.0F * a[3]);
-    rate[i] = flappy_fma(flappy_fma(rate[i], t, 2.0F * a[2]), t, a[1]);
-    bend[i] = flappy_fma(flappy_fma(flappy_fma(20.0F * a[5], t, 12.0F * a[4]), t, 6.0F * a[3]), t, 2.0F * a[2]);
-  }
-  s.position_m = flappy_vector_of(value[0], value[1], value[2]);
-  s.velocity_m_s = flappy_vector_of(rate[0], rate[1], rate[2]);
-  s.acceleration_m_s2 = flappy_vector_of(bend[0], bend[1], bend[2]);
-  s.heading = flappy_sin_cos_wide(value[3]);
-  s.heading_rate_rad_s = rate[3];
-  return s;
-}
-
 /* Cascaded PID: position P -> velocity PID -> lean angles -> attitude PID -> wing beat. f: forward, l: left, in the
    heading frame.
      v_sp = v_ref + k (p_ref - p)             e = v_sp - v        a_f,l = a_ref + PID(e)       V_z = PID(e_z)
@@ -39,8 +6,6 @@ static inline flappy_setpoint flappy_controller_setpoint(uint32_t tick, uint32_t
      V_amp = V_hover + V_z / (cos roll cos pitch)
    Derivatives come from low-passed velocity and body rate. Integrators are clamped, and stand still while what they drive
    is at its limit. */
-
-static inline float flappy_within(float x, float limit) { return flappy_clamp(x, -limit, limit); }
 
 /* +1 or -1 where x is at its limit, else 0. */
 static inline float flappy_saturation(float x, float low, float high) {
@@ -70,8 +35,9 @@ static inline float flappy_velocity_pid(const flappy_gains *k, float error, floa
   return flappy_fma(k->p, error, flappy_fma(k->d, slope, sum));
 }
 
-static inline flappy_wing_beat flappy_pid_control(flappy_pid *m, const flappy_motion *x, const flappy_setpoint *ref) {
-  const flappy_controller_constants *k = &flappy_controller_k;
+static inline flappy_wing_beat flappy_feedback_update(flappy_feedback *m, const flappy_motion *x, const flappy_setpoint *ref) {
+  const flappy_feedback_constants *k = &flappy_controller_k.feedback;
+  const flappy_controller_constants *loop = &flappy_controller_k;
   const flappy_matrix R = flappy_rotation_matrix(x->attitude);
   const flappy_sin_cos yaw = flappy_heading(&R);
   const flappy_vector before = m->velocity_m_s, way = flappy_minus(ref->position_m, x->position_m);
@@ -79,15 +45,15 @@ static inline flappy_wing_beat flappy_pid_control(flappy_pid *m, const flappy_mo
       flappy_within(flappy_fma(k->position_xy_1_s, way.x, ref->velocity_m_s.x), k->speed_limit_m_s),
       flappy_within(flappy_fma(k->position_xy_1_s, way.y, ref->velocity_m_s.y), k->speed_limit_m_s),
       flappy_within(flappy_fma(k->position_z_1_s, way.z, ref->velocity_m_s.z), k->climb_limit_m_s));
-  const float a_most = k->acceleration_limit_m_s2, g = k->gravity_m_s2;
+  const float a_most = k->acceleration_limit_m_s2, g = loop->gravity_m_s2;
   flappy_vector slope, error, w;
   flappy_wing_beat u;
   float sum_f, sum_l, error_f, error_l, a_f, a_l, pitch_for_a, pitch_wanted, roll_for_a, roll_wanted, blocked_f, blocked_l;
   float step_f, step_l, roll, pitch, yaw_error, climb, lift;
 
   /* position, velocity, acceleration */
-  m->velocity_m_s = flappy_add_scaled(before, k->velocity_share, flappy_minus(x->velocity_m_s, before));
-  slope = flappy_times(k->per_period_Hz, flappy_minus(before, m->velocity_m_s)); /* of the error */
+  m->velocity_m_s = flappy_add_scaled(before, loop->velocity_share, flappy_minus(x->velocity_m_s, before));
+  slope = flappy_times(loop->per_period_Hz, flappy_minus(before, m->velocity_m_s)); /* of the error */
   error = flappy_minus(wanted, m->velocity_m_s);
   sum_f = flappy_forward(yaw, m->integral_x, m->integral_y);
   sum_l = flappy_left(yaw, m->integral_x, m->integral_y);
@@ -117,7 +83,7 @@ static inline flappy_wing_beat flappy_pid_control(flappy_pid *m, const flappy_mo
                            flappy_sum2(ref->heading.cos, yaw.cos, ref->heading.sin, yaw.sin));
 
   /* wing beat */
-  m->body_rate_rad_s = flappy_add_scaled(m->body_rate_rad_s, k->rate_share,
+  m->body_rate_rad_s = flappy_add_scaled(m->body_rate_rad_s, loop->rate_share,
                                          flappy_minus(x->body_rate_rad_s, m->body_rate_rad_s));
   w = m->body_rate_rad_s;
   u.difference_V = flappy_attitude_pid(&k->roll, &m->integral_roll, roll_wanted - roll, -w.x, k->difference_limit_V);
@@ -134,26 +100,27 @@ static inline flappy_wing_beat flappy_pid_control(flappy_pid *m, const flappy_mo
 }
 
 /* The inputs that its integrators have learnt: those of a settled vehicle. */
-static inline flappy_wing_beat flappy_pid_trim(const flappy_pid *m) {
+static inline flappy_wing_beat flappy_feedback_trim(const flappy_feedback *m) {
   flappy_wing_beat u;
-  u.amplitude_V = flappy_controller_k.hover_V + m->integral_z;
+  u.amplitude_V = flappy_controller_k.feedback.hover_V + m->integral_z;
   u.difference_V = m->integral_roll;
   u.bias_V = m->integral_pitch;
   u.split_cycle = m->integral_yaw;
   return u;
 }
 
-/* Driver. Within a beat of fraction t in [0, 1):
-     V = A cos(pi t / s) + V_0              for t < s
-     V = A cos(pi (t - 1) / (1 - s)) + V_0  after
-     left:  A = V_amp + V_d, s = 0.5 - d_sigma      right: A = V_amp - V_d, s = 0.5 + d_sigma */
-static inline float flappy_voltage(float side, const flappy_wing_beat *u, float fraction, float limit) {
-  const float s = 0.5F - side * u->split_cycle;
-  const float t = fraction < 0.0F ? fraction + 1.0F : fraction;
-  const float x = t < s ? t / s : (t - 1.0F) / (1.0F - s);
-  const float amplitude = flappy_fma(side, u->difference_V, u->amplitude_V);
-  return flappy_within(flappy_fma(amplitude, flappy_cos_pi(x), u->bias_V), limit);
+/* Integrators at 0. */
+static inline void flappy_feedback_start(flappy_feedback *m, const flappy_motion *x) {
+  m->integral_x = m->integral_y = m->integral_z = 0.0F;
+  m->integral_roll = m->integral_pitch = m->integral_yaw = 0.0F;
+  m->velocity_m_s = x->velocity_m_s;
+  m->body_rate_rad_s = x->body_rate_rad_s;
 }
 
-/* Of the beat, in [-1/2, 1/2). */
-static inline float flappy_beat_fraction(uint32_t phase) { return (float)(int32_t)phase * 0x1p-32F; }
+/* Takes back what it learnt in the last period, but for its low-passes. */
+static inline void flappy_feedback_unlearn(const flappy_feedback *before, flappy_feedback *now) {
+  const flappy_feedback low_passed = *now;
+  *now = *before;
+  now->velocity_m_s = low_passed.velocity_m_s;
+  now->body_rate_rad_s = low_passed.body_rate_rad_s;
+}

@@ -37,8 +37,8 @@ static inline void flappy_controller_test_begin(flappy_controller *c, uint32_t z
   for (i = 0; i < sizeof c->estimator / sizeof(float); ++i) to[i] = *from++;
   to = (float *)&c->estimate;
   for (i = 0; i < sizeof c->estimate / sizeof(float); ++i) to[i] = *from++;
-  to = (float *)&c->pid;
-  for (i = 0; i < sizeof c->pid / sizeof(float); ++i) to[i] = *from++;
+  to = (float *)&c->feedback;
+  for (i = 0; i < sizeof c->feedback / sizeof(float); ++i) to[i] = *from++;
   c->tick = (uint32_t)clock[0];
   c->phase = (uint32_t)clock[1];
   c->handed_back = clock[2];
@@ -148,7 +148,7 @@ static inline int flappy_controller_selftest(void) {
     flappy_controller_steer(&c);
     if (!flappy_all_finite((const float *)&c.estimator, (uint32_t)sizeof c.estimator) ||
         !flappy_all_finite((const float *)&c.estimate, (uint32_t)sizeof c.estimate) ||
-        !flappy_all_finite((const float *)&c.pid, (uint32_t)sizeof c.pid))
+        !flappy_all_finite((const float *)&c.feedback, (uint32_t)sizeof c.feedback))
       return FLAPPY_CONTROLLER_FAILED_NAN;
   }
   return 0;

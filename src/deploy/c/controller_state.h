@@ -1,3 +1,23 @@
+/* What the controller is told; all members are float. */
+typedef struct {
+  flappy_feedback_constants feedback;
+  float velocity_share, rate_share; /* of a new value in the low-passed one */
+  float period_s, per_period_Hz, gravity_m_s2;
+  /* estimator: spectral densities and variances, where the IMU sits in B, variances to begin with */
+  float angle_noise_rad2_s, gyro_bias_drift_rad2_s3, velocity_noise_m2_s3, accel_bias_drift_m2_s5;
+  float mocap_angle_rad2, mocap_position_m2;
+  flappy_vector imu_position_m;
+  float start_angle_rad2, start_gyro_bias_rad2_s2, start_position_m2, start_velocity_m2_s2, start_accel_bias_m2_s4;
+  /* hand-back: all at once, or at a time */
+  float hand_back_x_m, hand_back_distance_m, hand_back_speed_x_m_s, hand_back_speed_m_s, hand_back_heading_cos;
+  float hand_back_tilt_cos, hand_back_body_rate_rad_s, hand_back_at_s;
+  float start_added[4]; /* V, V, V, split cycle: the middle of what a policy may add */
+  flappy_vector start_position_m; /* where the task begins, in W, and with what heading */
+  float start_heading_rad;
+  /* driver */
+  float driver_amplitude_V, driver_difference_V, driver_bias_V, driver_split_cycle, left_limit_V, right_limit_V;
+} flappy_controller_constants;
+
 /* Numbers that the estimator and the controller remember; all members of the first three are float. */
 typedef struct {
   flappy_quaternion attitude;
@@ -18,12 +38,6 @@ typedef struct {
   flappy_vector body_rate_rad_s;              /* of the newest samples, bias taken out */
   float angle_innovation, position_innovation; /* of the last pose: r.r/S, three degrees of freedom each */
 } flappy_estimator;
-
-typedef struct {
-  float integral_x, integral_y, integral_z;          /* m/s^2, m/s^2 in W; V */
-  float integral_roll, integral_pitch, integral_yaw; /* V, V, split cycle */
-  flappy_vector velocity_m_s, body_rate_rad_s;       /* low-passed */
-} flappy_pid;
 
 /* Motion of the torso origin. */
 typedef struct {
@@ -57,7 +71,7 @@ typedef struct {
 typedef struct {
   flappy_estimator estimator;
   flappy_motion estimate; /* at now_us */
-  flappy_pid pid;
+  flappy_feedback feedback;
   float added[4];         /* by the policy: V, V, V, split cycle */
   flappy_wing_beat input; /* before the driver clips it */
   uint32_t phase;         /* of the wing beat, 2^32 each */

@@ -20,6 +20,8 @@ constexpr const char* kCodes = R"(/* What flappy_controller_selftest() finds. */
 #define FLAPPY_CONTROLLER_FAILED_NAN 3   /* what is no sample is taken */
 )";
 
+using Members = std::vector<std::pair<std::string, std::vector<float>>>;
+
 /// Arrays of the header, and the checksum over them in their order.
 class Constants {
  public:
@@ -31,16 +33,13 @@ class Constants {
     crc_ = crc32(crc_, words);
     text_ << c_array<std::int32_t>("static const int32_t flappy_controller_" + name + "[" + count + "]", words);
   }
-  /// A struct of named members, each in braces where it is several numbers.
-  void add_struct(const std::string& declaration,
-                  const std::vector<std::pair<std::string, std::vector<float>>>& members) {
-    text_ << declaration << " = {\n";
-    for (const auto& [name, numbers] : members) {
-      crc_ = crc32(crc_, numbers);
-      std::string list;
-      for (const float x : numbers) list += (list.empty() ? "" : ", ") + c_number(x);
-      text_ << "    " << (numbers.size() > 1 ? "{" + list + "}" : list) << ", /* " << name << " */\n";
-    }
+  /// A struct of named members, each in braces where it is several numbers; the first one is a struct too.
+  void add_struct(const std::string& declaration, const std::string& first, const Members& members_of_first,
+                  const Members& members) {
+    text_ << declaration << " = {\n    {\n";
+    for (const auto& member : members_of_first) add_member("        ", member);
+    text_ << "    }, /* " << first << " */\n";
+    for (const auto& member : members) add_member("    ", member);
     text_ << "};\n";
   }
   std::string take() {
@@ -51,44 +50,42 @@ class Constants {
   std::uint32_t crc() const { return crc_; }
 
  private:
+  void add_member(const char* indent, const Members::value_type& member) {
+    const auto& [name, numbers] = member;
+    crc_ = crc32(crc_, numbers);
+    std::string list;
+    for (const float x : numbers) list += (list.empty() ? "" : ", ") + c_number(x);
+    text_ << indent << (numbers.size() > 1 ? "{" + list + "}" : list) << ", /* " << name << " */\n";
+  }
+
   std::ostringstream text_;
   std::uint32_t crc_ = 0;
 };
 
+/// Members of flappy_feedback_constants.
+template <class C>
+Members feedback_of(const flight::FlightConstants& all) {
+  Members list;
+  const auto k = flight::rounded<float>(all.controller.of<C>());
+  C::exported(k, [&](const char* name, const auto& numbers) {
+    const float* first = reinterpret_cast<const float*>(&numbers);
+    list.push_back({name, {first, first + sizeof numbers / sizeof(float)}});
+  });
+  return list;
+}
+
 /// Members of flappy_controller_constants.
+template <class C>
 void add_constants(const rollout::FlyConfig& config, Constants& to) {
   const flight::FlightConstants all = flight::flight_constants(config.fleet);
-  const auto k = flight::rounded<float>(all.controller.of<flight::PidController>());
+  const flight::LoopConstants<float> k = flight::rounded<float, flight::LoopConstants>(all.controller.of<C>());
   const auto f = flight::rounded<float>(all.fusion);
   const auto task = flight::rounded<float>(all.task);
   const auto start = flight::rounded<float>(flight::start_covariance(config.fleet.sensors));
   const auto& h = task.hand_back;
   const model::Driver& d = config.vehicle.driver;
-  std::vector<std::pair<std::string, std::vector<float>>> list;
+  Members list;
   const auto one = [&](const char* name, auto x) { list.push_back({name, {static_cast<float>(x)}}); };
-  const auto gains = [&](const char* name, const flight::PidGains<float>& g) {
-    list.push_back({name, {g.p, g.i, g.d, g.integral_limit}});
-  };
-  one("position_xy_1_s", k.position_xy_1_s);
-  one("position_z_1_s", k.position_z_1_s);
-  one("speed_limit_m_s", k.speed_limit_m_s);
-  one("climb_limit_m_s", k.climb_limit_m_s);
-  gains("forward", k.forward);
-  gains("left", k.left);
-  gains("up", k.up);
-  one("acceleration_limit_m_s2", k.acceleration_limit_m_s2);
-  one("roll_limit_rad", k.roll_limit_rad);
-  one("pitch_limit_rad", k.pitch_limit_rad);
-  one("yaw_error_limit_rad", k.yaw_error_limit_rad);
-  gains("roll", k.roll);
-  gains("pitch", k.pitch);
-  gains("yaw", k.yaw);
-  one("hover_V", k.hover_V);
-  one("lower_V", k.lower_V);
-  one("upper_V", k.upper_V);
-  one("difference_limit_V", k.difference_limit_V);
-  one("bias_limit_V", k.bias_limit_V);
-  one("split_cycle_limit", k.split_cycle_limit);
   one("velocity_share", k.velocity_share);
   one("rate_share", k.rate_share);
   one("period_s", k.period_s);
@@ -130,7 +127,7 @@ void add_constants(const rollout::FlyConfig& config, Constants& to) {
   one("driver_split_cycle", d.split_cycle_limit);
   one("left_limit_V", config.vehicle.left.motor.voltage_limit_V);
   one("right_limit_V", config.vehicle.right.motor.voltage_limit_V);
-  to.add_struct("static const flappy_controller_constants flappy_controller_k", list);
+  to.add_struct("static const flappy_controller_constants flappy_controller_k", "feedback", feedback_of<C>(all), list);
 }
 
 void add_path(const flight::Task& task, Constants& to) {
@@ -149,7 +146,7 @@ void add_trace(const ControllerTrace& t, Constants& to) {
   std::vector<float> numbers = t.estimator;
   const auto append = [&](const auto& list) { numbers.insert(numbers.end(), std::begin(list), std::end(list)); };
   append(t.estimate);
-  append(t.pid);
+  append(t.feedback);
   to.add("test_state", "FLAPPY_CONTROLLER_TEST_STATE", numbers);
   to.add("test_clock", "FLAPPY_CONTROLLER_TEST_CLOCK",
          std::vector<std::int32_t>{static_cast<std::int32_t>(t.tick), static_cast<std::int32_t>(t.phase), t.handed_back,
@@ -224,8 +221,18 @@ std::string about(const rollout::FlyConfig& config, const policy::RunInfo& run, 
 std::string controller_header(const rollout::FlyConfig& config, const policy::RunInfo& run,
                               const ControllerTrace& trace) {
   const flight::FleetOptions& o = config.fleet;
-  if (o.controller.kind != flight::kind_of<flight::PidController>())
-    throw io::InputError("controller: is none that can be exported; accepted: kind = \"pid\"");
+  Constants constants;
+  std::string source, accepted;
+  for (int kind = 0; kind < flight::kControllers; ++kind)
+    flight::with_controller(kind, [&]<class C>(C) {
+      if constexpr (requires { C::kSource; }) {
+        accepted += (accepted.empty() ? "kind = \"" : " or \"") + std::string(C::kName) + "\"";
+        if (kind != o.controller.kind) return;
+        source = C::kSource;
+        add_constants<C>(config, constants);
+      }
+    });
+  if (source.empty()) throw io::InputError("controller: is none that can be exported; accepted: " + accepted);
   if (trace.ring.empty() || trace.imu.empty() || trace.frames.empty() || trace.updates.empty())
     throw io::InputError("controller: its test flight has no samples; accepted: sensors and a driver that are faster");
   const Periods periods = periods_of(config);
@@ -235,8 +242,6 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
       std::llround(config.vehicle.driver.flapping_Hz * config.vehicle.driver.hold_s * 0x1p32));
   const auto number = [](auto n) { return std::to_string(n) + "U"; };
 
-  Constants constants;
-  add_constants(config, constants);
   add_path(o.task, constants);
   const std::string numbers = constants.take();
   add_trace(trace, constants);
@@ -264,7 +269,7 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
   define("AHEAD_US", number(schedule.ring_slots() * periods.control_us) + " /* no further does it extrapolate */");
   define("SEGMENTS", number(o.task.path.size()));
   define("CRC32", number(constants.crc()));
-  define("TEST_STATE", number(trace.estimator.size() + trace.estimate.size() + trace.pid.size()));
+  define("TEST_STATE", number(trace.estimator.size() + trace.estimate.size() + trace.feedback.size()));
   define("TEST_CLOCK", "7U");
   define("TEST_RING", number(trace.ring.size()));
   define("TEST_IMU", number(trace.imu.size()));
@@ -274,11 +279,13 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
   text << kCodes << "\n"
        << kEmbedded.at("arithmetic.h") << "\n"
        << kEmbedded.at("controller_types.h") << "\n"
-       << numbers << "\n"
+       << kEmbedded.at(source + "_types.h") << "\n"
        << kEmbedded.at("controller_state.h") << "\n"
+       << numbers << "\n"
        << kEmbedded.at("controller_math.h") << "\n"
        << kEmbedded.at("controller_estimator.h") << "\n"
-       << kEmbedded.at("controller_pid.h") << "\n"
+       << kEmbedded.at("controller_path.h") << "\n"
+       << kEmbedded.at(source + ".h") << "\n"
        << kEmbedded.at("controller.h") << "\n"
        << "/* A recorded flight: state to begin with; tick, phase, handed back, times of horizon, present, last IMU "
           "sample "

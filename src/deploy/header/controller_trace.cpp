@@ -116,7 +116,9 @@ ControllerTrace record_controller(const rollout::FlyConfig& config, int periods,
     if (period == begin) {
       t.estimator = flight.rows(offsetof(FlightBlock<float>, fusion), flight::kFusionRows);
       t.estimate = flight.rows(offsetof(FlightBlock<float>, estimate), flight::kEstimateRows);
-      t.pid = flight.rows(offsetof(FlightBlock<float>, controller), model::kRows<flight::Pid>);
+      flight::with_controller(o.controller.kind, [&]<class C>(C) {
+        t.feedback = flight.rows(offsetof(FlightBlock<float>, controller), model::kRows<C::template Memory>);
+      });
       t.tick = fleet.tick(0);
       t.phase = fleet.snapshot(0).phase;
       t.handed_back = fleet.handed_back(0);

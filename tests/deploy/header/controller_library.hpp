@@ -24,14 +24,14 @@ void w_load(flappy_controller *c, uint32_t us, const float *estimator, const flo
   w_start(c, us, origin);
   W_COPY((float *)&c->estimator, estimator, sizeof c->estimator / 4);
   W_COPY((float *)&c->estimate, estimate, sizeof c->estimate / 4);
-  W_COPY((float *)&c->pid, pid, sizeof c->pid / 4);
+  W_COPY((float *)&c->feedback, pid, sizeof c->feedback / 4);
   c->phase = phase;
 }
 void w_state(const flappy_controller *c, float *estimator, float *estimate, float *pid) {
   uint32_t i;
   W_COPY(estimator, (const float *)&c->estimator, sizeof c->estimator / 4);
   W_COPY(estimate, (const float *)&c->estimate, sizeof c->estimate / 4);
-  W_COPY(pid, (const float *)&c->pid, sizeof c->pid / 4);
+  W_COPY(pid, (const float *)&c->feedback, sizeof c->feedback / 4);
 }
 void w_begin(flappy_controller *c) { flappy_controller_begin(c); }
 void w_act(flappy_controller *c, const float *added) { flappy_controller_act(c, added); }
