@@ -143,16 +143,16 @@ FLAPPY_INLINE MocapSample<L<T>> see(const FlightSpace<T>& s, const FlightPlan<T>
   return sample;
 }
 
-/// The pose of `fuse` where motion capture is later than it says: of the time before, once that is known.
+/// The pose of a correction where motion capture is later than it says: of the time before, once that is known.
 template <class T>
-FLAPPY_INLINE void delay(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Fuse& fuse, int first) {
-  T* rows = s.queue + static_cast<std::ptrdiff_t>(fuse.slot) * kMocapRows * kLanes<T>;
-  const auto pose = load_rows<MocapSample<L<T>>>(slot(s.queue, fuse.slot, kMocapRows), first);
+FLAPPY_INLINE void delay(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Correction& correction, int first) {
+  T* rows = s.queue + static_cast<std::ptrdiff_t>(correction.slot) * kMocapRows * kLanes<T>;
+  const auto pose = load_rows<MocapSample<L<T>>>(slot(s.queue, correction.slot, kMocapRows), first);
   const L<T> late = effect_parameter<MocapDelay>(s.effects, 0, first);
-  const L<T> age = L<T>(L<T>(fuse.age_s) + late) / L<T>(plan.task.tick_s);
+  const L<T> age = L<T>(L<T>(correction.age_s) + late) / L<T>(plan.task.tick_s);
   const auto truth = load_rows<Truth<L<T>>>(s.flight.truth, first);
   const auto past = past_truth<T>(s.effects, s.flight.tick + first, truth, age, plan.task.tick_s, first);
-  const auto then = see(s, plan, past, pose.valid, fuse.index, first);
+  const auto then = see(s, plan, past, pose.valid, correction.index, first);
   const L<T>*from = reinterpret_cast<const L<T>*>(&then), *prompt = reinterpret_cast<const L<T>*>(&pose);
   for (int r = 0; r < kMocapRows; ++r) where(late == L<T>(0), prompt[r], from[r]).store(rows + r * kLanes<T> + first);
 }
@@ -175,9 +175,9 @@ FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
     if (s.effects.set & kImuEffects)
       disturb(s.effects, flight_time_s(f, plan, steps, first), beat_phase(s.body, first), imu.low_passed.accel_m_s2,
               sample, first);
-    auto fusion = load_rows<Fusion<L<T>>>(f.fusion, first);
-    gather(fusion.gathered, sample, interval);
-    store_rows(fusion, f.fusion, first);
+    auto estimator = load_rows<Estimator<L<T>>>(f.estimator, first);
+    gather(estimator.gathered, sample, interval);
+    store_rows(estimator, f.estimator, first);
     if (s.tap.imu != nullptr) store_rows(sample, slot(s.tap.imu, imu_samples, kImuSampleRows), first);
   }
   if (slice.mocap) {
@@ -196,42 +196,42 @@ FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
 
 /// The estimate at the end of the period, from all that has arrived by then.
 template <class T>
-FLAPPY_INLINE void fuse(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
+FLAPPY_INLINE void estimate(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;
-  auto fusion = load_rows<Fusion<L<T>>>(f.fusion, first);
-  const L<T> zero(0), gravity(plan.fusion.gravity_m_s2);
+  auto estimator = load_rows<Estimator<L<T>>>(f.estimator, first);
+  const L<T> zero(0), gravity(plan.estimator.gravity_m_s2);
   const auto increment = [&](int index) {
     return load_rows<Increment<L<T>>>(slot(s.ring, index, kIncrementRows), first);
   };
   const auto move = [&](Pose<L<T>>& pose, const Advance& a) {
-    advance(pose, increment(a.slot), fusion.gyro_bias_rad_s, fusion.accel_bias_m_s2, L<T>(a.share), L<T>(a.duration_s),
-            gravity);
+    advance(pose, increment(a.slot), estimator.gyro_bias_rad_s, estimator.accel_bias_m_s2, L<T>(a.share),
+            L<T>(a.duration_s), gravity);
   };
   if (plan.push_slot >= 0) {
-    store_rows(fusion.gathered, slot(s.ring, plan.push_slot, kIncrementRows), first);
-    fusion.gathered = {{zero, zero, zero}, {zero, zero, zero}};
+    store_rows(estimator.gathered, slot(s.ring, plan.push_slot, kIncrementRows), first);
+    estimator.gathered = {{zero, zero, zero}, {zero, zero, zero}};
   }
-  for (int i = 0; i < plan.fuse_count; ++i) {
-    const Fuse& pose = plan.fuse[i];
+  for (int i = 0; i < plan.correction_count; ++i) {
+    const Correction& pose = plan.corrections[i];
     for (const Advance* a = plan.advance + pose.first; a != plan.advance + pose.first + pose.count; ++a) {
-      move(fusion.horizon, *a);
-      spread(fusion.covariance, plan.fusion, L<T>(a->share * a->duration_s));
+      move(estimator.horizon, *a);
+      spread(estimator.covariance, plan.estimator, L<T>(a->share * a->duration_s));
     }
     if (s.effects.set & kBit<MocapDelay>) delay(s, plan, pose, first);
-    correct(fusion, plan.fusion, load_rows<MocapSample<L<T>>>(slot(s.queue, pose.slot, kMocapRows), first));
+    correct(estimator, plan.estimator, load_rows<MocapSample<L<T>>>(slot(s.queue, pose.slot, kMocapRows), first));
   }
-  if (plan.fuse_count > 0) fusion.now = fusion.horizon;
-  for (int i = 0; i < plan.replay_count; ++i) move(fusion.now, plan.replay[i]);
+  if (plan.correction_count > 0) estimator.now = estimator.horizon;
+  for (int i = 0; i < plan.replay_count; ++i) move(estimator.now, plan.replay[i]);
 
-  Pose<L<T>> ahead = fusion.now;
+  Pose<L<T>> ahead = estimator.now;
   if (plan.newest.slot >= 0) {
     const L<T> per_duration(1 / plan.newest.duration_s);
-    fusion.body_rate_rad_s = per_duration * increment(plan.newest.slot).turn_rad - fusion.gyro_bias_rad_s;
+    estimator.body_rate_rad_s = per_duration * increment(plan.newest.slot).turn_rad - estimator.gyro_bias_rad_s;
     if (plan.ahead_s > 0)
       move(ahead, {plan.newest.slot, plan.ahead_s / plan.newest.duration_s, plan.newest.duration_s});
   }
-  store_rows(torso(plan.fusion, ahead, fusion.body_rate_rad_s), f.estimate, first);
-  store_rows(fusion, f.fusion, first);
+  store_rows(torso(plan.estimator, ahead, estimator.body_rate_rad_s), f.estimate, first);
+  store_rows(estimator, f.estimator, first);
 }
 
 /// Scores the period, looks whether the episode is over, and shows the policy what it may know.
@@ -313,10 +313,10 @@ void fly_block(const FlightSpace<T>& s, const FlightPlan<T>& plan) {
     mocap_samples += slice.mocap;
     watch.lap(kSense);
   }
-  for_lanes<T>([&](int first) { fuse(s, plan, first); });
-  watch.lap(kFuse);
+  for_lanes<T>([&](int first) { estimate(s, plan, first); });
+  watch.lap(kEstimate);
   for_lanes<T>([&](int first) { judge(s, plan, first); });
-  watch.lap(kJudge);
+  watch.lap(kReward);
 }
 
 }  // namespace

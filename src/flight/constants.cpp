@@ -15,7 +15,7 @@ FlightConstants flight_constants(const FleetOptions& options) {
   const double gravity = options.batch.world.gravity_m_s2, step_s = options.batch.step_s;
   const double period_s = static_cast<double>(std::lround(1 / (options.control_hz * step_s))) * step_s;
   const auto& at = s.imu.position_m;
-  const FusionNoise& f = s.fusion;
+  const EstimatorNoise& f = s.estimator;
   FlightConstants k{
       period_s,
       {{at.x, at.y, at.z},
@@ -56,8 +56,8 @@ Covariance<double> start_covariance(const Sensors& s) {
   c.angle = square(s.mocap.attitude_noise_rad);
   c.gyro_bias = (square(bias.x) + square(bias.y) + square(bias.z)) / 3;
   c.position = square(s.mocap.position_noise_m);
-  c.velocity = square(s.fusion.initial_velocity_sd_m_s);
-  c.accel_bias = square(s.fusion.accel_bias_sd_m_s2);
+  c.velocity = square(s.estimator.initial_velocity_sd_m_s);
+  c.accel_bias = square(s.estimator.accel_bias_sd_m_s2);
   return c;
 }
 

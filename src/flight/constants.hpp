@@ -19,7 +19,7 @@ struct FlightConstants {
   double period_s;
   ImuConstants<double> imu;
   MocapConstants<double> mocap;
-  FusionConstants<double> fusion;
+  EstimatorConstants<double> estimator;
   ControllerConstants<double> controller;
   TaskConstants<double> task;
 };

@@ -178,8 +178,8 @@ void Fleet<T>::begin(int periods) {
     plan.first_step = period.first_step;
     plan.slices = period.slices.data();
     plan.slice_count = static_cast<int>(period.slices.size());
-    plan.fuse = period.fuse.data();
-    plan.fuse_count = static_cast<int>(period.fuse.size());
+    plan.corrections = period.corrections.data();
+    plan.correction_count = static_cast<int>(period.corrections.size());
     plan.advance = period.advance.data();
     plan.replay = period.replay.data();
     plan.replay_count = static_cast<int>(period.replay.size());
@@ -336,7 +336,7 @@ T Fleet<T>::gain(std::size_t i) const {
 template <class T>
 std::pair<double, double> Fleet<T>::innovation(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
-  const auto x = get<Fusion<double>>(f.fusion, lane);
+  const auto x = get<Estimator<double>>(f.estimator, lane);
   return {x.angle_innovation, x.position_innovation};
 }
 
@@ -386,7 +386,7 @@ auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
     s.template for_samples<MocapSample>(i, s.mocap_tap, s.mocap_tap_size, &Slice::mocap, add);
   } else if (!s.mocap_tap.empty()) {
     const T* queue = &s.queue[i / kLanes<T> * s.queue_size];
-    for (const Fuse& f : s.periods.back().fuse) {
+    for (const Correction& f : s.periods.back().corrections) {
       const T* rows = queue + static_cast<std::ptrdiff_t>(f.slot) * kMocapRows * kLanes<T>;
       add(f.time_s,
           get<MocapSample<double>>(reinterpret_cast<const T(*)[kLanes<T>]>(rows), static_cast<int>(i % kLanes<T>)));

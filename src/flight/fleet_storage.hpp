@@ -81,7 +81,7 @@ struct Fleet<T>::Storage {
     plan.losses = k.mocap.loss_begins > 0;
     plan.imu = rounded<T>(k.imu);
     plan.mocap = rounded<T>(k.mocap);
-    plan.fusion = rounded<T>(k.fusion);
+    plan.estimator = rounded<T>(k.estimator);
     plan.controller_kind = options.controller.kind;
     plan.controller = rounded<T>(k.controller);
     plan.task = rounded<T>(k.task);
@@ -167,7 +167,7 @@ struct Fleet<T>::Storage {
   void start_lane(std::size_t i, std::uint32_t episode, const Truth<double>& truth);
   void show(std::size_t i);
   void observe_as(std::size_t i, const Estimate<double>& x, T* row);
-  void start_fusion(std::size_t i, const Truth<double>& truth, sim::RandomKey key);
+  void start_estimator(std::size_t i, const Truth<double>& truth, sim::RandomKey key);
 };
 
 /// What every start has in common: numbers, sensors, estimator, a fresh episode.
@@ -189,7 +189,7 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
                                                            Vec3<double>{0, 0, options.batch.world.gravity_m_s2})};
   imu.gyro_bias_rad_s = {sd.x * sim::normal(key, 0), sd.y * sim::normal(key, 1), sd.z * sim::normal(key, 2)};
   put(imu, f.imu, lane);
-  start_fusion(i, truth, key);
+  start_estimator(i, truth, key);
   Episode<double> fresh{};
   for (int k = 0; k < kActions; ++k) fresh.adds[k] = scaled(k, 0);
   put(fresh, f.episode, lane);
@@ -284,19 +284,19 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   put(x, block.state, lane);
 
   const auto imu = get<Imu<double>>(f.imu, lane);
-  const auto learnt = get<Fusion<double>>(f.fusion, lane);
+  const auto learnt = get<Estimator<double>>(f.estimator, lane);
   const auto flown = get<Truth<double>>(f.truth, lane);
   start_lane(i, episode, {x.position_m, x.attitude, turned_z(flown.velocity_m_s), flown.body_rate_rad_s});
   auto fresh_imu = get<Imu<double>>(f.imu, lane);
   fresh_imu.gyro_bias_rad_s = imu.gyro_bias_rad_s;
   fresh_imu.low_passed = imu.low_passed;
   put(fresh_imu, f.imu, lane);
-  auto fusion = get<Fusion<double>>(f.fusion, lane);
-  fusion.gyro_bias_rad_s = learnt.gyro_bias_rad_s;
-  fusion.accel_bias_m_s2 = learnt.accel_bias_m_s2;
-  fusion.covariance.gyro_bias = learnt.covariance.gyro_bias;
-  fusion.covariance.accel_bias = learnt.covariance.accel_bias;
-  put(fusion, f.fusion, lane);
+  auto estimator = get<Estimator<double>>(f.estimator, lane);
+  estimator.gyro_bias_rad_s = learnt.gyro_bias_rad_s;
+  estimator.accel_bias_m_s2 = learnt.accel_bias_m_s2;
+  estimator.covariance.gyro_bias = learnt.covariance.gyro_bias;
+  estimator.covariance.accel_bias = learnt.covariance.accel_bias;
+  put(estimator, f.estimator, lane);
   change_controller(i, [&]<class C>(C, auto& memory) { C::rotate_z(turn.sin, turn.cos, memory); });
   show(i);
 }
@@ -304,7 +304,7 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
 /// The estimator has watched the flapper before its start, as well as one pose shows it: what it has in store is a past of
 /// steady motion.
 template <class T>
-void Fleet<T>::Storage::start_fusion(std::size_t i, const Truth<double>& truth, sim::RandomKey key) {
+void Fleet<T>::Storage::start_estimator(std::size_t i, const Truth<double>& truth, sim::RandomKey key) {
   const auto [f, lane] = at(i);
   const Sensors& s = options.sensors;
   const auto noise = [&](double sd, std::uint32_t first) {
@@ -314,22 +314,22 @@ void Fleet<T>::Storage::start_fusion(std::size_t i, const Truth<double>& truth, 
   key.stream = sim::Stream::start_estimate;
   Estimate<double> x{truth.position_m + noise(s.mocap.position_noise_m, 0),
                      turned(truth.attitude, noise(s.mocap.attitude_noise_rad / 2, 3)),
-                     truth.velocity_m_s + noise(s.fusion.initial_velocity_sd_m_s, 6), truth.body_rate_rad_s};
+                     truth.velocity_m_s + noise(s.estimator.initial_velocity_sd_m_s, 6), truth.body_rate_rad_s};
   put(x, f.estimate, lane);
 
   const double gravity = options.batch.world.gravity_m_s2;
-  Fusion<double> fusion{};
-  FusionConstants<double> place{};
+  Estimator<double> estimator{};
+  EstimatorConstants<double> place{};
   place.imu_position_m[0] = s.imu.position_m.x;
   place.imu_position_m[1] = s.imu.position_m.y;
   place.imu_position_m[2] = s.imu.position_m.z;
   const Pose<double> imu = imu_pose(place, x);
-  fusion.horizon = fusion.now = imu;
-  fusion.horizon.position_m = add_scaled(imu.position_m, -schedule.horizon_age_s(), imu.velocity_m_s);
-  fusion.now.position_m = add_scaled(imu.position_m, -schedule.present_age_s(), imu.velocity_m_s);
-  fusion.body_rate_rad_s = x.body_rate_rad_s;
-  fusion.covariance = start_covariance(s);
-  put(fusion, f.fusion, lane);
+  estimator.horizon = estimator.now = imu;
+  estimator.horizon.position_m = add_scaled(imu.position_m, -schedule.horizon_age_s(), imu.velocity_m_s);
+  estimator.now.position_m = add_scaled(imu.position_m, -schedule.present_age_s(), imu.velocity_m_s);
+  estimator.body_rate_rad_s = x.body_rate_rad_s;
+  estimator.covariance = start_covariance(s);
+  put(estimator, f.estimator, lane);
   const Vec3<double> weight = transpose_times(rotation_matrix(x.attitude), Vec3<double>{0, 0, gravity});
   std::vector<Advance> past = schedule.pending();
   if (schedule.newest().slot >= 0) past.push_back(schedule.newest());

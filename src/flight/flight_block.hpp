@@ -11,7 +11,8 @@ namespace flappy::flight {
 
 using sim::kLanes;
 
-inline constexpr int kImuRows = model::kRows<Imu>, kFusionRows = model::kRows<Fusion>, kTruthRows = model::kRows<Truth>;
+inline constexpr int kImuRows = model::kRows<Imu>, kEstimatorRows = model::kRows<Estimator>,
+                     kTruthRows = model::kRows<Truth>;
 inline constexpr int kEstimateRows = model::kRows<Estimate>, kEpisodeRows = model::kRows<Episode>;
 inline constexpr int kIncrementRows = model::kRows<Increment>, kMocapRows = model::kRows<MocapSample>;
 inline constexpr int kImuSampleRows = model::kRows<ImuSample>;
@@ -20,7 +21,7 @@ template <class T>
 struct alignas(64) FlightBlock {
   T imu[kImuRows][kLanes<T>];
   T seen[1][kLanes<T>];  // by motion capture
-  T fusion[kFusionRows][kLanes<T>];
+  T estimator[kEstimatorRows][kLanes<T>];
   T truth[kTruthRows][kLanes<T>];        // at the end of the last period
   T estimate[kEstimateRows][kLanes<T>];  //   the same
   T controller[kControllerRows][kLanes<T>];
@@ -52,7 +53,7 @@ struct FlightSpace {
 };
 
 /// Stages of a control period, in order.
-enum Stage { kSteer, kPhysics, kSense, kFuse, kJudge, kStages };
+enum Stage { kSteer, kPhysics, kSense, kEstimate, kReward, kStages };
 
 /// How all blocks fly through one control period.
 template <class T>
@@ -61,16 +62,16 @@ struct FlightPlan {
   const sim::StepPlan* physics;
   std::int64_t first_step;
   const Slice* slices;
-  const Fuse* fuse;
+  const Correction* corrections;
   const Advance *advance, *replay;
-  int slice_count, fuse_count, replay_count, push_slot;
+  int slice_count, correction_count, replay_count, push_slot;
   Advance newest;
   double ahead_s;
   std::uint64_t seed;
   bool losses;
   ImuConstants<T> imu;
   MocapConstants<T> mocap;
-  FusionConstants<T> fusion;
+  EstimatorConstants<T> estimator;
   int controller_kind;
   ControllerConstants<T> controller;
   TaskConstants<T> task;

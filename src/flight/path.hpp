@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "flight/fusion.hpp"
+#include "flight/estimator.hpp"
 
 namespace flappy::flight {
 

@@ -39,7 +39,7 @@ const Period& Schedule::next() {
   period_.newest = newest;
   period_.first_step = step_;
   sample(step_ + period_steps_);
-  fuse_arrived();
+  correct_arrived();
   replay();
   return period_;
 }
@@ -75,8 +75,8 @@ void Schedule::sample(std::int64_t end) {
   }
 }
 
-/// A pose is fused once it has arrived and the IMU has covered its time.
-void Schedule::fuse_arrived() {
+/// A pose corrects once it has arrived and the IMU has covered its time.
+void Schedule::correct_arrived() {
   const auto covered_s = [&] {
     double until = horizon_s_;
     for (const Entry& e : ring_)
@@ -86,8 +86,9 @@ void Schedule::fuse_arrived() {
   while (!queue_.empty() && queue_.front().arrival_s <= now_s() + kSame_s &&
          queue_.front().time_s <= covered_s + kSame_s) {
     const double target = queue_.front().time_s;
-    Fuse fuse{queue_.front().slot, static_cast<int>(period_.advance.size()), 0, queue_.front().index, target,
-              now_s() - target};
+    Correction correction{
+        queue_.front().slot, static_cast<int>(period_.advance.size()), 0, queue_.front().index, target,
+        now_s() - target};
     queue_.pop_front();
     while (!ring_.empty() && ring_.front().from_s < target - kSame_s) {
       const Entry& e = ring_.front();
@@ -98,13 +99,13 @@ void Schedule::fuse_arrived() {
       if (e.to_s > target + kSame_s) break;
       ring_.pop_front();
     }
-    fuse.count = static_cast<int>(period_.advance.size()) - fuse.first;
-    period_.fuse.push_back(fuse);
+    correction.count = static_cast<int>(period_.advance.size()) - correction.first;
+    period_.corrections.push_back(correction);
   }
 }
 
 void Schedule::replay() {
-  const bool anew = !period_.fuse.empty();
+  const bool anew = !period_.corrections.empty();
   if (anew) present_s_ = horizon_s_;
   for (Entry& e : ring_) {
     if (e.arrival_s > now_s() + kSame_s) break;

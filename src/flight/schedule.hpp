@@ -1,4 +1,4 @@
-// When sensors sample, when their samples arrive, and what fusion then does: the same for every flapper of a batch, so it
+// When sensors sample, when their samples arrive, and what estimator then does: the same for every flapper of a batch, so it
 // is worked out once for each control period. Rates need divide neither each other nor the control rate; a sample is
 // taken at the first physics step that has reached its time.
 #pragma once
@@ -27,7 +27,7 @@ struct Advance {
 };
 
 /// Moves the horizon to the time of the pose in `slot`, by `count` advances from `first` on, and corrects.
-struct Fuse {
+struct Correction {
   int slot = 0, first = 0, count = 0;
   std::uint32_t index = 0;       // of the sample
   double time_s = 0, age_s = 0;  // when it was taken; from then to the end of the period
@@ -38,7 +38,7 @@ struct Period {
   std::int64_t first_step = 0;
   std::vector<Slice> slices;
   int push_slot = -1;  // of the ring, for what the IMU gathered; -1: it gathered nothing
-  std::vector<Fuse> fuse;
+  std::vector<Correction> corrections;
   std::vector<Advance> advance;  // of the horizon
   std::vector<Advance> replay;   // of the present: from the new horizon if there is one, else from where it was
   Advance newest{-1, 1, 0};      // of what has arrived from the IMU; slot -1: nothing yet
@@ -82,7 +82,7 @@ class Schedule {
   double now_s() const { return static_cast<double>(step_) * step_s_; }
   std::int64_t sample_step(double rate_hz, std::int64_t index) const;
   void sample(std::int64_t end);
-  void fuse_arrived();
+  void correct_arrived();
   void replay();
 
   Sensors sensors_;
@@ -91,7 +91,7 @@ class Schedule {
   std::int64_t step_ = 0, imu_count_ = 0, mocap_count_ = 0, pushed_ = 0;
   double last_imu_s_ = 0, horizon_s_, present_s_;
   std::deque<Entry> ring_;  // beyond the horizon, oldest first
-  std::deque<Pose> queue_;  // not yet fused
+  std::deque<Pose> queue_;  // not yet corrected by
   Period period_;
 };
 

@@ -25,6 +25,7 @@ double low_pass_lag_s(const ImuSensor& imu) {
 Sensors read_sensors(const io::Table& table) {
   constexpr io::Range kRate{10, 10000}, kNoise = io::non_negative(100);
   table.integer("schema", 1, 1);
+  table.renamed("fusion", "estimator, with the same keys");
   Sensors s;
   s.imu.rate_hz = table.number("imu.rate_hz", kRate);
   s.imu.latency_s = table.number("imu.latency_s", io::non_negative(0.1));
@@ -39,12 +40,12 @@ Sensors read_sensors(const io::Table& table) {
   s.mocap.attitude_noise_rad = table.number("mocap.attitude_noise_rad", io::positive(1));
   s.mocap.loss_probability = table.number_or("mocap.loss_probability", 0, {0, 0.5});
   s.mocap.loss_length = table.number_or("mocap.loss_length", 1, {1, 1e6});
-  s.fusion.angle_drift_rad_sqrt_s = table.number("fusion.angle_drift_rad_sqrt_s", kNoise);
-  s.fusion.velocity_drift_m_s_sqrt_s = table.number("fusion.velocity_drift_m_s_sqrt_s", kNoise);
-  s.fusion.gyro_bias_drift_rad_s_sqrt_s = table.number("fusion.gyro_bias_drift_rad_s_sqrt_s", kNoise);
-  s.fusion.accel_bias_sd_m_s2 = table.number("fusion.accel_bias_sd_m_s2", kNoise);
-  s.fusion.accel_bias_drift_m_s2_sqrt_s = table.number("fusion.accel_bias_drift_m_s2_sqrt_s", kNoise);
-  s.fusion.initial_velocity_sd_m_s = table.number("fusion.initial_velocity_sd_m_s", kNoise);
+  s.estimator.angle_drift_rad_sqrt_s = table.number("estimator.angle_drift_rad_sqrt_s", kNoise);
+  s.estimator.velocity_drift_m_s_sqrt_s = table.number("estimator.velocity_drift_m_s_sqrt_s", kNoise);
+  s.estimator.gyro_bias_drift_rad_s_sqrt_s = table.number("estimator.gyro_bias_drift_rad_s_sqrt_s", kNoise);
+  s.estimator.accel_bias_sd_m_s2 = table.number("estimator.accel_bias_sd_m_s2", kNoise);
+  s.estimator.accel_bias_drift_m_s2_sqrt_s = table.number("estimator.accel_bias_drift_m_s2_sqrt_s", kNoise);
+  s.estimator.initial_velocity_sd_m_s = table.number("estimator.initial_velocity_sd_m_s", kNoise);
   table.finish();
   return s;
 }

@@ -1,4 +1,4 @@
-// What flies a flapper, as its user states it: sensors, fusion, controllers. Read from configuration; nothing derived.
+// What flies a flapper, as its user states it: sensors, estimator, controllers. Read from configuration; nothing derived.
 #pragma once
 
 #include <string>
@@ -25,7 +25,7 @@ struct MocapSensor {
 };
 
 /// What the estimator is told about noise besides what the sensors declare.
-struct FusionNoise {
+struct EstimatorNoise {
   double angle_drift_rad_sqrt_s = 0;
   double velocity_drift_m_s_sqrt_s = 0;
   double gyro_bias_drift_rad_s_sqrt_s = 0;
@@ -36,7 +36,7 @@ struct FusionNoise {
 struct Sensors {
   ImuSensor imu;
   MocapSensor mocap;
-  FusionNoise fusion;
+  EstimatorNoise estimator;
 };
 
 /// Share of a new value in a first-order low-pass: 1 - exp(-2 pi f dt).

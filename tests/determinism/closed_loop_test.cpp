@@ -74,7 +74,7 @@ FleetOptions options(const std::string& name) {
   Sensors s;
   s.imu = {333, 0.0005, 90, {0.01, 0, -0.005}, 0.05235987755982989, 0.5, {0.02, 0.03, 0.015}};
   s.mocap = {470, 0.003, 1e-4, 0.005, 0.3, 2};
-  s.fusion = {1e-3, 0.02, 1e-4, 0.1, 0.01, 0.01};
+  s.estimator = {1e-3, 0.02, 1e-4, 0.1, 0.01, 0.01};
   const Task t = task(
       along(waypoint(0, 0, 0, 0.3) + waypoint(0.004, 0.1, 0.05, 0.4, 1) + waypoint(0.02, 0, 0, 0.3, -2),
             "kind = \"flying\"\n[start.position_m]\nx_half = 0.3\ny_half = 0.3\nz = 0.4\nz_half = 0.1\n"

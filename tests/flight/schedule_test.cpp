@@ -51,17 +51,17 @@ class Follower {
     for (const Increment& i : in_order_)
       if (i.arrival_s <= now_s() + kSame_s) covered_s_ = i.to_s, newest_ = i;
     const double before = present_s_;
-    for (const Fuse& f : p.fuse) fuse(p, f);
-    if (!p.fuse.empty()) present_s_ = horizon_s_;
+    for (const Correction& f : p.corrections) correct(p, f);
+    if (!p.corrections.empty()) present_s_ = horizon_s_;
     for (const Advance& a : p.replay) present_s_ = walk(present_s_, a, "replay");
-    expect(present_s_ >= before - kSame_s || !p.fuse.empty(), "the present goes back");
+    expect(present_s_ >= before - kSame_s || !p.corrections.empty(), "the present goes back");
     expect(near(present_s_, std::max(covered_s_, horizon_s_)),
            "the present is not where the IMU's arrived samples end");
     expect(near(p.ahead_s, now_s() - present_s_), "ahead_s");
     const auto next = poses_.find(next_pose_);
     expect(next == poses_.end() || next->second.arrival_s > now_s() + kSame_s ||
                next->second.time_s > covered_s_ + kSame_s,
-           "a pose could have been fused");
+           "a pose could have corrected");
     if (newest_) {
       expect(p.newest.slot >= 0 && near(ring_[p.newest.slot].to_s, newest_->to_s) && p.newest.share == 1 &&
                  near(p.newest.duration_s, newest_->to_s - newest_->from_s),
@@ -71,7 +71,7 @@ class Follower {
   }
 
   std::string fault;
-  int fused() const { return next_pose_; }
+  int corrected() const { return next_pose_; }
 
  private:
   struct Increment {
@@ -143,11 +143,11 @@ class Follower {
     return to;
   }
 
-  void fuse(const Period& p, const Fuse& f) {
+  void correct(const Period& p, const Correction& f) {
     const auto pose = poses_.find(next_pose_);
     expect(pose != poses_.end() && queue_.at(f.slot) == next_pose_, "a pose out of order, twice, or overwritten");
     if (pose == poses_.end()) return;
-    expect(pose->second.arrival_s <= now_s() + kSame_s, "a pose is fused before it has arrived");
+    expect(pose->second.arrival_s <= now_s() + kSame_s, "a pose corrects before it has arrived");
     for (int i = 0; i < f.count; ++i)
       horizon_s_ = walk(horizon_s_, p.advance[static_cast<std::size_t>(f.first + i)], "advance");
     expect(near(horizon_s_, pose->second.time_s), "the horizon does not end at the time of the pose");
@@ -179,7 +179,7 @@ class Follower {
   std::map<std::uint32_t, Pose> poses_;
 };
 
-TEST(Schedule, FusesEveryPoseOnceAndCoversAllTime) {
+TEST(Schedule, CorrectsByEveryPoseOnceAndCoversAllTime) {
   for (const int imu_hz : {500, 1000, 800, 333, 90, 10000})
     for (const int mocap_hz : {150, 200, 240, 97, 1200})
       for (const double mocap_latency_s : {0.0, 0.005, 0.025, 0.030, 0.0333, 0.080})
@@ -190,7 +190,7 @@ TEST(Schedule, FusesEveryPoseOnceAndCoversAllTime) {
             EXPECT_EQ(follower.fault, "");
             // all that arrived: those of the last latency and of the IMU's delays are still on their way
             const double end_s = kPeriods * kPeriodSteps * kStep_s - mocap_latency_s;
-            EXPECT_GE(follower.fused(), (end_s - 0.03) * mocap_hz - 2);
+            EXPECT_GE(follower.corrected(), (end_s - 0.03) * mocap_hz - 2);
           }
 }
 

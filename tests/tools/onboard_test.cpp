@@ -45,9 +45,9 @@ class OwnFlight {
     auto estimate = sim::get<flight::Estimate<double>>(f.estimate, 0);
     estimate.velocity_m_s = estimate.body_rate_rad_s = {0, 0, 0};  // as an estimator assumes that sees the first pose
     sim::put(estimate, f.estimate, 0);
-    auto fusion = sim::get<flight::Fusion<double>>(f.fusion, 0);
-    fusion.horizon.velocity_m_s = fusion.now.velocity_m_s = {0, 0, 0};
-    sim::put(fusion, f.fusion, 0);
+    auto estimator = sim::get<flight::Estimator<double>>(f.estimator, 0);
+    estimator.horizon.velocity_m_s = estimator.now.velocity_m_s = {0, 0, 0};
+    sim::put(estimator, f.estimator, 0);
     for (auto& row : f.controller) row[0] = 0;
     f.tick[0] = kHoverTick;
     set_handed_back(true);

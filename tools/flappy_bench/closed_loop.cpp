@@ -81,7 +81,7 @@ LoopReport measure_closed_loop(const model::Vehicle& vehicle, const std::string&
   std::uint64_t cycles[flight::kStages] = {};
   candidates[0].loop.fleet().count_cycles(cycles);
   candidates[0].loop.run(options.seconds);
-  const char* names[flight::kStages] = {"controller", "physics", "sensors", "fusion", "reward, end and observation"};
+  const char* names[flight::kStages] = {"controller", "physics", "sensors", "estimator", "reward, end and observation"};
   double total = 0;
   for (const std::uint64_t c : cycles) total += static_cast<double>(c);
   for (int i = 0; i < flight::kStages; ++i)

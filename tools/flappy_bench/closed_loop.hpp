@@ -1,4 +1,4 @@
-// Speed of the closed loop: physics, sensors, fusion, controller, reward and observation of every flapper.
+// Speed of the closed loop: physics, sensors, estimator, controller, reward and observation of every flapper.
 #pragma once
 
 #include <string>

@@ -79,7 +79,7 @@ template <class C>
 void add_constants(const rollout::FlyConfig& config, Constants& to) {
   const flight::FlightConstants all = flight::flight_constants(config.fleet);
   const flight::LoopConstants<float> k = flight::rounded<float, flight::LoopConstants>(all.controller.of<C>());
-  const auto f = flight::rounded<float>(all.fusion);
+  const auto f = flight::rounded<float>(all.estimator);
   const auto task = flight::rounded<float>(all.task);
   const auto start = flight::rounded<float>(flight::start_covariance(config.fleet.sensors));
   const auto& h = task.hand_back;

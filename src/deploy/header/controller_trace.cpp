@@ -114,7 +114,7 @@ ControllerTrace record_controller(const rollout::FlyConfig& config, int periods,
   std::vector<ControllerTrace::Frame> frames;
   for (int period = 0; period < begin + periods; ++period) {
     if (period == begin) {
-      t.estimator = flight.rows(offsetof(FlightBlock<float>, fusion), flight::kFusionRows);
+      t.estimator = flight.rows(offsetof(FlightBlock<float>, estimator), flight::kEstimatorRows);
       t.estimate = flight.rows(offsetof(FlightBlock<float>, estimate), flight::kEstimateRows);
       flight::with_controller(o.controller.kind, [&]<class C>(C) {
         t.feedback = flight.rows(offsetof(FlightBlock<float>, controller), model::kRows<C::template Memory>);

@@ -31,7 +31,7 @@ struct ControllerTrace {
     float left_V, right_V;
   };
   // before the first period
-  std::vector<float> estimator, estimate, feedback;  // rows of Fusion, Estimate and the controller
+  std::vector<float> estimator, estimate, feedback;  // rows of Estimator, Estimate and the controller
   std::uint32_t tick = 0, phase = 0;
   std::int32_t handed_back = 0;
   std::int32_t horizon_us = 0, present_us = 0, last_imu_us = 0;

@@ -113,7 +113,7 @@ Seen fly_beside(const FlyConfig& config, std::size_t count, int periods, bool fe
   const std::uint32_t zero_us = 0U - static_cast<std::uint32_t>(whole_us(fleet.period_s()) * (periods / 3));  // wraps
   std::vector<std::vector<ControllerUnit>> units(all.size());
   const auto estimator_of = [](const auto& s) {
-    return rows(s.flight, offsetof(FlightBlock<float>, fusion), flight::kFusionRows);
+    return rows(s.flight, offsetof(FlightBlock<float>, estimator), flight::kEstimatorRows);
   };
   const auto estimate_of = [](const auto& s) {
     return rows(s.flight, offsetof(FlightBlock<float>, estimate), flight::kEstimateRows);
@@ -192,7 +192,7 @@ Seen fly_beside(const FlyConfig& config, std::size_t count, int periods, bool fe
             EXPECT_TRUE(c.pose(c.at(), zero_us + static_cast<std::uint32_t>(s.taken_us), s.valid, s.x.data()));
         const bool back = c.tick(c.at(), zero_us + static_cast<std::uint32_t>(end_us)) != 0;
         if (fail("hand-back", testing::AssertionResult(back == fleet.handed_back(i)))) return seen;
-        std::vector<float> estimator(flight::kFusionRows), estimate(flight::kEstimateRows),
+        std::vector<float> estimator(flight::kEstimatorRows), estimate(flight::kEstimateRows),
             pid(model::kRows<flight::Pid>);
         c.state(c.at(), estimator.data(), estimate.data(), pid.data());
         if (fail("estimator", same_bits(estimator, estimator_of(now))) ||

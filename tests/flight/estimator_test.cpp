@@ -1,6 +1,6 @@
-// Fusion: on motion known in closed form, run by the schedule as a block is, with its covariance open to the test; and whole
+// Estimator: on motion known in closed form, run by the schedule as a block is, with its covariance open to the test; and whole
 // fleets, whose innovations and errors show what sensors, schedule and filter make together.
-#include "flight/fusion.hpp"
+#include "flight/estimator.hpp"
 
 #include <gtest/gtest.h>
 
@@ -107,7 +107,7 @@ class Rig {
                       t(low_pass_share(s.imu.low_pass_hz, 1 / s.imu.rate_hz)),
                       t(gravity)};
     mocap_constants_ = {t(noise * s.mocap.position_noise_m), t(noise * s.mocap.attitude_noise_rad), 0, 1};
-    const FusionNoise& f = s.fusion;
+    const EstimatorNoise& f = s.estimator;
     constants_ = {t(sq(s.imu.gyro_noise_rad_s) / s.imu.rate_hz + sq(f.angle_drift_rad_sqrt_s)),
                   t(sq(f.gyro_bias_drift_rad_s_sqrt_s)),
                   t(sq(s.imu.accel_noise_m_s2) / s.imu.rate_hz + sq(f.velocity_drift_m_s_sqrt_s)),
@@ -128,17 +128,17 @@ class Rig {
     imu_.gyro_bias_rad_s = as<T>(gyro_bias);
     accel_bias = noise * f.accel_bias_sd_m_s2 * V{normal(), normal(), normal()};
     // the horizon as uncertain as it is said to be
-    fusion.covariance = {t(sq(s.mocap.attitude_noise_rad)), 0, t((sq(sd.x) + sq(sd.y) + sq(sd.z)) / 3),
-                         t(sq(s.mocap.position_noise_m)),   0, 0,
-                         t(sq(f.initial_velocity_sd_m_s)),  0, t(sq(f.accel_bias_sd_m_s2))};
+    estimator.covariance = {t(sq(s.mocap.attitude_noise_rad)), 0, t((sq(sd.x) + sq(sd.y) + sq(sd.z)) / 3),
+                            t(sq(s.mocap.position_noise_m)),   0, 0,
+                            t(sq(f.initial_velocity_sd_m_s)),  0, t(sq(f.accel_bias_sd_m_s2))};
     const Truth<double> first = course.at(-low_pass_lag_s(s.imu));
     const V turn = 0.5 * noise * s.mocap.attitude_noise_rad * V{normal(), normal(), normal()};
     Truth<double> x = first;
     x.attitude = turned(first.attitude, turn);
     x.position_m = first.position_m + noise * s.mocap.position_noise_m * V{normal(), normal(), normal()};
     x.velocity_m_s = first.velocity_m_s + noise * f.initial_velocity_sd_m_s * V{normal(), normal(), normal()};
-    fusion.horizon = fusion.now = {as<T>(x).attitude, as<T>(x.position_m), as<T>(x.velocity_m_s)};
-    fusion.gathered = {};
+    estimator.horizon = estimator.now = {as<T>(x).attitude, as<T>(x.position_m), as<T>(x.velocity_m_s)};
+    estimator.gathered = {};
   }
 
   void step() {
@@ -150,7 +150,7 @@ class Rig {
         const T interval = static_cast<T>(slice.imu_interval_s);
         ImuSample<T> y = sample_imu<T>(imu_constants_, 1 / interval, truth, imu_, normals(), normals());
         y.accel_m_s2 = y.accel_m_s2 + as<T>(accel_bias);
-        gather(fusion.gathered, y, interval);
+        gather(estimator.gathered, y, interval);
       }
       if (slice.mocap) {
         MocapSample<T> z = sample_mocap<T>(mocap_constants_, truth, T(1), normals(), normals());
@@ -160,28 +160,28 @@ class Rig {
       }
     }
     const auto move = [&](Pose<T>& pose, const Advance& a) {
-      advance(pose, ring_[static_cast<std::size_t>(a.slot)], fusion.gyro_bias_rad_s, fusion.accel_bias_m_s2,
+      advance(pose, ring_[static_cast<std::size_t>(a.slot)], estimator.gyro_bias_rad_s, estimator.accel_bias_m_s2,
               static_cast<T>(a.share), static_cast<T>(a.duration_s), static_cast<T>(gravity_));
     };
-    if (p.push_slot >= 0) ring_[static_cast<std::size_t>(p.push_slot)] = fusion.gathered, fusion.gathered = {};
-    for (const Fuse& f : p.fuse) {
+    if (p.push_slot >= 0) ring_[static_cast<std::size_t>(p.push_slot)] = estimator.gathered, estimator.gathered = {};
+    for (const Correction& f : p.corrections) {
       for (int i = 0; i < f.count; ++i) {
         const Advance& a = p.advance[static_cast<std::size_t>(f.first + i)];
-        move(fusion.horizon, a);
-        spread(fusion.covariance, constants_, static_cast<T>(a.share * a.duration_s));
+        move(estimator.horizon, a);
+        spread(estimator.covariance, constants_, static_cast<T>(a.share * a.duration_s));
       }
       const MocapSample<T>& z = queue_[static_cast<std::size_t>(f.slot)];
-      correct(fusion, constants_, z);
+      correct(estimator, constants_, z);
       horizon_s = pose_s_.front();
       pose_s_.erase(pose_s_.begin());
-      if (z.valid > 0 && on_pose) on_pose(fusion.angle_innovation, fusion.position_innovation);
+      if (z.valid > 0 && on_pose) on_pose(estimator.angle_innovation, estimator.position_innovation);
     }
-    if (!p.fuse.empty()) fusion.now = fusion.horizon;
-    for (const Advance& a : p.replay) move(fusion.now, a);
-    Pose<T> ahead = fusion.now;
+    if (!p.corrections.empty()) estimator.now = estimator.horizon;
+    for (const Advance& a : p.replay) move(estimator.now, a);
+    Pose<T> ahead = estimator.now;
     if (p.newest.slot >= 0) {
       rate = (1 / p.newest.duration_s) * wide(ring_[static_cast<std::size_t>(p.newest.slot)].turn_rad) -
-             wide(fusion.gyro_bias_rad_s);
+             wide(estimator.gyro_bias_rad_s);
       if (p.ahead_s > 0) move(ahead, {p.newest.slot, p.ahead_s / p.newest.duration_s, p.newest.duration_s});
     }
     present = error_of(ahead, now_s());
@@ -192,10 +192,10 @@ class Rig {
   }
 
   double now_s() const { return static_cast<double>(steps_) * kStep_s; }
-  Errors horizon() const { return error_of(fusion.horizon, horizon_s); }
+  Errors horizon() const { return error_of(estimator.horizon, horizon_s); }
   Truth<double> truth(double t) const { return course_.at(t); }
 
-  Fusion<T> fusion{};
+  Estimator<T> estimator{};
   Errors present{};  // of the estimate, at its own time
   V rate{};          // mean of the newest increment, whose middle is at middle_s
   double horizon_s = 0, middle_s = 0, blind_from_s = 1e9, blind_to_s = 1e9;
@@ -226,7 +226,7 @@ class Rig {
   Imu<T> imu_{};
   ImuConstants<T> imu_constants_;
   MocapConstants<T> mocap_constants_;
-  FusionConstants<T> constants_;
+  EstimatorConstants<T> constants_;
   std::int64_t steps_ = 0;
 };
 
@@ -251,7 +251,7 @@ Largest largest(const Sensors& s, const Course& course, double gravity = 9.81) {
 // Without noise, what is left is that an increment is taken as steady: half-way through one of T = 2 ms the angle is off by
 // w' T^2/8 and the velocity by a' T^2/8. Here w' <= 0.2 (2 pi 1.3)^2 + .. = 20 rad/s^2, a' <= 0.3 (2 pi 0.5)^3 + g w
 // = 30 m/s^3: 1e-5 rad, 1.5e-5 m/s. An estimate late by one period would be off by 3e-3 rad and 6e-3 m/s, by 30 ms 0.03 m.
-TEST(Fusion, OfPerfectSensorsIsTheTruthAtThePresent) {
+TEST(Estimator, OfPerfectSensorsIsTheTruthAtThePresent) {
   for (const Overrides& o : {Overrides{},
                              {"mocap.latency_s=0.0"},
                              {"mocap.rate_hz=97.0"},
@@ -273,7 +273,7 @@ TEST(Fusion, OfPerfectSensorsIsTheTruthAtThePresent) {
 
 // What has not arrived yet, t = 4 ms of it, is taken as steady too: w' t^2 = 3e-4 rad, a' t^2 = 5e-4 m/s. Late by it they
 // would be off by 7e-3 rad and 1.2e-2 m/s. A first-order low-pass of 60 Hz is more than a delay by (2 ms)^2 w''.
-TEST(Fusion, BridgesTheDelaysOfTheImu) {
+TEST(Estimator, BridgesTheDelaysOfTheImu) {
   for (const Overrides& o : {Overrides{"imu.latency_s=0.003"},
                              {"imu.rate_hz=333.0"},
                              {"imu.low_pass_hz=60.0"},
@@ -287,7 +287,7 @@ TEST(Fusion, BridgesTheDelaysOfTheImu) {
 }
 
 // A quaternion turned by a quarter of a turn e at a time lags by e^2/3 of it: 2e-6 of 5 rad/s x 38 ms.
-TEST(Fusion, DoesNotLagBehindSteadyMotion) {
+TEST(Estimator, DoesNotLagBehindSteadyMotion) {
   for (const char* o : {"imu.latency_s=0.0", "imu.latency_s=0.003", "imu.rate_hz=333.0", "imu.low_pass_hz=60.0"}) {
     Course gliding;
     gliding.x.rate = 2, gliding.y.rate = -1, gliding.yaw.rate = 5;
@@ -305,10 +305,13 @@ TEST(Fusion, DoesNotLagBehindSteadyMotion) {
 }
 
 /// Sensors whose noise is all that the filter is told of.
-const Overrides kExact = {"imu.gyro_bias_sd_rad_s.x=0.02",          "imu.gyro_bias_sd_rad_s.y=0.02",
-                          "imu.gyro_bias_sd_rad_s.z=0.02",          "fusion.angle_drift_rad_sqrt_s=0.0",
-                          "fusion.velocity_drift_m_s_sqrt_s=0.0",   "fusion.gyro_bias_drift_rad_s_sqrt_s=0.0",
-                          "fusion.accel_bias_drift_m_s2_sqrt_s=0.0"};
+const Overrides kExact = {"imu.gyro_bias_sd_rad_s.x=0.02",
+                          "imu.gyro_bias_sd_rad_s.y=0.02",
+                          "imu.gyro_bias_sd_rad_s.z=0.02",
+                          "estimator.angle_drift_rad_sqrt_s=0.0",
+                          "estimator.velocity_drift_m_s_sqrt_s=0.0",
+                          "estimator.gyro_bias_drift_rad_s_sqrt_s=0.0",
+                          "estimator.accel_bias_drift_m_s2_sqrt_s=0.0"};
 
 struct Sums {
   double n = 0, angle = 0, gyro_bias = 0, position = 0, velocity = 0,
@@ -328,13 +331,13 @@ Sums fly_many(const Sensors& s, const Course& course, double gravity, int runs, 
     };
     rig.fly(until_s);
     const Errors e = rig.horizon();
-    const Covariance<double>& c = rig.fusion.covariance;
+    const Covariance<double>& c = rig.estimator.covariance;
     sum.n += 1;
     sum.angle += square(e.angle) / c.angle;
-    sum.gyro_bias += square(rig.gyro_bias - rig.fusion.gyro_bias_rad_s) / c.gyro_bias;
+    sum.gyro_bias += square(rig.gyro_bias - rig.estimator.gyro_bias_rad_s) / c.gyro_bias;
     sum.position += square(e.position) / c.position;
     sum.velocity += square(e.velocity) / c.velocity;
-    sum.accel_bias += square(rig.accel_bias - rig.fusion.accel_bias_m_s2) / c.accel_bias;
+    sum.accel_bias += square(rig.accel_bias - rig.estimator.accel_bias_m_s2) / c.accel_bias;
   }
   return sum;
 }
@@ -342,7 +345,7 @@ Sums fly_many(const Sensors& s, const Course& course, double gravity, int runs, 
 // Where the model of the filter is all there is (no gravity that a tilt error would leak, no wing beat within an increment),
 // squared errors over their variance are chi-square of 3: mean 3, variance 6, one draw for each flight. Innovations are white,
 // so each pose is a draw, and neighbours do not correlate. The last poses' own correction leaves 1 % or so.
-TEST(Fusion, KnowsItsErrors) {
+TEST(Estimator, KnowsItsErrors) {
   for (const char* low_pass : {"imu.low_pass_hz=0.0", "imu.low_pass_hz=80.0"}) {
     Overrides o = kExact;
     o.emplace_back(low_pass);
@@ -364,7 +367,7 @@ TEST(Fusion, KnowsItsErrors) {
 
 // As shipped, with gravity, wing beat and turning heading: the declared drift covers what the model leaves out, and no more
 // than covers it. Velocity errors half-way through a beat are real and in none of its numbers.
-TEST(Fusion, AsShippedIsNeitherBoldNorTimid) {
+TEST(Estimator, AsShippedIsNeitherBoldNorTimid) {
   Course turning = swaying();
   turning.yaw = {0.7, 1.5, 0, 0, 0};
   for (const char* name : {"paper", "code"})
@@ -381,20 +384,20 @@ TEST(Fusion, AsShippedIsNeitherBoldNorTimid) {
     }
 }
 
-TEST(Fusion, LearnsTheBiasesItKnowsOf) {
+TEST(Estimator, LearnsTheBiasesItKnowsOf) {
   const Sensors s = sensors("paper", kExact);
   Rig<double> rig(s, swaying(0), 0, 1, 77);
-  const double gyro = rig.fusion.covariance.gyro_bias, accel = rig.fusion.covariance.accel_bias;
+  const double gyro = rig.estimator.covariance.gyro_bias, accel = rig.estimator.covariance.accel_bias;
   rig.fly(10);
-  EXPECT_LT(rig.fusion.covariance.gyro_bias, 0.01 * gyro);
-  EXPECT_LT(rig.fusion.covariance.accel_bias, 0.05 * accel);
-  EXPECT_LT(square(rig.gyro_bias - rig.fusion.gyro_bias_rad_s) / rig.fusion.covariance.gyro_bias,
+  EXPECT_LT(rig.estimator.covariance.gyro_bias, 0.01 * gyro);
+  EXPECT_LT(rig.estimator.covariance.accel_bias, 0.05 * accel);
+  EXPECT_LT(square(rig.gyro_bias - rig.estimator.gyro_bias_rad_s) / rig.estimator.covariance.gyro_bias,
             30);  // chi-square: 1e-6
-  EXPECT_LT(square(rig.accel_bias - rig.fusion.accel_bias_m_s2) / rig.fusion.covariance.accel_bias, 30);
-  EXPECT_LT(square(rig.gyro_bias - rig.fusion.gyro_bias_rad_s), 0.05 * square(rig.gyro_bias));
+  EXPECT_LT(square(rig.accel_bias - rig.estimator.accel_bias_m_s2) / rig.estimator.covariance.accel_bias, 30);
+  EXPECT_LT(square(rig.gyro_bias - rig.estimator.gyro_bias_rad_s), 0.05 * square(rig.gyro_bias));
 }
 
-TEST(Fusion, OutlivesABurstOfLosses) {
+TEST(Estimator, OutlivesABurstOfLosses) {
   double before = 0, blind = 0, said = 0, after = 0;
   constexpr int kRuns = 200;
   for (int run = 0; run < kRuns; ++run) {
@@ -403,8 +406,8 @@ TEST(Fusion, OutlivesABurstOfLosses) {
     rig.fly(1.5);
     before += square(rig.horizon().position) / kRuns;
     rig.fly(0.52);
-    blind += square(rig.horizon().position) / rig.fusion.covariance.position / kRuns;
-    said += 3 * rig.fusion.covariance.position / kRuns;
+    blind += square(rig.horizon().position) / rig.estimator.covariance.position / kRuns;
+    said += 3 * rig.estimator.covariance.position / kRuns;
     rig.fly(0.3);
     after += square(rig.horizon().position) / kRuns;
   }
@@ -420,7 +423,7 @@ void stays_positive() {
   Rig<double> exact(s, swaying(), 9.81, 1, 3);
   for (int period = 0; period < 30000; ++period) {
     rig.step(), exact.step();
-    const Covariance<T>& c = rig.fusion.covariance;
+    const Covariance<T>& c = rig.estimator.covariance;
     const auto bounded = [](double cross, double a, double b) { return cross * cross <= a * b; };
     ASSERT_TRUE(c.angle > 0 && c.gyro_bias > 0 && c.position > 0 && c.velocity > 0 && c.accel_bias > 0) << period;
     ASSERT_TRUE(bounded(c.angle_bias, c.angle, c.gyro_bias)) << period;
@@ -430,12 +433,12 @@ void stays_positive() {
     ASSERT_LT(square(rig.present.position), 1e-6) << period;
     ASSERT_LT(square(rig.present.angle), 1e-3) << period;
   }
-  const T* a = &rig.fusion.covariance.angle;
-  const double* b = &exact.fusion.covariance.angle;
+  const T* a = &rig.estimator.covariance.angle;
+  const double* b = &exact.estimator.covariance.angle;
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(a[i] / b[i], 1, 0.01) << i;
 }
 
-TEST(Fusion, StaysPositiveForAMinuteInFloat) { stays_positive<float>(); }
+TEST(Estimator, StaysPositiveForAMinuteInFloat) { stays_positive<float>(); }
 
 /// A fleet's errors: mean squares over flappers.
 struct MeanSquares {
@@ -469,13 +472,13 @@ Task travelling() {
 const Overrides kQuiet = {"imu.gyro_noise_rad_s=0.0",      "imu.accel_noise_m_s2=0.0",
                           "imu.gyro_bias_sd_rad_s.x=0.0",  "imu.gyro_bias_sd_rad_s.y=0.0",
                           "imu.gyro_bias_sd_rad_s.z=0.0",  "mocap.position_noise_m=1e-9",
-                          "mocap.attitude_noise_rad=1e-9", "fusion.initial_velocity_sd_m_s=1e-9"};
+                          "mocap.attitude_noise_rad=1e-9", "estimator.initial_velocity_sd_m_s=1e-9"};
 
 TEST(FleetFusion, OfQuietSensorsIsTheTruth) {
   Sensors s =
       sensors("paper", {"imu.gyro_noise_rad_s=0.0", "imu.accel_noise_m_s2=0.0", "imu.gyro_bias_sd_rad_s.x=0.0",
                         "imu.gyro_bias_sd_rad_s.y=0.0", "imu.gyro_bias_sd_rad_s.z=0.0", "mocap.position_noise_m=1e-9",
-                        "mocap.attitude_noise_rad=1e-9", "fusion.initial_velocity_sd_m_s=1e-9"});
+                        "mocap.attitude_noise_rad=1e-9", "estimator.initial_velocity_sd_m_s=1e-9"});
   Fleet<double> fleet(8, test::nominal(), fleet_options(s, controller("pid"), travelling()));
   double fastest = 0;
   for (int period = 0; period < 750; ++period) {

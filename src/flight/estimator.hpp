@@ -18,7 +18,7 @@ namespace flappy::flight {
 
 /// Spectral densities and variances.
 template <class T>
-struct FusionConstants {
+struct EstimatorConstants {
   T angle_noise_rad2_s, gyro_bias_drift_rad2_s3;
   T velocity_noise_m2_s3, accel_bias_drift_m2_s5;
   T mocap_angle_rad2, mocap_position_m2;
@@ -49,7 +49,7 @@ struct Covariance {
 
 /// The filter, as rows. Its poses are those of the point where the IMU sits: no lever arm turns its readings into motion.
 template <class T>
-struct Fusion {
+struct Estimator {
   Pose<T> horizon, now;
   Vec3<T> gyro_bias_rad_s, accel_bias_m_s2;
   Covariance<T> covariance;
@@ -86,7 +86,7 @@ FLAPPY_INLINE void advance(Pose<T>& x, const Increment<T>& increment, const Vec3
 }
 
 template <class T>
-FLAPPY_INLINE void spread(Covariance<T>& c, const FusionConstants<Element<T>>& k, const T& time) {
+FLAPPY_INLINE void spread(Covariance<T>& c, const EstimatorConstants<Element<T>>& k, const T& time) {
   c.angle = c.angle + time * T(T(k.angle_noise_rad2_s) + (time * c.gyro_bias - T(2) * c.angle_bias));
   c.angle_bias = c.angle_bias - time * c.gyro_bias;
   c.gyro_bias += time * T(k.gyro_bias_drift_rad2_s3);
@@ -99,13 +99,13 @@ FLAPPY_INLINE void spread(Covariance<T>& c, const FusionConstants<Element<T>>& k
 }
 
 template <class T>
-FLAPPY_INLINE Vec3<T> imu_position(const FusionConstants<Element<T>>& k) {
+FLAPPY_INLINE Vec3<T> imu_position(const EstimatorConstants<Element<T>>& k) {
   return {T(k.imu_position_m[0]), T(k.imu_position_m[1]), T(k.imu_position_m[2])};
 }
 
 /// Motion of the torso origin.
 template <class T>
-FLAPPY_INLINE Estimate<T> torso(const FusionConstants<Element<T>>& k, const Pose<T>& imu, const Vec3<T>& body_rate) {
+FLAPPY_INLINE Estimate<T> torso(const EstimatorConstants<Element<T>>& k, const Pose<T>& imu, const Vec3<T>& body_rate) {
   const Matrix3<T> R = rotation_matrix(imu.attitude);
   const Vec3<T> arm = imu_position<T>(k);
   return {imu.position_m - R * arm, imu.attitude, imu.velocity_m_s - R * cross(body_rate, arm), body_rate};
@@ -113,7 +113,7 @@ FLAPPY_INLINE Estimate<T> torso(const FusionConstants<Element<T>>& k, const Pose
 
 /// The pose of the IMU.
 template <class T>
-FLAPPY_INLINE Pose<T> imu_pose(const FusionConstants<Element<T>>& k, const Estimate<T>& torso) {
+FLAPPY_INLINE Pose<T> imu_pose(const EstimatorConstants<Element<T>>& k, const Estimate<T>& torso) {
   const Matrix3<T> R = rotation_matrix(torso.attitude);
   const Vec3<T> arm = imu_position<T>(k);
   return {torso.attitude, torso.position_m + R * arm, torso.velocity_m_s + R * cross(torso.body_rate_rad_s, arm)};
@@ -121,7 +121,7 @@ FLAPPY_INLINE Pose<T> imu_pose(const FusionConstants<Element<T>>& k, const Estim
 
 /// Corrects the horizon by a pose taken at its time; a lost pose changes nothing.
 template <class T>
-FLAPPY_INLINE void correct(Fusion<T>& f, const FusionConstants<Element<T>>& k, const MocapSample<T>& z) {
+FLAPPY_INLINE void correct(Estimator<T>& f, const EstimatorConstants<Element<T>>& k, const MocapSample<T>& z) {
   const auto lost = z.valid <= T(0);
   const T none(0);
   Covariance<T>& c = f.covariance;
