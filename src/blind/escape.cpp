@@ -51,7 +51,7 @@ class Escaper {
     if (begun) {
       const model::WingBeat<double> learnt = flight::PidController::trim(rules_.controller, before);
       if (episode_.handed_back == 0) {
-        if (tick_ % rules_.task.hold == 0) act(seen, beat, t_s, learnt);
+        if (tick_ % rules_.task.action_repeat == 0) act(seen, beat, t_s, learnt);
         if (rules_.constants.holds_trim > 0) {
           u = learnt;
           flight::PidController::unlearn(true, before, pid_);

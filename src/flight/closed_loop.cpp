@@ -40,7 +40,7 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
   bool any_due = false;
   for (int i = 0; i < kWidth<T>; ++i) {
     index[i] = static_cast<T>(f.flapper[first + i] - plan.first_flapper);
-    due[i] = f.tick[first + i] % plan.hold == 0 ? T(1) : T(0);
+    due[i] = f.tick[first + i] % plan.action_repeat == 0 ? T(1) : T(0);
     any_due |= due[i] > 0;
   }
   if (!any_due) return;

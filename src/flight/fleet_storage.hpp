@@ -86,7 +86,7 @@ struct Fleet<T>::Storage {
     plan.controller = rounded<T>(k.controller);
     plan.task = rounded<T>(k.task);
     plan.parts = options.task.parts;
-    plan.hold = options.task.hold;
+    plan.action_repeat = options.task.action_repeat;
     observed = static_cast<int>(options.task.observation().size());
     plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(k.period_s)};
   }

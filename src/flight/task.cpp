@@ -334,10 +334,11 @@ Task read_task(const io::Table& table, double tick_s) {
     k.action_low[i] = range[0];
     k.action_high[i] = range[1];
   }
-  const double hold_s = table.number_or("action.hold_s", tick_s, {tick_s, 1});
-  task.hold = static_cast<std::uint32_t>(std::lround(hold_s / tick_s));
-  if (std::abs(hold_s / tick_s - task.hold) > 1e-6)
-    table.fail("action.hold_s", "is no whole number of control periods", "n x " + io::shortest_digits(tick_s) + " s");
+  table.renamed("action.hold_s", "action.repeat_s");
+  const double repeat_s = table.number_or("action.repeat_s", tick_s, {tick_s, 1});
+  task.action_repeat = static_cast<std::uint32_t>(std::lround(repeat_s / tick_s));
+  if (std::abs(repeat_s / tick_s - task.action_repeat) > 1e-6)
+    table.fail("action.repeat_s", "is no whole number of control periods", "n x " + io::shortest_digits(tick_s) + " s");
   k.reward = read_reward(table);
 
   const auto limit = [&](const char* name, double otherwise) {

@@ -120,8 +120,8 @@ struct Task {
   std::string name;
   StartRange start;
   std::vector<Segment<double>> path;
-  std::uint32_t parts = 0;  ///< bit of each Part observed
-  std::uint32_t hold = 1;   ///< control periods for which a policy's action stays
+  std::uint32_t parts = 0;          ///< bit of each Part observed
+  std::uint32_t action_repeat = 1;  ///< control periods for which a policy's action stays
   TaskConstants<double> constants{};
 
   /// Names of the parts observed, with their signals.

@@ -62,7 +62,7 @@ void Collector::start(std::size_t i) {
 
 void Collector::begin(const std::shared_ptr<const policy::Actor>& actor) {
   fleet_.set_actor(actor);
-  fleet_.begin(static_cast<int>(fly_.fleet.task.hold));
+  fleet_.begin(static_cast<int>(fly_.fleet.task.action_repeat));
 }
 
 void Collector::run(std::size_t item) {

@@ -43,7 +43,10 @@ class Part {
  public:
   Part(const FlyConfig& config, const flight::FleetOptions& options, std::size_t count,
        const std::vector<flight::Snapshot<T>>& hover, const Pilot& pilot, Detail detail)
-      : fleet_(count, config.vehicle, options), pilot_(pilot), outcomes_(count), hold_(options.task.hold) {
+      : fleet_(count, config.vehicle, options),
+        pilot_(pilot),
+        outcomes_(count),
+        action_repeat_(options.task.action_repeat) {
     for (std::size_t i = 0; i < count; ++i) {
       if (!hover.empty()) {
         fleet_.start(i, 0, hover[i]);
@@ -60,7 +63,7 @@ class Part {
   }
 
   void step() {
-    if (pilot_.policy != nullptr && tick_ % hold_ == 0) act();
+    if (pilot_.policy != nullptr && tick_ % action_repeat_ == 0) act();
     fleet_.step();
     ++tick_;
     if (followers_.empty()) return;
@@ -126,7 +129,7 @@ class Part {
   std::vector<double> drawn_J_;  // by the motors, until the last tick
   std::vector<std::size_t> acting_;
   std::vector<float> observation_, action_;
-  std::int64_t tick_ = 0, hold_;
+  std::int64_t tick_ = 0, action_repeat_;
 };
 
 template <class T>

@@ -92,7 +92,7 @@ FleetOptions options(const std::string& name) {
   o.task.constants.limits.x_high_m = 0.1;
   o.task.constants.reward = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7,   0.8, 0.9, 1, 1.1, 0.1, 1.2,
                              0.3, 0.2, 10,  0.5, 20,  3,   0.006, 1.5, 0.1, 2, 1.3, 0.7};
-  o.task.hold = 3;
+  o.task.action_repeat = 3;
   return o;
 }
 

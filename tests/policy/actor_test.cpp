@@ -152,7 +152,7 @@ TEST(Actor, ActsInAFleetOnWhatItObserves) {
 
 TEST(Actor, HoldsItsActionAndGathersWhatItEarns) {
   FleetOptions o = hovering();
-  o.task.hold = 3;
+  o.task.action_repeat = 3;
   const auto actor = std::make_shared<policy::Actor>(fitting(o.task));
   Fleet<double> fleet(2, test::nominal(), o);
   fleet.set_actor(actor);
@@ -171,7 +171,7 @@ TEST(Actor, HoldsItsActionAndGathersWhatItEarns) {
 
 TEST(Actor, ExploresWithNoiseOfItsDeviationAndMemory) {
   FleetOptions o = hovering();
-  o.task.hold = 2;
+  o.task.action_repeat = 2;
   policy::Actor quiet = fitting(o.task);
   for (double& w : quiet.weights) w = 0;
   const std::size_t n = 256;

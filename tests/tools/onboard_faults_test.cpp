@@ -251,9 +251,9 @@ TEST(OnboardFaults, DoesNotCompileWithHeadersThatDoNotFit) {
   const auto has = [](const std::string& text, const char* part) { return text.find(part) != text.npos; };
   const Headers& good = escape_headers();
   Words other = kShort;
-  other.push_back("task.action.hold_s=0.02");
+  other.push_back("task.action.repeat_s=0.02");
   EXPECT_TRUE(has(complaint({policy_text(escape(other)), good.controller}), "differ in task, periods, signals"));
-  other.back() = "task.action.hold_s=0.012";
+  other.back() = "task.action.repeat_s=0.012";
   other.push_back("flight.control_hz=250.0");
   EXPECT_TRUE(has(complaint({policy_text(escape(other)), controller_text(escape(other))}), "is not this loop's"));
   EXPECT_TRUE(

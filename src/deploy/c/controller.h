@@ -240,7 +240,7 @@ static inline void flappy_controller_observe(const flappy_controller *c, float o
 
 /* Whether the policy is to act now. */
 static inline int flappy_controller_policy_due(const flappy_controller *c) {
-  return !c->handed_back && c->tick % FLAPPY_CONTROLLER_HOLD == 0;
+  return !c->handed_back && c->tick % FLAPPY_CONTROLLER_ACTION_REPEAT == 0;
 }
 
 /* What the policy adds from now on until the hand-back; what is not finite adds nothing. */

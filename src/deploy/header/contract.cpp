@@ -42,7 +42,8 @@ bool holds_trim(const FlyConfig& config) { return config.fleet.task.constants.ho
 
 Periods periods_of(const FlyConfig& config) {
   const double control_s = 1 / config.fleet.control_hz;
-  return {whole_us("a control period", control_s), whole_us("a policy's period", control_s * config.fleet.task.hold),
+  return {whole_us("a control period", control_s),
+          whole_us("a policy's period", control_s * config.fleet.task.action_repeat),
           whole_us("the driver's hold", config.vehicle.driver.hold_s)};
 }
 

@@ -257,7 +257,7 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
        << contract_macros("FLAPPY_CONTROLLER_", config, run);
   define("DRIVE_US", number(periods.driver_us));
   define("PHASE_STEP", number(phase_step) + " /* of the wing beat, 2^32 each, in that time */");
-  define("HOLD", number(o.task.hold) + " /* control periods for which the policy's output stays */");
+  define("ACTION_REPEAT", number(o.task.action_repeat) + " /* control periods for which the policy's output stays */");
   define("OBS", std::to_string(o.task.observation().size()));
   define("PARTS", number(o.task.parts) + " /* of the observation: bits in flappy_controller_observe() */");
   define("HANDS_BACK", o.task.constants.hand_back.enabled > 0 ? "1" : "0");

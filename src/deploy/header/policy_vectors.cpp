@@ -84,9 +84,9 @@ policy::PolicyVectors roll_out(const rollout::FlyConfig& config, std::size_t fir
   const long ticks = std::lround(config.duration_s / fleet.period_s());
   for (long tick = 0; tick < ticks; ++tick) {
     std::vector<std::size_t> acting;
-    for (std::size_t i = 0; i < flights && tick % o.task.hold == 0; ++i)
+    for (std::size_t i = 0; i < flights && tick % o.task.action_repeat == 0; ++i)
       if (fleet.ended(i) == 0 && !fleet.handed_back(i)) acting.push_back(i);
-    if (acting.empty() && tick % o.task.hold == 0) break;
+    if (acting.empty() && tick % o.task.action_repeat == 0) break;
     for (const std::size_t i : acting) {
       std::vector<float>& seen = each[i].observation;
       seen.resize(seen.size() + inputs);

@@ -282,7 +282,7 @@ TEST(Contract, ChangesWithWhatHeadersMustShare) {
   const std::uint32_t own = contract_crc32(config);
   rollout::FlyConfig other = config;
   EXPECT_EQ(contract_crc32(other), own);
-  other.fleet.task.hold = 1;
+  other.fleet.task.action_repeat = 1;
   EXPECT_NE(contract_crc32(other), own);
   other = config;
   other.fleet.control_hz = 250;
