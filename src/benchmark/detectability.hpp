@@ -4,7 +4,7 @@
 // A robot without effects flies; everything else is a change of its rows, found by carrying the robot with and without an
 // effect along the flights (oracle_carry.hpp), or by sensing the same flight again. The rows have the noise that is left once
 // the robot itself is carried, and the floor of gap::Evidence, what every model of a wing gets wrong; together with the
-// uncertain parameters and the little that every vehicle has of every entry of the catalogue (gap/model_error.hpp), integrated
+// uncertain parameters and the little that every vehicle has of every entry of the catalogue (gap/evidence/model_discrepancy.hpp), integrated
 // out, that is one normal distribution, N(0, C). An effect in force moves its mean by d.
 //
 // A hypothesis has columns M beside the parameters, a ~ N(0, P^-1) of them: r ~ N(0, C + M P^-1 M'). With A = M' C^-1 M and
@@ -55,7 +55,7 @@ class Subject {
   /// simulator. `uncertain`: draws, about any vehicle.
   std::vector<gap::Smooth> parameters(const sim::Randomisation& uncertain) const;
   std::vector<gap::Smooth> simulated_parameters(const sim::Randomisation& uncertain) const;
-  /// What every vehicle has a little of (gap/model_error.hpp), in the simulator.
+  /// What every vehicle has a little of (gap/evidence/model_discrepancy.hpp), in the simulator.
   std::vector<gap::Smooth> background() const;
   /// The same of coordinates of an entry of the catalogue, in the simulator.
   std::vector<gap::Smooth> catalogue(const std::string& effect, const std::vector<Eigen::VectorXd>& coordinates) const;

@@ -57,7 +57,7 @@ Subject::Subject(blind::Case c, std::vector<blind::Flight> flights, int threads)
                            "; accepted: robots that fly");
     flights_.emplace_back(gap::Recording(name, std::move(flights[k].log), case_.vehicle));
   }
-  evidence_ = std::make_unique<gap::Evidence>(flights_, threads_);
+  evidence_ = std::make_unique<gap::Evidence>(flights_, gap::read_model_discrepancy(), threads_);
   std::vector<double> declared;
   for (int g = 0; g < gap::kGroups; ++g) declared.push_back(evidence_->noise_sd(g));
 
@@ -188,7 +188,7 @@ std::vector<Smooth> Subject::background() const {
     for (Index i = 0; i < n; ++i)
       if (unknowns[static_cast<std::size_t>(i)].size) axes.emplace_back(kSizeReach * Eigen::VectorXd::Unit(n, i));
     for (const Smooth& s : catalogue(e.info.id, axes))
-      if (s.size() > 0) result.emplace_back(gap::background_sd(e.info.id) / kSizeReach * s);
+      if (s.size() > 0) result.emplace_back(evidence_->discrepancy().background_sd(e.info.id) / kSizeReach * s);
   }
   return result;
 }

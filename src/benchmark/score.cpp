@@ -16,7 +16,7 @@ using model::group_of;
 using Names = std::vector<std::string>;
 using Cases = std::vector<const ScoredCase*>;
 
-constexpr double kAbstains = 0.5, kConfident = 0.9, kSureOfGain = 2;
+constexpr double kConfident = 0.9, kSureOfGain = 2;
 /// Of rich flights with motion capture and IMU, each robot once: what claims are judged by.
 constexpr const char* kClaiming[] = {"singles", "none", "parameters", "withheld", "pairs"};
 
@@ -239,8 +239,6 @@ ScoreLine pairs_line(const Cases& cases) {
 }
 
 }  // namespace
-
-bool abstains(const Prediction& p) { return p.kind == "group" || p.probability < kAbstains; }
 
 bool right(const Truth& t, const Prediction& p) {
   if (t.part == "none") return p.kind == "none" || p.kind == "parameters";

@@ -42,9 +42,6 @@ struct Scores {
 
 Scores score(const std::vector<ScoredCase>& cases);
 
-/// Whether a verdict names no one answer as the likelier one: `group`, or less than one half.
-bool abstains(const Prediction& prediction);
-
 /// Whether the verdict is what it should be.
 bool right(const Truth& truth, const Prediction& prediction);
 

@@ -189,7 +189,7 @@ TEST(OracleSubject, LessThanEveryVehicleHasSaysNothing) {
   // a column is as large as the catalogue's entry at that coordinate
   const std::string first = model::effects().front().info.id;
   const auto unknowns = static_cast<Index>(gap::unknowns_of(first).size());
-  const double sd = gap::background_sd(first), reach = 0.4;
+  const double sd = gap::read_model_discrepancy().background_sd(first), reach = 0.4;
   const std::vector<VectorXd> at = {reach * VectorXd::Unit(unknowns, 0)};
   const gap::Smooth there = subject.catalogue(first, at)[0];
   EXPECT_LT((background.front() - sd / reach * there).norm(), 1e-12 * there.norm());

@@ -122,6 +122,8 @@ int main(int argc, char** argv) {
   diagnose->add_option("--vehicle", command.vehicle, "the vehicle's file, as it was believed")->required();
   diagnose->add_option("--flights", command.flights, "folders of flight logs")->required();
   diagnose->add_option("--priors", command.priors, "what is uncertain of the vehicle")->capture_default_str();
+  diagnose->add_option("--discrepancy", command.discrepancy, "what every model gets wrong")->capture_default_str();
+  diagnose->add_option("--verdict", command.verdict, "constants of the verdict")->capture_default_str();
   diagnose->add_option("--manoeuvre", command.manoeuvre,
                        "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
   diagnose->add_option("--withhold", command.withheld, "entries that the catalogue is to lack");

@@ -8,6 +8,8 @@
 
 namespace flappy::benchmark {
 
+bool abstains(const Prediction& p) { return p.kind == "group" || p.probability < 0.5; }
+
 Prediction predict(const Question& q) {
   const model::Vehicle vehicle = model::read_vehicle(q.vehicle);
   const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(q.priors).root());

@@ -41,6 +41,9 @@ struct Prediction {
   /// Of a verdict that abstains: the two answers that the manoeuvre proposed tells apart, effects joined by +; or none.
   std::vector<std::string> next;
 };
+/// Whether a verdict names no one answer as the likelier one: `group`, or less than one half.
+bool abstains(const Prediction& prediction);
+
 inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "stlsq"};
 
 struct Question {

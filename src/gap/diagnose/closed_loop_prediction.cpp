@@ -6,8 +6,8 @@
 #include <limits>
 #include <numbers>
 
-#include "rollout/simulated_flight.hpp"
 #include "io/parallel.hpp"
+#include "rollout/simulated_flight.hpp"
 
 namespace flappy::gap {
 namespace {

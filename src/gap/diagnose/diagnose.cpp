@@ -6,10 +6,9 @@
 #include <numbers>
 #include <optional>
 
-#include "gap/localise/closure.hpp"
-#include "gap/evidence/model_error.hpp"
-#include "gap/evidence/screening.hpp"
 #include "gap/diagnose/verdict.hpp"
+#include "gap/evidence/screening.hpp"
+#include "gap/localise/closure.hpp"
 #include "io/parallel.hpp"
 #include "model/effects/registry.hpp"
 
@@ -20,25 +19,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What a further effect has to gain in the linear screening to be fitted.
-constexpr double kLeastFurther = 8;
-/// A coordinate of a size that is as good as 0.
-constexpr double kVanished = 0.005;
-/// How much larger than what every model gets wrong a term which no entry explains may be.
-constexpr double kUnexplained[] = {2, 4, 8, 16};
-constexpr int kMostTerms = 12, kTried = 3;
-/// Nats that a term has to bring beyond those of choosing it: single floors are exceeded now and then.
-constexpr double kTermCost = 10;
-/// Nats that an entry gains before its equation's errors count: beyond, an unknown cause has to explain as much again.
-constexpr double kLarge = 350;
-/// What was thought before any flight: how often a gap is of each kind.
-constexpr double kPriorNone = 0.1, kPriorParameters = 0.15, kPriorEffect = 0.6, kPriorUnknown = 0.15;
-/// Nats that an entry may gain on a robot without any effect, for two makers' models differ by more here and there than their
-/// floors say: so much of its gain tells nothing, and more of what a further entry gains, to which the first one's errors are left.
-constexpr double kByChance = 12, kByChanceBeside = 16;
-/// For every further effect.
-constexpr double kPriorFurther = 0.1;
-
 class Diagnoser {
  public:
   Diagnoser(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
@@ -46,9 +26,10 @@ class Diagnoser {
       : flights_(flights),
         uncertain_(uncertain),
         options_(options),
+        rule_(options.rule),
         threads_(io::thread_count(options.threads)),
         all_(flights.size(), 1),
-        evidence_(flights, threads_),
+        evidence_(flights, options.discrepancy, threads_),
         fitter_(flights, evidence_, threads_) {}
 
   Diagnosis run() {
@@ -59,16 +40,16 @@ class Diagnoser {
     progress(0.3, "screening effects");
     const std::vector<SizeColumn> columns = size_columns({}, parameters_);
     std::vector<Smooth> background;
-    for (const SizeColumn& c : columns) background.push_back(background_sd(c.effect) * c.change);
+    for (const SizeColumn& c : columns) background.push_back(options_.discrepancy.background_sd(c.effect) * c.change);
     fitter_.set_background(std::move(background));
     parameters_ = fitter_.refit(plain, parameters_, 4);
     d.parameters = parameters_;
     around_ = surroundings_of(flights_, noise_sd());
     loss_ = losses_of(around_, parameters_.point.residual);
-    d.answers.push_back(weigh(Answer::Kind::none, plain, nominal, std::log(kPriorNone)));
+    d.answers.push_back(weigh(Answer::Kind::none, plain, nominal, std::log(rule_.prior.none)));
     plain_ = log_evidence(plain, parameters_.point);
-    d.answers.push_back(weigh(Answer::Kind::parameters, plain, parameters_.point, std::log(kPriorParameters)));
-    Answer unknown = explain_freely(plain, parameters_.point, std::log(kPriorUnknown));
+    d.answers.push_back(weigh(Answer::Kind::parameters, plain, parameters_.point, std::log(rule_.prior.parameters)));
+    Answer unknown = explain_freely(plain, parameters_.point, std::log(rule_.prior.unknown));
     const double parameters = d.answers[1].log_evidence;
 
     std::vector<Answer> singles;
@@ -88,7 +69,7 @@ class Diagnoser {
       for (int n = 2; n <= options_.most_effects; ++n) {
         if (!progress(0.7 + 0.1 * n, "looking beside " + best.effects.back())) break;
         const auto beside = screen(evidence_, fitter_, best.fit, size_columns(best.effects, best.fit));
-        if (beside.empty() || beside.front().gain < kLeastFurther) break;
+        if (beside.empty() || beside.front().gain < rule_.gain.further_screened_nats) break;
         std::vector<Screened> set = screened_of(best);
         set.push_back(beside.front());
         Answer more = fit_effects(set);
@@ -100,18 +81,19 @@ class Diagnoser {
     // what looks like an entry at first, and leaves more than that entry's equation may
     const auto best = std::ranges::max_element(singles, {}, &Answer::log_evidence);
     if (best != singles.end() && best->fitted()) {
-      const double log_prior = std::log(kPriorUnknown / static_cast<double>(model::effects().size()));
+      const double log_prior = std::log(rule_.prior.unknown / static_cast<double>(model::effects().size()));
       Answer beside = explain_freely(Hypothesis(uncertain_, best->effects), best->fit.point, log_prior);
       if (!beside.terms.empty() && beside.log_evidence > unknown.log_evidence) unknown = std::move(beside);
-      unknown.log_evidence -= std::max(0.0, best->log_evidence - parameters - kLarge);
+      unknown.log_evidence -= std::max(0.0, best->log_evidence - parameters - rule_.unknown.large_effect_nats);
     }
     d.answers.push_back(std::move(unknown));
     for (Answer& a : singles) {
-      if (a.fitted()) widen(a.fit, Hypothesis(uncertain_, a.effects));
+      if (a.fitted()) widen(a.fit, Hypothesis(uncertain_, a.effects), rule_);
       d.answers.push_back(std::move(a));
     }
     d.complete = !stopped_;
-    set_probabilities(d.answers);
+    set_probabilities(d.answers, rule_);
+    d.conclusion = conclude(d.answers, rule_);
     d.nominal = nominal.residual;
     hold_out(d);
     d.noise_sd = noise_sd();
@@ -150,14 +132,15 @@ class Diagnoser {
     const Smooth own = fitter_.form_error(h, l);
     const Smooth floor = evidence_.floor();
     std::vector<double> each;
-    for (const Mistaken& m : kMistaken)
+    for (const ModelDiscrepancy::Scale& m : options_.discrepancy.scales)
       each.push_back(std::log(m.probability) + posterior(l, c, all_, together(m.factor * floor, own)).log_evidence);
     const double most = *std::ranges::max_element(each);
     double sum = 0;
     for (const double e : each) sum += std::exp(e - most);
     const double all = most + std::log(sum), gain = all - plain_;
     if (h.effects().empty()) return all;
-    const double by_chance = kByChance + kByChanceBeside * static_cast<double>(h.effects().size() - 1);
+    const double by_chance =
+        rule_.gain.by_chance_nats + rule_.gain.further_by_chance_nats * static_cast<double>(h.effects().size() - 1);
     return plain_ + std::max(gain - by_chance, std::min(gain, 0.0));
   }
 
@@ -189,11 +172,12 @@ class Diagnoser {
             for (int g = 0; g < kGroups; ++g)
               if (t.has(g) && has_rows(g / kCoefficients, g % kCoefficients)) signal += evidence_.signal(g);
             for (t.function = 0; signal > 0 && t.function < evidence_.basis().size(); ++t.function)
-              for (const double times : kUnexplained) all.push_back({{t.channel, t.harmonic, t.function, times}, 0});
+              for (const double times : rule_.unknown.times)
+                all.push_back({{t.channel, t.harmonic, t.function, times}, 0});
           }
         constexpr double kKinds = 4;
         for (std::size_t i = first; i < all.size(); ++i)
-          all[i].cost = std::log(kKinds * static_cast<double>(all.size() - first)) + kTermCost;
+          all[i].cost = std::log(kKinds * static_cast<double>(all.size() - first)) + rule_.unknown.term_cost_nats;
       }
     return all;
   }
@@ -209,24 +193,25 @@ class Diagnoser {
     a.beside = h.effects();
     double gained = 0;
     std::vector<Possible> possible = possible_terms();
-    for (int n = 0; n < kMostTerms; ++n) {
+    for (int n = 0; n < rule_.unknown.terms; ++n) {
       Statistics settled = l.statistics;  // with the columns where they are most probable
       for (std::size_t k = 0; k < c.columns.size(); ++k)
         evidence_.add(-now.mean[static_cast<Index>(k)], *c.columns[k], settled);
       std::map<double, Smooth> gains;
-      for (const double times : kUnexplained) gains[times] = evidence_.local_gains(settled, all_, sd, times * floor);
+      for (const double times : rule_.unknown.times)
+        gains[times] = evidence_.local_gains(settled, all_, sd, times * floor);
       for (Possible& p : possible) {
         p.term.gain = -p.cost;
         for (int g = 0; g < kGroups; ++g)
           if (p.term.has(g)) p.term.gain += gains[p.term.times](g, p.term.function);
       }
-      std::ranges::partial_sort(possible, possible.begin() + kTried, std::greater{},
+      std::ranges::partial_sort(possible, possible.begin() + rule_.unknown.tried, std::greater{},
                                 [](const Possible& p) { return p.term.gain; });
       // of the first, what they gain with columns that follow
       std::optional<Term> best;
       Smooth best_sd;
       Posterior best_posterior;
-      for (int i = 0; i < kTried; ++i) {
+      for (int i = 0; i < rule_.unknown.tried; ++i) {
         Term t = possible[static_cast<std::size_t>(i)].term;
         Smooth room = sd;
         for (int g = 0; g < kGroups; ++g)
@@ -292,7 +277,7 @@ class Diagnoser {
         const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
         if (u.effect == e && u.size) largest = std::max(largest, std::abs(a.fit.point.at[i]));
       }
-      if (largest < kVanished) return true;
+      if (largest < rule_.gain.vanished_size) return true;
     }
     return false;
   }
@@ -319,7 +304,9 @@ class Diagnoser {
     return a;
   }
 
-  static double log_prior_of_one() { return std::log(kPriorEffect / static_cast<double>(model::effects().size())); }
+  double log_prior_of_one() const {
+    return std::log(rule_.prior.effect / static_cast<double>(model::effects().size()));
+  }
 
   Answer fit_effects(const std::vector<Screened>& set) const {
     std::vector<std::string> effects;
@@ -333,7 +320,7 @@ class Diagnoser {
       at += s.coordinates.size();
     }
     Fit fit = fitter_.fit(h, h.bounded(start), parameters_, 6);
-    if (fit.point.residual.empty() || refuted(loss_, losses_of(around_, fit.point.residual))) {
+    if (fit.point.residual.empty() || refuted(loss_, losses_of(around_, fit.point.residual), rule_)) {
       Answer none;
       none.kind = Answer::Kind::effect;
       none.effects = effects;
@@ -341,7 +328,7 @@ class Diagnoser {
     }
     double log_prior = log_prior_of_one();
     for (std::size_t i = 1; i < set.size(); ++i)
-      log_prior += std::log(kPriorFurther / static_cast<double>(model::effects().size()));
+      log_prior += std::log(rule_.prior.further_effect / static_cast<double>(model::effects().size()));
     for (Index i = h.shared(); i < h.size(); ++i) {
       const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
       if (u.size && u.low >= 0) log_prior += std::log(2.0);
@@ -392,6 +379,7 @@ class Diagnoser {
   const std::vector<CarriedFlight>& flights_;
   const sim::Randomisation& uncertain_;
   const DiagnoseOptions& options_;
+  const VerdictRule& rule_;
   int threads_;
   std::vector<char> all_;
   Evidence evidence_;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "gap/diagnose/verdict_rule.hpp"
 #include "gap/evidence/fit.hpp"
 
 namespace flappy::gap {
@@ -44,11 +45,22 @@ struct DiagnoseOptions {
   int most_effects = 3;
   std::vector<std::string> withheld;                                    ///< entries that the catalogue is to lack
   std::function<bool(double share, const std::string& what)> progress;  ///< false: no further effect is fitted
+  ModelDiscrepancy discrepancy = read_model_discrepancy();
+  VerdictRule rule = read_verdict_rule();
+};
+
+/// What is claimed of the answers.
+struct Conclusion {
+  enum class Kind { effect, group, parameters, none, unknown, data } kind = Kind::unknown;
+  std::vector<std::string> effects;  ///< of a group: of its sets that hold a twentieth of it
+  double probability = 0;            ///< of a group: all of it
+  std::size_t answer = 0;            ///< the most probable one of what is concluded
 };
 
 struct Diagnosis {
-  bool complete = true;          ///< false: progress had it stop before every effect was weighed
-  std::vector<Answer> answers;   ///< most probable first
+  bool complete = true;         ///< false: progress had it stop before every effect was weighed
+  std::vector<Answer> answers;  ///< most probable first
+  Conclusion conclusion;
   Fit parameters;                ///< without any effect
   Signature nominal;             ///< what is left of the measurement with the vehicle's file
   Signature refit;               ///< with parameters alone: in each flight what is left with the fit to the others

@@ -39,10 +39,7 @@ Logs read_logs(const DiagnoseCommand& command) {
 }
 
 Diagnosis diagnose_visibly(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
-                           const std::vector<std::string>& withheld, int threads) {
-  DiagnoseOptions options;
-  options.threads = threads;
-  options.withheld = withheld;
+                           DiagnoseOptions options) {
   io::ProgressLine line("diagnosing");
   std::string noted;
   options.progress = [&](double share, const std::string& what) {
@@ -105,7 +102,7 @@ struct Asked {
   sim::Randomisation uncertain;
   rollout::FlyConfig pilot;
   std::vector<Manoeuvre> manoeuvres;
-  std::vector<std::string> withheld;
+  DiagnoseOptions options;
 };
 
 Asked read_asked(const DiagnoseCommand& command) {
@@ -122,9 +119,15 @@ Asked read_asked(const DiagnoseCommand& command) {
     for (std::string& member : model::whole_group(id)) withheld.push_back(std::move(member));
   }
   flightlog::check_each_once(command.flights);
-  return {vehicle, sim::read_randomisation(vehicle, io::Config::load(command.priors).root()),
+  return {vehicle,
+          sim::read_randomisation(vehicle, io::Config::load(command.priors).root()),
           rollout::read_fly_config(command.manoeuvre.empty() ? FLAPPY_CONFIGS "/fly/hover.toml" : command.manoeuvre),
-          read_manoeuvres(FLAPPY_CONFIGS "/gap/experiments"), withheld};
+          read_manoeuvres(FLAPPY_CONFIGS "/gap/experiments"),
+          {.threads = command.threads,
+           .withheld = withheld,
+           .progress = {},
+           .discrepancy = read_model_discrepancy(command.discrepancy),
+           .rule = read_verdict_rule(command.verdict)}};
 }
 
 /// In closed loop, and what to fly next; each left out after Ctrl-C.
@@ -141,6 +144,7 @@ void look_ahead(const DiagnoseCommand& command, const Asked& asked, const std::v
   line.show(0.5, "weighing what to fly next");
   NextOptions next;
   next.threads = command.threads;
+  next.discrepancy = asked.options.discrepancy;
   const auto ranked = rank_experiments(d, asked.uncertain, asked.manoeuvres, next);
   if (!ranked.empty()) report.next = ranked.front();
 }
@@ -161,8 +165,7 @@ Json run_diagnose(const DiagnoseCommand& command) {
   std::vector<CarriedFlight> flights;
   for (std::size_t f = 0; !faulty && f < read.logs.size(); ++f)
     flights.emplace_back(Recording(command.flights[f], std::move(read.logs[f]), asked.vehicle));
-  const Diagnosis d =
-      faulty ? Diagnosis() : diagnose_visibly(flights, asked.uncertain, asked.withheld, command.threads);
+  const Diagnosis d = faulty ? Diagnosis() : diagnose_visibly(flights, asked.uncertain, asked.options);
   // of an earlier diagnosis nothing stays beside this one
   for (const char* name : kFiles)
     if (std::error_code error; !out.empty()) std::filesystem::remove(out / name, error);

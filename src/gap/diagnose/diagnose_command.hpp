@@ -8,7 +8,9 @@
 namespace flappy::gap {
 
 struct DiagnoseCommand {
-  std::string vehicle, priors = FLAPPY_CONFIGS "/gap/priors.toml";
+  std::string vehicle, priors = FLAPPY_CONFIGS "/gap/priors.toml",
+                       discrepancy = FLAPPY_CONFIGS "/gap/model_discrepancy.toml",
+                       verdict = FLAPPY_CONFIGS "/gap/verdict.toml";
   std::string
       manoeuvre;  ///< configuration of flappy-fly that the flights flew; empty: the recorded paths, under our hover's
   std::vector<std::string> flights, withheld;

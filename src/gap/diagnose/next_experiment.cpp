@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "rollout/simulated_flight.hpp"
 #include "io/parallel.hpp"
+#include "rollout/simulated_flight.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -95,7 +95,8 @@ double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
   return Evidence::posterior(reduced, chosen, prior_mean).log_evidence - with;
 }
 
-std::optional<NextExperiment> judge(const Manoeuvre& m, const std::vector<Rival>& rivals) {
+std::optional<NextExperiment> judge(const Manoeuvre& m, const std::vector<Rival>& rivals,
+                                    const ModelDiscrepancy& discrepancy) {
   std::vector<rollout::SimulatedFlight> flown;
   for (const Rival& r : rivals) {
     flown.push_back(std::move(simulate(m.config, r.candidate().vehicle, 1, m.config.settle_s)[0]));
@@ -106,7 +107,7 @@ std::optional<NextExperiment> judge(const Manoeuvre& m, const std::vector<Rival>
     list.emplace_back(Recording(m.name, std::move(*flown.front().log), rivals.front().candidate().vehicle));
     return list;
   }();
-  const Evidence evidence(flight, 1);
+  const Evidence evidence(flight, discrepancy, 1);
   const Fitter fitter(flight, evidence, 1);
   std::vector<Expected> expected;
   for (const Rival& r : rivals) {
@@ -147,7 +148,8 @@ std::vector<NextExperiment> rank_experiments(const Diagnosis& diagnosis, const s
   const std::vector<Rival> rivals = rivals_of(diagnosis, uncertain, options.most_rivals);
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
-  io::parallel_for(manoeuvres.size(), options.threads, [&](std::size_t i) { found[i] = judge(manoeuvres[i], rivals); });
+  io::parallel_for(manoeuvres.size(), options.threads,
+                   [&](std::size_t i) { found[i] = judge(manoeuvres[i], rivals, options.discrepancy); });
   std::vector<NextExperiment> list;
   for (std::optional<NextExperiment>& e : found)
     if (e) list.push_back(std::move(*e));

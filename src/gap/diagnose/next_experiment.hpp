@@ -36,6 +36,7 @@ struct NextExperiment {
 struct NextOptions {
   int threads = 0;
   std::size_t most_rivals = 4;
+  ModelDiscrepancy discrepancy = read_model_discrepancy();
 };
 
 /// Best first. Rivals are the most probable answers that can fly: an unknown cause cannot. Without two of them, and for a

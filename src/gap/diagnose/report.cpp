@@ -83,7 +83,7 @@ std::string unit_of(const std::string& name) {
 Report answers_of(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain, const Diagnosis& d) {
   Report r;
   r.complete = d.complete;
-  r.conclusion = conclude(d.answers);
+  r.conclusion = d.conclusion;
   const Surroundings around = surroundings_of(flights, d.noise_sd);
   r.noise_floor = huber_floor();
   const Losses refit = losses_of(around, d.refit);

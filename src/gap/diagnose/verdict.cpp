@@ -7,24 +7,6 @@
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
-namespace {
-
-/// One set is named when it holds so much of everything, or of its pool.
-constexpr double kOfAll = 0.5, kOfPool = 0.8;
-/// Of its pool, what is worth a name in a group.
-constexpr double kLeastShare = 0.05;
-
-/// Of refuted().
-constexpr double kWorse = 0.3;
-/// By how much the figures of an effect are farther off than rows and floors alone let expect, and how far a size is off because
-/// the robot's effect has another form than the entry, as a share of itself.
-constexpr double kWider = 1.4, kSizeError = 0.1;
-
-/// Of what speaks for entries: how often it is a cause that no entry has and that looks like one, and how often it is another
-/// entry, whose equation is so far off that a rival's describes it better.
-constexpr double kMimicked = 0.06, kConfused = 0.06;
-
-}  // namespace
 
 const char* kind_name(Conclusion::Kind kind) {
   static const char* const kNames[] = {"effect", "group", "parameters", "none", "unknown", "data"};
@@ -45,22 +27,23 @@ std::string pool_name(const std::vector<std::string>& effects) {
   return name;
 }
 
-bool refuted(const Losses& parameters, const Losses& effects) {
+bool refuted(const Losses& parameters, const Losses& effects, const VerdictRule& rule) {
   const auto before = parameters.mean(), after = effects.mean();
-  return before && after && *after - *before > kWorse * (*before - huber_floor());
+  return before && after && *after - *before > rule.refutation.share_of_gap * (*before - huber_floor());
 }
 
-void widen(Fit& fit, const Hypothesis& hypothesis) {
+void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
   const Eigen::VectorXd mean = fit.mean();
   Eigen::MatrixXd& covariance = fit.posterior.covariance;
   for (Eigen::Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
-    covariance.row(i) *= kWider;
-    covariance.col(i) *= kWider;
-    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].size) covariance(i, i) += std::pow(kSizeError * mean[i], 2);
+    covariance.row(i) *= rule.interval.sd_factor;
+    covariance.col(i) *= rule.interval.sd_factor;
+    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].size)
+      covariance(i, i) += std::pow(rule.interval.size_error * mean[i], 2);
   }
 }
 
-void set_probabilities(std::vector<Answer>& answers) {
+void set_probabilities(std::vector<Answer>& answers, const VerdictRule& rule) {
   std::ranges::sort(answers, std::greater{}, &Answer::log_evidence);
   const double most = answers.empty() ? 0 : answers.front().log_evidence;
   double sum = 0, of_effects = 0, effects = 0;
@@ -70,14 +53,15 @@ void set_probabilities(std::vector<Answer>& answers) {
     if (a.kind == Answer::Kind::effect) of_effects += a.probability, effects += 1;
   }
   for (Answer& a : answers) {
-    if (a.kind == Answer::Kind::unknown) a.probability += kMimicked * of_effects;
+    if (a.kind == Answer::Kind::unknown) a.probability += rule.doubt.unknown * of_effects;
     if (a.kind == Answer::Kind::effect)
-      a.probability += kConfused * of_effects / effects - (kMimicked + kConfused) * a.probability;
+      a.probability +=
+          rule.doubt.confused * of_effects / effects - (rule.doubt.unknown + rule.doubt.confused) * a.probability;
   }
   std::ranges::stable_sort(answers, std::greater{}, &Answer::probability);
 }
 
-Conclusion conclude(const std::vector<Answer>& answers) {
+Conclusion conclude(const std::vector<Answer>& answers, const VerdictRule& rule) {
   struct Pool {
     double mass = 0;
     std::size_t best = 0;
@@ -112,11 +96,11 @@ Conclusion conclude(const std::vector<Answer>& answers) {
       break;
   }
   c.kind = Conclusion::Kind::effect;
-  if (best.probability >= kOfAll || best.probability >= kOfPool * pool.mass) return c;
+  if (best.probability >= rule.naming.of_all || best.probability >= rule.naming.of_pool * pool.mass) return c;
   c.kind = Conclusion::Kind::group;
   c.probability = pool.mass;
   for (const Answer& a : answers) {
-    if (key(a) != name || a.probability < kLeastShare * pool.mass) continue;
+    if (key(a) != name || a.probability < rule.naming.member_of_pool * pool.mass) continue;
     for (const std::string& e : a.effects)
       if (!std::ranges::count(c.effects, e)) c.effects.push_back(e);
   }

@@ -11,25 +11,19 @@ namespace flappy::gap {
 
 /// Whether effects, wherever models may be mistaken, leave more in all than the parameters alone: by more than a share of the gap
 /// that these leave.
-bool refuted(const Losses& parameters, const Losses& effects);
+bool refuted(const Losses& parameters, const Losses& effects, const VerdictRule& rule);
 
 /// Makes the figures of the effects of a fit, along whose coordinates its directions are, as uncertain as they are.
-void widen(Fit& fit, const Hypothesis& hypothesis);
+void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule);
 
 /// Of every answer, from its log evidence; the most probable first. Of what speaks for entries a little goes to an unknown cause,
 /// which may look like one, and to all entries alike.
-void set_probabilities(std::vector<Answer>& answers);
+void set_probabilities(std::vector<Answer>& answers, const VerdictRule& rule);
 
 /// The largest mass, rivals that such flights often cannot separate (EffectInfo::group) pooled: a set of effects pools with those whose
 /// effects are of the same groups. Of a pool the most probable set is named where it holds half of everything or four fifths of its
 /// pool; otherwise the pool is, and its verdict is `group`.
-struct Conclusion {
-  enum class Kind { effect, group, parameters, none, unknown, data } kind = Kind::unknown;
-  std::vector<std::string> effects;  ///< of a group: of its sets that hold a twentieth of it
-  double probability = 0;            ///< of a group: all of it
-  std::size_t answer = 0;            ///< the most probable one of what is concluded
-};
-Conclusion conclude(const std::vector<Answer>& answers);
+Conclusion conclude(const std::vector<Answer>& answers, const VerdictRule& rule);
 const char* kind_name(Conclusion::Kind kind);
 const char* kind_name(Answer::Kind kind);
 

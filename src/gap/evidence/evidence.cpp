@@ -39,8 +39,8 @@ struct WithoutEta {
 
 }  // namespace
 
-Evidence::Evidence(const std::vector<CarriedFlight>& flights, int threads)
-    : flights_(flights), threads_(threads), basis_(flights), groups_(kGroups) {
+Evidence::Evidence(const std::vector<CarriedFlight>& flights, ModelDiscrepancy discrepancy, int threads)
+    : flights_(flights), discrepancy_(std::move(discrepancy)), threads_(threads), basis_(flights), groups_(kGroups) {
   for (const CarriedFlight& f : flights) weights_.emplace_back(f.beats() * kRowsPerBeat, 1.0);
   for (int channel = 0; channel < kChannels; ++channel) {
     double all = 0;
@@ -236,7 +236,9 @@ double Evidence::noise_sd(int group) const {
 Smooth Evidence::floor() const {
   Smooth sd(kGroups, basis_.size());
   for (int g = 0; g < kGroups; ++g)
-    for (int i = 0; i < basis_.size(); ++i) sd(g, i) = groups_[static_cast<std::size_t>(g)].signal * basis_.floor(g, i);
+    for (int i = 0; i < basis_.size(); ++i)
+      sd(g, i) = groups_[static_cast<std::size_t>(g)].signal *
+                 discrepancy_.share(g / kCoefficients, (g % kCoefficients + 1) / 2, basis_.kind(i));
   return sd;
 }
 

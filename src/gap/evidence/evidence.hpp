@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "gap/evidence/model_error.hpp"
+#include "gap/evidence/model_discrepancy.hpp"
 
 namespace flappy::gap {
 
@@ -30,14 +30,13 @@ class RegimeBasis {
   explicit RegimeBasis(const std::vector<CarriedFlight>& flights);
   int size() const { return static_cast<int>(names_.size()); }
   const std::string& name(int i) const { return names_[static_cast<std::size_t>(i)]; }
-  /// How large its coefficient is in every model, as a share of the signal of a group.
-  double floor(int group, int i) const;
+  BasisFunction kind(int i) const { return kinds_[static_cast<std::size_t>(i)]; }
   /// [beat][size()].
   const Eigen::MatrixXd& values(std::size_t flight) const { return values_[flight]; }
 
  private:
   std::vector<std::string> names_;
-  std::vector<Function> kinds_;
+  std::vector<BasisFunction> kinds_;
   std::vector<Eigen::MatrixXd> values_;
 };
 
@@ -64,9 +63,10 @@ struct Posterior {
 
 class Evidence {
  public:
-  Evidence(const std::vector<CarriedFlight>& flights, int threads);
+  Evidence(const std::vector<CarriedFlight>& flights, ModelDiscrepancy discrepancy, int threads);
 
   const RegimeBasis& basis() const { return basis_; }
+  const ModelDiscrepancy& discrepancy() const { return discrepancy_; }
   /// Noise is as the headers declare it, until it is learnt from what a good fit leaves: its scale, its autocorrelation, and
   /// which rows count less. The weights alone are for residuals that are no noise yet.
   void learn_weights(const Signature& residual);
@@ -110,6 +110,7 @@ class Evidence {
   void for_whitened(std::size_t flight, int group, const Use& use) const;
 
   const std::vector<CarriedFlight>& flights_;
+  ModelDiscrepancy discrepancy_;
   int threads_;
   RegimeBasis basis_;
   std::vector<Group> groups_;

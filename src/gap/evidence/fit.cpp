@@ -157,7 +157,7 @@ Smooth Fitter::form_error(const Hypothesis& hypothesis, const Linearised& point)
     own += point.at[i] * column;
   }
   Smooth squares = Smooth::Zero(kGroups, evidence_.basis().size());
-  for (const auto& [effect, own] : whole) squares += (kFormError * own).cwiseAbs2();
+  for (const auto& [effect, own] : whole) squares += (evidence_.discrepancy().form_error * own).cwiseAbs2();
   return squares.cwiseSqrt();
 }
 

@@ -1,7 +1,6 @@
 #include <cmath>
 
 #include "gap/evidence/evidence.hpp"
-#include "gap/evidence/model_error.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -13,14 +12,10 @@ constexpr int kAmplitude = 1, kDifference = 2, kBias = 3, kSplitCycle = 4, kVelo
 
 }  // namespace
 
-double RegimeBasis::floor(int group, int i) const {
-  return mistaken_share(group / kCoefficients, (group % kCoefficients + 1) / 2, kinds_[static_cast<std::size_t>(i)]);
-}
-
 RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
   values_.resize(flights.size());
   // centred and of rms 1, but for the constant; what never changes is the constant
-  const auto append = [&](const std::string& name, Function kind, std::vector<Eigen::VectorXd> column) {
+  const auto append = [&](const std::string& name, BasisFunction kind, std::vector<Eigen::VectorXd> column) {
     double sum = 0, squares = 0, n = 0;
     for (const Eigen::VectorXd& v : column)
       sum += v.sum(), squares += v.squaredNorm(), n += static_cast<double>(v.size());
@@ -35,7 +30,7 @@ RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
     names_.push_back(name);
     kinds_.push_back(kind);
   };
-  const auto add = [&](const char* name, Function kind, auto&& value) {
+  const auto add = [&](const char* name, BasisFunction kind, auto&& value) {
     std::vector<Eigen::VectorXd> column;
     for (const CarriedFlight& f : flights) {
       column.emplace_back(static_cast<Eigen::Index>(f.beats()));
@@ -46,46 +41,46 @@ RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
   };
   using R = const Recording&;
   using S = const Regime&;
-  add("1", Function::constant, [](R, S) { return 1.0; });
-  add("amplitude", Function::input, [](R, S s) { return s.amplitude_V; });
-  add("difference", Function::input, [](R, S s) { return s.difference_V; });
-  add("bias", Function::input, [](R, S s) { return s.bias_V; });
-  add("split_cycle", Function::input, [](R, S s) { return s.split_cycle; });
-  add("velocity_x", Function::velocity_x, [](R, S s) { return s.velocity_B_m_s.x(); });
-  add("velocity_y", Function::velocity_y, [](R, S s) { return s.velocity_B_m_s.y(); });
-  add("velocity_z", Function::velocity_z, [](R, S s) { return s.velocity_B_m_s.z(); });
-  add("rate_x", Function::rate, [](R, S s) { return s.rate_rad_s.x(); });
-  add("rate_y", Function::rate, [](R, S s) { return s.rate_rad_s.y(); });
-  add("rate_z", Function::rate, [](R, S s) { return s.rate_rad_s.z(); });
+  add("1", BasisFunction::constant, [](R, S) { return 1.0; });
+  add("amplitude", BasisFunction::input, [](R, S s) { return s.amplitude_V; });
+  add("difference", BasisFunction::input, [](R, S s) { return s.difference_V; });
+  add("bias", BasisFunction::input, [](R, S s) { return s.bias_V; });
+  add("split_cycle", BasisFunction::input, [](R, S s) { return s.split_cycle; });
+  add("velocity_x", BasisFunction::velocity_x, [](R, S s) { return s.velocity_B_m_s.x(); });
+  add("velocity_y", BasisFunction::velocity_y, [](R, S s) { return s.velocity_B_m_s.y(); });
+  add("velocity_z", BasisFunction::velocity_z, [](R, S s) { return s.velocity_B_m_s.z(); });
+  add("rate_x", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.x(); });
+  add("rate_y", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.y(); });
+  add("rate_z", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.z(); });
   // of what is already centred, so that a product says what its factors do not
   const auto multiply = [&](int a, int b) {
     std::vector<Eigen::VectorXd> column;
     for (const Eigen::MatrixXd& v : values_) column.emplace_back(v.col(a).cwiseProduct(v.col(b)));
-    append(name(a) + " " + name(b), Function::product, std::move(column));
+    append(name(a) + " " + name(b), BasisFunction::product, std::move(column));
   };
   if (size() == kPlain)
     for (const int b : {kAmplitude, kDifference, kBias, kSplitCycle, kVelocityX, kVelocityZ}) multiply(kAmplitude, b);
-  add("|velocity| velocity_x", Function::square_x,
+  add("|velocity| velocity_x", BasisFunction::drag_x,
       [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.x(); });
-  add("|velocity| velocity_y", Function::square_y,
+  add("|velocity| velocity_y", BasisFunction::drag_y,
       [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.y(); });
-  add("|velocity| velocity_z", Function::square_z,
+  add("|velocity| velocity_z", BasisFunction::drag_z,
       [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.z(); });
-  add("near ground", Function::place,
+  add("near ground", BasisFunction::place,
       [](R r, S s) { return std::exp(-std::max(0.0, s.position_m.z() - r.world.ground_z_m) / kReach_m); });
-  add("near ceiling", Function::place,
+  add("near ceiling", BasisFunction::place,
       [](R r, S s) { return std::exp(-std::max(0.0, r.world.ceiling_z_m - s.position_m.z()) / kReach_m); });
-  add("near wall", Function::place, [](R r, S s) {
+  add("near wall", BasisFunction::place, [](R r, S s) {
     double near = 0;
     for (const sim::Wall& w : r.world.walls)
       near += std::exp(
           -std::max(0.0, w.normal_x * (s.position_m.x() - w.x_m) + w.normal_y * (s.position_m.y() - w.y_m)) / kReach_m);
     return near;
   });
-  add("height", Function::place, [](R, S s) { return s.position_m.z(); });
-  add("cos heading", Function::place, [](R, S s) { return std::cos(s.heading_rad); });
-  add("sin heading", Function::place, [](R, S s) { return std::sin(s.heading_rad); });
-  add("time", Function::place, [](R r, S s) { return s.t_s - r.begin_s; });
+  add("height", BasisFunction::place, [](R, S s) { return s.position_m.z(); });
+  add("cos heading", BasisFunction::place, [](R, S s) { return std::cos(s.heading_rad); });
+  add("sin heading", BasisFunction::place, [](R, S s) { return std::sin(s.heading_rad); });
+  add("time", BasisFunction::place, [](R r, S s) { return s.t_s - r.begin_s; });
 }
 
 }  // namespace flappy::gap

@@ -130,7 +130,7 @@ TEST(Recording, FliesWhatWasDriven) {
 // Of two effects that oppose each other each errs by 0.3 of what its sizes change; shapes are no more of it.
 TEST(Fit, EveryEquationErrsByItself) {
   const std::vector<CarriedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
-  const Evidence evidence(flights, 2);
+  const Evidence evidence(flights, read_model_discrepancy(), 2);
   const Fitter fitter(flights, evidence, 2);
   const sim::Randomisation prior = uncertain();
   const Hypothesis h(prior, {"ground_effect", "spring_hardening"});
@@ -149,7 +149,7 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   const std::vector<CarriedFlight> flights = flown("hummingbird_identified");
   const sim::Randomisation prior = uncertain();
   const Hypothesis plain(prior, {});
-  Evidence evidence(flights, 2);
+  Evidence evidence(flights, read_model_discrepancy(), 2);
   const Fitter fitter(flights, evidence, 2);
   const Linearised start =
       fitter.linearise(plain, plain.start(), {Eigen::MatrixXd(plain.size(), 0), Eigen::VectorXd(0)});
@@ -267,7 +267,7 @@ TEST(Diagnose, StopsWithWhatItHas) {
 // Of one coefficient of the basis in one group: log p by hand, where it is a column, a floor, or may be larger than its floor.
 TEST(Evidence, IntegratesOutInClosedForm) {
   const std::vector<CarriedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
-  const Evidence evidence(flights, 2);
+  const Evidence evidence(flights, read_model_discrepancy(), 2);
   const Candidate it{nominal(), 0};
   Rows residual = flights[0].measured();
   const Rows predicted = flights[0].predict({&it})[0];

@@ -41,6 +41,8 @@ Answer answer(double probability, Answer::Kind kind) {
 
 // ---- verdict
 
+Conclusion conclude(const std::vector<Answer>& answers) { return gap::conclude(answers, read_verdict_rule()); }
+
 TEST(Verdict, IsNotSureOfEntries) {
   const auto weighed = [](double log_evidence, Answer a) {
     a.log_evidence = log_evidence;
@@ -49,7 +51,7 @@ TEST(Verdict, IsNotSureOfEntries) {
   std::vector<Answer> all = {weighed(-1000, answer(0, Answer::Kind::parameters)),
                              weighed(-1000, answer(0, Answer::Kind::unknown)), weighed(-900, answer(0, {"body_drag"})),
                              weighed(-800, answer(0, {"wind"}))};
-  set_probabilities(all);
+  set_probabilities(all, read_verdict_rule());
   // 0.06 of what entries hold goes to an unknown cause, 0.06 to both entries alike
   EXPECT_EQ(all[0].effects, std::vector<std::string>{"wind"});
   EXPECT_NEAR(all[0].probability, 0.88 + 0.03, 1e-12);
@@ -60,7 +62,7 @@ TEST(Verdict, IsNotSureOfEntries) {
   // what other answers hold stays
   all = {weighed(std::log(0.7), answer(0, Answer::Kind::parameters)), weighed(std::log(0.3), answer(0, {"wind"})),
          weighed(-1000, answer(0, Answer::Kind::unknown))};
-  set_probabilities(all);
+  set_probabilities(all, read_verdict_rule());
   EXPECT_NEAR(all[0].probability, 0.7, 1e-12);
   EXPECT_NEAR(all[1].probability, 0.3 * 0.94, 1e-12);
   EXPECT_NEAR(all[2].probability, 0.3 * 0.06, 1e-12);
@@ -123,10 +125,10 @@ TEST(Verdict, RefutesWhatLeavesMore) {
   const double floor = huber_floor();
   const auto losses = [](double mean) { return Losses{{8 * mean, 4 * mean}, {8, 4}}; };
   const Losses before = losses(floor + 1);
-  EXPECT_FALSE(refuted(before, losses(floor + 1.29)));
-  EXPECT_TRUE(refuted(before, losses(floor + 1.31)));
-  EXPECT_FALSE(refuted(before, losses(floor)));
-  EXPECT_FALSE(refuted(before, {})) << "a vehicle that came apart has no loss";
+  EXPECT_FALSE(refuted(before, losses(floor + 1.29), read_verdict_rule()));
+  EXPECT_TRUE(refuted(before, losses(floor + 1.31), read_verdict_rule()));
+  EXPECT_FALSE(refuted(before, losses(floor), read_verdict_rule()));
+  EXPECT_FALSE(refuted(before, {}, read_verdict_rule())) << "a vehicle that came apart has no loss";
 }
 
 // Of coordinates with sd 0.2 and covariance 0.01: 1.4 times as wide, and a size of 2 by a tenth of itself besides.
@@ -143,7 +145,7 @@ TEST(Verdict, WidensSizesAndShapes) {
   fit.posterior.mean[size] = 2;
   fit.posterior.covariance = 0.04 * Eigen::MatrixXd::Identity(h.size(), h.size());
   fit.posterior.covariance(size, shape) = fit.posterior.covariance(shape, size) = 0.01;
-  widen(fit, h);
+  widen(fit, h, read_verdict_rule());
   EXPECT_NEAR(fit.covariance()(size, size), 1.96 * 0.04 + 0.04, 1e-12);
   EXPECT_NEAR(fit.covariance()(shape, shape), 1.96 * 0.04, 1e-12);
   EXPECT_NEAR(fit.covariance()(size, shape), 1.96 * 0.01, 1e-12);
@@ -368,6 +370,33 @@ TEST(RunDiagnose, RefusesWhatItCannotAnswer) {
   EXPECT_TRUE(
       refusal().ends_with(": driver.hold_s: physics goes by steps of 1e-04 s here; accepted: a multiple of that"))
       << refusal();
+}
+
+// Of the files of constants every key is asked for, and none is let pass that nobody asks for.
+TEST(VerdictRule, IsReadStrictly) {
+  const flight::Folder folder;
+  const std::string path = (folder / "constants.toml").string();
+  const auto refusal = [&](const std::string& text, const auto& read) {
+    std::ofstream(path) << text;
+    return test::refusal([&] { read(path); });
+  };
+  const auto verdict = [&](const std::string& text) { return refusal(text, read_verdict_rule); };
+  const auto discrepancy = [&](const std::string& text) { return refusal(text, read_model_discrepancy); };
+  const auto with = [](std::string text, const std::string& from, const std::string& to) {
+    return text.replace(text.find(from), from.size(), to);
+  };
+  const std::string rule = contents(kConfigs + "gap/verdict.toml");
+  EXPECT_EQ(verdict(rule), "accepted");
+  EXPECT_NE(verdict("priors = 1\n" + rule).find(path + ":1:1: priors: "), std::string::npos)
+      << verdict("priors = 1\n" + rule);
+  EXPECT_NE(verdict(with(rule, "none = 0.1", "none = 0.2")).find("do not add up to 1"), std::string::npos);
+  EXPECT_NE(verdict(with(rule, "confused = 0.06", "")).find("doubt.confused"), std::string::npos);
+  const std::string model = contents(kConfigs + "gap/model_discrepancy.toml");
+  EXPECT_EQ(discrepancy(model), "accepted");
+  EXPECT_NE(discrepancy(with(model, "body_drag = ", "body_dragg = ")).find("background_sd.body_dragg"),
+            std::string::npos);
+  EXPECT_NE(discrepancy(with(model, "[4.0, 0.05]", "[4.0, 0.06]")).find("do not add up to 1"), std::string::npos);
+  EXPECT_NE(discrepancy(with(model, "[share.turn]", "[share.turns]")).find("share.turn"), std::string::npos);
 }
 
 }  // namespace

@@ -1,0 +1,42 @@
+#include "gap/diagnose/verdict_rule.hpp"
+
+#include <cmath>
+
+#include "io/config.hpp"
+
+namespace flappy::gap {
+
+VerdictRule read_verdict_rule(const std::filesystem::path& path) {
+  constexpr io::Range kPositive = io::positive(), kNats = io::non_negative(), kShare{0, 1};
+  const io::Config config = io::Config::load(path);
+  const io::Table root = config.root();
+  root.integer("schema", 1, 1);
+  VerdictRule r{};
+  const io::Table prior = root.table("prior");
+  r.prior = {prior.number("none", io::positive(1)), prior.number("parameters", io::positive(1)),
+             prior.number("effect", io::positive(1)), prior.number("unknown", io::positive(1)),
+             prior.number("further_effect", io::positive(1))};
+  if (!(std::abs(r.prior.none + r.prior.parameters + r.prior.effect + r.prior.unknown - 1) < 1e-9))
+    prior.fail("", "none, parameters, effect and unknown do not add up to 1", "probabilities that do");
+  const io::Table gain = root.table("gain");
+  r.gain = {gain.number("by_chance_nats", kNats), gain.number("further_by_chance_nats", kNats),
+            gain.number("further_screened_nats", kNats), gain.number("vanished_size", kPositive)};
+  const io::Table unknown = root.table("unknown");
+  r.unknown = {unknown.numbers("times", kPositive), static_cast<int>(unknown.integer("terms", 0, 1000)),
+               static_cast<int>(unknown.integer("tried", 1, 100)), unknown.number("term_cost_nats", kNats),
+               unknown.number("large_effect_nats", kNats)};
+  if (r.unknown.times.empty()) unknown.fail("times", "is empty", "numbers above 0");
+  r.refutation = {root.table("refutation").number("share_of_gap", kNats)};
+  const io::Table interval = root.table("interval");
+  r.interval = {interval.number("sd_factor", kPositive), interval.number("size_error", kNats)};
+  const io::Table doubt = root.table("doubt");
+  r.doubt = {doubt.number("unknown", kShare), doubt.number("confused", kShare)};
+  if (r.doubt.unknown + r.doubt.confused > 1) doubt.fail("", "unknown and confused exceed 1 together", "shares");
+  const io::Table naming = root.table("naming");
+  r.naming = {naming.number("of_all", kShare), naming.number("of_pool", kShare),
+              naming.number("member_of_pool", kShare)};
+  root.finish();
+  return r;
+}
+
+}  // namespace flappy::gap

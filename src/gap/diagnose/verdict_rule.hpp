@@ -1,0 +1,38 @@
+// The constants by which evidence becomes a verdict. What each is for, and how it was learnt, stands in
+// configs/gap/verdict.toml, whose tables and keys these are.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+namespace flappy::gap {
+
+struct VerdictRule {
+  struct Prior {
+    double none, parameters, effect, unknown, further_effect;
+  } prior;
+  struct Gain {
+    double by_chance_nats, further_by_chance_nats, further_screened_nats, vanished_size;
+  } gain;
+  struct UnknownCause {
+    std::vector<double> times;
+    int terms, tried;
+    double term_cost_nats, large_effect_nats;
+  } unknown;
+  struct Refutation {
+    double share_of_gap;
+  } refutation;
+  struct Interval {
+    double sd_factor, size_error;
+  } interval;
+  struct Doubt {
+    double unknown, confused;
+  } doubt;
+  struct Naming {
+    double of_all, of_pool, member_of_pool;
+  } naming;
+};
+
+VerdictRule read_verdict_rule(const std::filesystem::path& path = FLAPPY_CONFIGS "/gap/verdict.toml");
+
+}  // namespace flappy::gap
