@@ -12,7 +12,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using gap::Smooth;
+using gap::BasisCoefficients;
 
 /// Sizes at which effects are tried: few do twice as much at twice the size. Those of sensors do.
 constexpr double kSizes[] = {0.25, 0.5, 1, 4}, kSensorSizes[] = {1, 4}, kDelaySizes[] = {0.01, 0.03, 0.1};
@@ -40,10 +40,10 @@ double expected_gain(const MatrixXd& information, const VectorXd& truth, const M
          llt.matrixLLT().diagonal().array().log().sum();
 }
 
-Oracle::Oracle(const Subject& subject, const sim::Randomisation& uncertain) {
+DetectabilityAnalysis::DetectabilityAnalysis(const Subject& subject, const sim::Randomisation& uncertain) {
   std::vector<Subject::Added> list;
   const std::uint64_t seed = subject.flown().seed;
-  for (std::size_t e = 0; e < blind::kEffects; ++e) {
+  for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
     const auto effect = static_cast<blind::Effect>(e);
     if (effect == blind::Effect::command_delay)  // straight for a small part of a beat only
       for (const double size : kDelaySizes) list.push_back({effect, size, seed});
@@ -55,8 +55,8 @@ Oracle::Oracle(const Subject& subject, const sim::Randomisation& uncertain) {
       for (int i = 1; turned == effect && i <= others; ++i)
         list.push_back({effect, 1, seed + static_cast<std::uint64_t>(i)});
   }
-  const std::vector<Smooth> found = subject.added(list);
-  std::vector<Smooth> columns;
+  const std::vector<BasisCoefficients> found = subject.added(list);
+  std::vector<BasisCoefficients> columns;
   for (std::size_t i = 0; i < list.size(); ++i) {
     if (found[i].size() == 0) continue;
     Columns& c = effects_[static_cast<std::size_t>(list[i].effect)];
@@ -68,32 +68,32 @@ Oracle::Oracle(const Subject& subject, const sim::Randomisation& uncertain) {
     }
     columns.push_back(found[i]);
   }
-  for (std::size_t e = 0; e < blind::kEffects; ++e) {
+  for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
     if (!acts_on_sensors(static_cast<blind::Effect>(e)) || !in_catalogue(static_cast<blind::Effect>(e))) continue;
     const auto unknowns = static_cast<Index>(gap::unknowns_of(blind::effect_names()[e]).size());
     std::vector<VectorXd> axes;
     for (Index i = 0; i < unknowns; ++i)
       if (gap::unknowns_of(blind::effect_names()[e])[static_cast<std::size_t>(i)].size)
         axes.emplace_back(kTypicalCoordinate * VectorXd::Unit(unknowns, i));
-    for (Smooth& axis : subject.catalogue(blind::effect_names()[e], axes)) {
+    for (BasisCoefficients& axis : subject.catalogue(blind::effect_names()[e], axes)) {
       if (axis.size() == 0) continue;
       effects_[e].further.push_back(static_cast<int>(columns.size()));
       columns.push_back(std::move(axis));
     }
   }
-  std::vector<Smooth> known = subject.parameters(uncertain);
-  for (Smooth& s : subject.background()) known.push_back(std::move(s));
+  std::vector<BasisCoefficients> known = subject.parameters(uncertain);
+  for (BasisCoefficients& s : subject.background()) known.push_back(std::move(s));
   information_ = subject.information(known, columns);
 }
 
 /// The first size tried that is no smaller; as many as there are where there is none.
-std::size_t Oracle::tried(blind::Effect effect, double size) const {
+std::size_t DetectabilityAnalysis::tried(blind::Effect effect, double size) const {
   const Columns& c = effects_[static_cast<std::size_t>(effect)];
   return static_cast<std::size_t>(std::ranges::lower_bound(c.sizes, size) - c.sizes.begin());
 }
 
 /// What an effect adds at any size: straight of the next larger one that was tried; empty beyond.
-VectorXd Oracle::truth_of(blind::Effect effect, double size) const {
+VectorXd DetectabilityAnalysis::truth_of(blind::Effect effect, double size) const {
   const Columns& c = effects_[static_cast<std::size_t>(effect)];
   const std::size_t above = tried(effect, size);
   if (above == c.sizes.size()) return {};
@@ -101,7 +101,7 @@ VectorXd Oracle::truth_of(blind::Effect effect, double size) const {
 }
 
 /// Of the sizes tried of an effect but one, each beside its further directions, the one that explains the truth best.
-double Oracle::best_gain(const VectorXd& truth, blind::Effect hypothesis, std::size_t but) const {
+double DetectabilityAnalysis::best_gain(const VectorXd& truth, blind::Effect hypothesis, std::size_t but) const {
   const Columns& c = effects_[static_cast<std::size_t>(hypothesis)];
   const auto n = static_cast<Index>(c.further.size());
   MatrixXd m = MatrixXd::Zero(width(), n + 1);
@@ -119,19 +119,19 @@ double Oracle::best_gain(const VectorXd& truth, blind::Effect hypothesis, std::s
 
 /// The effect itself as a hypothesis. Differences of carried flights are rough (gap/fit.hpp), the same way wherever they come
 /// from the same flights; so nothing is held against its own: the hypothesis is of any other size tried than the truth.
-double Oracle::gain(blind::Effect truth, double size) const {
+double DetectabilityAnalysis::gain(blind::Effect truth, double size) const {
   const VectorXd d = truth_of(truth, size);
   if (d.size() == 0) return 0;
   const bool alone = effects_[static_cast<std::size_t>(truth)].at.size() == 1;
   return best_gain(d, truth, alone ? kNone : tried(truth, size));
 }
 
-double Oracle::gain_over(blind::Effect truth, double size, blind::Effect rival) const {
+double DetectabilityAnalysis::gain_over(blind::Effect truth, double size, blind::Effect rival) const {
   const VectorXd d = truth_of(truth, size);
   return d.size() == 0 ? 0 : gain(truth, size) - best_gain(d, rival, kNone);
 }
 
-double Oracle::detectable(blind::Effect effect, double nats) const {
+double DetectabilityAnalysis::detectable(blind::Effect effect, double nats) const {
   // where another size that was tried takes over, the gain may fall
   const auto enough = [&](double size) {
     return gain(effect, size) >= nats && (2 * size > kMostSize || gain(effect, 2 * size) >= nats);

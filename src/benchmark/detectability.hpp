@@ -1,9 +1,9 @@
 // What somebody who knew the truth could find out from flights: how large an effect of the blind robot has to be, and which
 // others it could be taken for.
 //
-// A robot without effects flies; everything else is a change of its rows, found by carrying the robot with and without an
-// effect along the flights (oracle_carry.hpp), or by sensing the same flight again. The rows have the noise that is left once
-// the robot itself is carried, and the floor of gap::Evidence, what every model of a wing gets wrong; together with the
+// A robot without effects flies; everything else is a change of its rows, found by predicting the flights with and without an
+// effect, the torso reset at every interval (detectability_prediction.hpp), or by sensing the same flight again. The rows have the noise that is left once
+// the robot itself is predicted, and the model discrepancy of gap::Evidence; together with the
 // uncertain parameters and the little that every vehicle has of every entry of the catalogue (gap/evidence/model_discrepancy.hpp), integrated
 // out, that is one normal distribution, N(0, C). An effect in force moves its mean by d.
 //
@@ -12,21 +12,21 @@
 //   L = E log N(r; 0, C + M P^-1 M') - E log N(r; 0, C) = 1/2 (f' (A + P)^-1 f + tr A (A + P)^-1 - log det (1 + P^-1 A))
 // under the truth r ~ N(d, C). With M = d and little prior that is half the information d' C^-1 d, less the price of learning
 // the size. A third of the flights counts for a third of L: what it gains once the others are known would say how well these
-// teach the errors that every flight shares, floor and background, to mimic the effect, and not how well it shows.
+// teach the errors that every flight shares, discrepancy and background, to mimic the effect, and not how well it shows.
 #pragma once
 
 #include <map>
 #include <memory>
 #include <optional>
 
-#include "benchmark/detectability_carry.hpp"
+#include "benchmark/detectability_prediction.hpp"
 #include "blind/flights.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::benchmark {
 
 /// All flights of a case.
-std::vector<blind::Flight> fly_all(const blind::Case& c, int threads);
+std::vector<blind::RobotFlight> fly_all(const blind::Case& c, int threads);
 
 /// L. `information`: d' C^-1 d of columns; `truth`: d as weights of these; `hypothesis`: M, a column of weights each; `precision`:
 /// of its coefficients, P.
@@ -42,7 +42,7 @@ bool acts_on_sensors(blind::Effect effect);
 class Subject {
  public:
   /// `flights`: of case `c`, all of them; both without effects. io::InputError where one of them crashed.
-  Subject(blind::Case c, std::vector<blind::Flight> flights, int threads);
+  Subject(blind::Case c, std::vector<blind::RobotFlight> flights, int threads);
 
   struct Added {
     blind::Effect effect;
@@ -50,38 +50,39 @@ class Subject {
     std::uint64_t seed;  ///< of what effects of the vehicle draw once, as directions
   };
   /// What each adds to the rows; empty for those with which the robot comes apart.
-  std::vector<gap::Smooth> added(const std::vector<Added>& list) const;
+  std::vector<gap::BasisCoefficients> added(const std::vector<Added>& list) const;
   /// The same of every uncertain parameter for one standard deviation, and of the IMU's lag, in the robot and in the
   /// simulator. `uncertain`: draws, about any vehicle.
-  std::vector<gap::Smooth> parameters(const sim::Randomisation& uncertain) const;
-  std::vector<gap::Smooth> simulated_parameters(const sim::Randomisation& uncertain) const;
+  std::vector<gap::BasisCoefficients> parameters(const sim::Randomisation& uncertain) const;
+  std::vector<gap::BasisCoefficients> simulated_parameters(const sim::Randomisation& uncertain) const;
   /// What every vehicle has a little of (gap/evidence/model_discrepancy.hpp), in the simulator.
-  std::vector<gap::Smooth> background() const;
+  std::vector<gap::BasisCoefficients> background() const;
   /// The same of coordinates of an entry of the catalogue, in the simulator.
-  std::vector<gap::Smooth> catalogue(const std::string& effect, const std::vector<Eigen::VectorXd>& coordinates) const;
+  std::vector<gap::BasisCoefficients> catalogue(const std::string& effect,
+                                                const std::vector<Eigen::VectorXd>& coordinates) const;
 
   /// d' C^-1 d of `columns`, with the parameters integrated out.
-  Eigen::MatrixXd information(const std::vector<gap::Smooth>& parameters,
-                              const std::vector<gap::Smooth>& columns) const;
+  Eigen::MatrixXd information(const std::vector<gap::BasisCoefficients>& parameters,
+                              const std::vector<gap::BasisCoefficients>& columns) const;
 
   /// Of the rows' noise over what the headers declare, median of the groups.
   double noise_ratio() const { return noise_ratio_; }
   const blind::Case& flown() const { return case_; }
 
  private:
-  std::vector<gap::Smooth> sensed(const std::vector<Added>& list) const;
+  std::vector<gap::BasisCoefficients> sensed(const std::vector<Added>& list) const;
   model::Vehicle moved(const sim::Randomisation& uncertain, std::size_t draw, double variate) const;
 
   blind::Case case_;
   int threads_;
-  std::vector<gap::CarriedFlight> flights_;
-  gap::Signature carried_, left_;  ///< by the robot as it is; by the simulator, of the measurement
+  std::vector<gap::PredictedFlight> flights_;
+  gap::Residuals unperturbed_, left_;  ///< by the robot as it is; by the simulator, of the measurement
   std::unique_ptr<gap::Evidence> evidence_;
   double noise_ratio_ = 1;
 };
 
 /// What flights say of every effect.
-class Oracle {
+class DetectabilityAnalysis {
  public:
   /// The columns of an effect, as indices.
   struct Columns {
@@ -89,10 +90,10 @@ class Oracle {
     std::vector<int> at;        ///< which
     std::vector<int> further;   ///< other directions, at typical size
   };
-  Oracle(std::array<Columns, blind::kEffects> effects, Eigen::MatrixXd information)
+  DetectabilityAnalysis(std::array<Columns, blind::kBlindEffects> effects, Eigen::MatrixXd information)
       : effects_(std::move(effects)), information_(std::move(information)) {}
   /// `uncertain`: draws of the parameters, about any vehicle. Some minutes of one processor.
-  Oracle(const Subject& subject, const sim::Randomisation& uncertain);
+  DetectabilityAnalysis(const Subject& subject, const sim::Randomisation& uncertain);
 
   /// Nats that the truth gains over parameters alone, on a third of the flights; 0 where the robot comes apart.
   double gain(blind::Effect truth, double size) const;
@@ -108,7 +109,7 @@ class Oracle {
   double best_gain(const Eigen::VectorXd& truth, blind::Effect hypothesis, std::size_t but) const;
   Eigen::Index width() const { return information_.rows(); }
 
-  std::array<Columns, blind::kEffects> effects_;
+  std::array<Columns, blind::kBlindEffects> effects_;
   Eigen::MatrixXd information_;
 };
 
@@ -122,8 +123,8 @@ inline constexpr double kMostMisfit = 0.5;
 /// The sizes and shapes of the entry with which the simulator's noise-free rows change most as the robot's do, in the measure
 /// C^-1 above: what `parameters`, the simulator's, can take over is nobody's size. Shapes have their prior, sizes none.
 /// `effect`: of the catalogue.
-TrueValue true_value(const Subject& subject, const std::vector<gap::Smooth>& parameters, blind::Effect effect,
-                     double size);
+TrueValue true_value(const Subject& subject, const std::vector<gap::BasisCoefficients>& parameters,
+                     blind::Effect effect, double size);
 
 /// "effect.parameter" of each effect in `effects`, alone, on flights without any under the same seed; null where the entry is
 /// nothing like it (misfit above 0.5), or where the robot does not fly without. Some twenty seconds of one processor.

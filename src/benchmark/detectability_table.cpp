@@ -9,7 +9,7 @@
 #include <functional>
 
 #include "benchmark/detectability.hpp"
-#include "blind/drawn.hpp"
+#include "blind/sampled_robot.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "gap/evidence/hypothesis.hpp"
 #include "io/files.hpp"
@@ -29,25 +29,25 @@ constexpr double kNats = 10, kMostSize = 4;
 
 struct Development {
   std::unique_ptr<Subject> subject;
-  std::unique_ptr<Oracle> oracle;
+  std::unique_ptr<DetectabilityAnalysis> analysis;
 };
 
 /// The robot of a seed as `fly` draws it, without effects.
 Development develop(const blind::Case& declared, const sim::Randomisation& robots, const sim::Randomisation& uncertain,
                     std::uint64_t seed, int threads) {
   for (std::uint64_t draw = 0; draw < blind::kTries; ++draw) {
-    const blind::Case c = blind::drawn_case(declared, robots, seed, draw);
-    std::vector<blind::Flight> flights = fly_all(c, threads);
-    if (std::ranges::any_of(flights, &blind::Flight::crashed)) continue;
+    const blind::Case c = blind::sampled_case(declared, robots, seed, draw);
+    std::vector<blind::RobotFlight> flights = fly_all(c, threads);
+    if (std::ranges::any_of(flights, &blind::RobotFlight::crashed)) continue;
     Development d{std::make_unique<Subject>(c, std::move(flights), threads), nullptr};
-    d.oracle = std::make_unique<Oracle>(*d.subject, uncertain);
+    d.analysis = std::make_unique<DetectabilityAnalysis>(*d.subject, uncertain);
     return d;
   }
   throw io::InputError("--seed " + std::to_string(seed) + ": " + std::to_string(blind::kTries) +
                        " robots in a row crashed; accepted: less randomisation");
 }
 
-struct Finding {
+struct EffectDetectability {
   double detectable = 0, low = 0, high = 0;  ///< median and extremes of the vehicles; infinite beyond size 4
   double gain_at_typical = 0;
   bool undetectable = false;
@@ -64,31 +64,32 @@ bool beyond_prior(const TrueValue& value) {
   return false;
 }
 
-std::vector<Finding> weigh(const std::vector<Development>& vehicles, const sim::Randomisation& uncertain) {
-  const std::vector<gap::Smooth> parameters = vehicles[0].subject->simulated_parameters(uncertain);
-  const auto over_vehicles = [&](const std::function<double(const Oracle&)>& value) {
+std::vector<EffectDetectability> weigh(const std::vector<Development>& vehicles, const sim::Randomisation& uncertain) {
+  const std::vector<gap::BasisCoefficients> parameters = vehicles[0].subject->simulated_parameters(uncertain);
+  const auto over_vehicles = [&](const std::function<double(const DetectabilityAnalysis&)>& value) {
     std::vector<double> values;
-    for (const Development& d : vehicles) values.push_back(value(*d.oracle));
+    for (const Development& d : vehicles) values.push_back(value(*d.analysis));
     return values;
   };
-  std::vector<Finding> findings(blind::kEffects);
-  for (std::size_t e = 0; e < blind::kEffects; ++e) {
+  std::vector<EffectDetectability> findings(blind::kBlindEffects);
+  for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
     const auto effect = static_cast<blind::Effect>(e);
-    Finding& f = findings[e];
-    const auto sizes = over_vehicles([&](const Oracle& o) { return o.detectable(effect, kNats); });
+    EffectDetectability& f = findings[e];
+    const auto sizes = over_vehicles([&](const DetectabilityAnalysis& o) { return o.detectable(effect, kNats); });
     f.detectable = io::median(sizes);
     f.low = *std::ranges::min_element(sizes);
     f.high = *std::ranges::max_element(sizes);
-    f.gain_at_typical = io::median(over_vehicles([&](const Oracle& o) { return o.gain(effect, 1); }));
+    f.gain_at_typical = io::median(over_vehicles([&](const DetectabilityAnalysis& o) { return o.gain(effect, 1); }));
     f.undetectable = !(2 * f.detectable <= kMostSize);
     const double size = std::min(2 * f.detectable, kMostSize);
     if (in_catalogue(effect)) f.value = true_value(*vehicles[0].subject, parameters, effect, size);
     if (!f.undetectable && in_catalogue(effect) && f.value.misfit < kMostMisfit) f.undetectable = beyond_prior(f.value);
     for (const auto& [at, rivals] : {std::pair{size, &f.inseparable}, std::pair{1.0, &f.inseparable_at_typical}})
-      for (std::size_t r = 0; r < blind::kEffects; ++r) {
+      for (std::size_t r = 0; r < blind::kBlindEffects; ++r) {
         const auto rival = static_cast<blind::Effect>(r);
         if (r == e || !in_catalogue(rival)) continue;
-        if (io::median(over_vehicles([&](const benchmark::Oracle& o) { return o.gain_over(effect, at, rival); })) < kNats)
+        if (io::median(over_vehicles(
+                [&](const benchmark::DetectabilityAnalysis& o) { return o.gain_over(effect, at, rival); })) < kNats)
           rivals->push_back(blind::effect_names()[r]);
       }
   }
@@ -114,7 +115,8 @@ std::string listed(const std::vector<std::string>& names) {
   return text;
 }
 
-std::string to_toml(const DetectabilityCommand& o, std::size_t vehicles, const std::vector<Finding>& findings) {
+std::string to_toml(const DetectabilityCommand& o, std::size_t vehicles,
+                    const std::vector<EffectDetectability>& findings) {
   char date[20];
   const std::time_t now = std::time(nullptr);
   std::strftime(date, sizeof date, "%Y-%m-%d", std::gmtime(&now));
@@ -133,8 +135,8 @@ std::string to_toml(const DetectabilityCommand& o, std::size_t vehicles, const s
       "# misfit           what the catalogue's entry leaves of the effect at that size, and its figures there; one "
       "vehicle\n"
       "schema = 1\n";
-  for (std::size_t e = 0; e < blind::kEffects; ++e) {
-    const Finding& f = findings[e];
+  for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
+    const EffectDetectability& f = findings[e];
     text += "\n[" + blind::effect_names()[e] + "]\n";
     if (std::isfinite(f.detectable)) text += "detectable = " + rounded(f.detectable) + "\n";
     text += std::string("undetectable = ") + (f.undetectable ? "true" : "false") + "\n";
@@ -153,10 +155,10 @@ std::string to_toml(const DetectabilityCommand& o, std::size_t vehicles, const s
   return text;
 }
 
-void print(const std::vector<Finding>& findings) {
+void print(const std::vector<EffectDetectability>& findings) {
   std::printf("%-28s %10s %17s %9s %7s  %s\n", "effect", "detectable", "least, most", "at size 1", "misfit", "rivals");
-  for (std::size_t e = 0; e < blind::kEffects; ++e) {
-    const Finding& f = findings[e];
+  for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
+    const EffectDetectability& f = findings[e];
     std::printf("%-28s %10.3g %8.3g %8.3g %9.1f %7.2f %s", blind::effect_names()[e].c_str(), f.detectable, f.low,
                 f.high, f.gain_at_typical, f.value.misfit, f.undetectable ? " undetectable;" : "");
     for (const std::string& r : f.inseparable) std::printf(" %s", r.c_str());
@@ -188,12 +190,12 @@ Json run_detectability(const DetectabilityCommand& o) {
       std::fflush(stdout);
     }
   }
-  const std::vector<Finding> findings = weigh(vehicles, uncertain);
+  const std::vector<EffectDetectability> findings = weigh(vehicles, uncertain);
   print(findings);
   io::write_atomically(o.out, to_toml(o, vehicles.size(), findings));
   Json effects = Json::object();
-  for (std::size_t e = 0; e < blind::kEffects; ++e) {
-    const Finding& f = findings[e];
+  for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
+    const EffectDetectability& f = findings[e];
     const auto finite = [](double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); };
     effects[blind::effect_names()[e]] = {{"detectable", finite(f.detectable)},
                                          {"detectable_low", finite(f.low)},

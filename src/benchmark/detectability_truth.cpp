@@ -11,7 +11,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using gap::Smooth;
+using gap::BasisCoefficients;
 
 constexpr int kIterations = 8;
 /// Reach of differences, and the step below which there is no more to be had: of a coordinate, of which the prior has 1.645.
@@ -22,7 +22,8 @@ constexpr double kStart = 0.5, kShapeStart = 1.5;
 /// An entry of the catalogue against what an effect does to the rows.
 class Likeness {
  public:
-  Likeness(const Subject& subject, const std::vector<Smooth>& parameters, std::string entry, Smooth wanted)
+  Likeness(const Subject& subject, const std::vector<BasisCoefficients>& parameters, std::string entry,
+           BasisCoefficients wanted)
       : subject_(subject),
         parameters_(parameters),
         entry_(std::move(entry)),
@@ -34,7 +35,7 @@ class Likeness {
     double least = cost(left_at({at})[0], at);
     for (int n = 0; n < kIterations; ++n) {
       const std::vector<VectorXd> tries = steps_from(at);
-      const std::vector<Smooth> left = left_at(tries);
+      const std::vector<BasisCoefficients> left = left_at(tries);
       std::size_t best = tries.size();
       for (std::size_t i = 0; i < tries.size(); ++i)
         if (const double c = cost(left[i], tries[i]); c < least) best = i, least = c;
@@ -46,7 +47,7 @@ class Likeness {
     TrueValue result;
     for (Index i = 0; i < size(); ++i)
       if (of(i).size) result.values[entry_ + "." + of(i).name] = of(i).value(at[i]);
-    const Smooth left = left_at({at})[0];
+    const BasisCoefficients left = left_at({at})[0];
     if (left.size() > 0) result.misfit = std::sqrt(std::min(1.0, measure({left})(0, 0) / measure({wanted_})(0, 0)));
     return result;
   }
@@ -59,14 +60,16 @@ class Likeness {
     for (Index i = 0; i < size(); ++i) x[i] = of(i).coordinate(of(i).value(x[i]));
     return x;
   }
-  MatrixXd measure(const std::vector<Smooth>& columns) const { return subject_.information(parameters_, columns); }
-  std::vector<Smooth> left_at(const std::vector<VectorXd>& places) const {
-    std::vector<Smooth> left = subject_.catalogue(entry_, places);
-    for (Smooth& s : left)
+  MatrixXd measure(const std::vector<BasisCoefficients>& columns) const {
+    return subject_.information(parameters_, columns);
+  }
+  std::vector<BasisCoefficients> left_at(const std::vector<VectorXd>& places) const {
+    std::vector<BasisCoefficients> left = subject_.catalogue(entry_, places);
+    for (BasisCoefficients& s : left)
       if (s.size() > 0) s = wanted_ - s;
     return left;
   }
-  double cost(const Smooth& left, const VectorXd& at) const {
+  double cost(const BasisCoefficients& left, const VectorXd& at) const {
     if (left.size() == 0) return 1e300;
     double sum = measure({left})(0, 0);
     for (Index i = 0; i < size(); ++i)
@@ -88,7 +91,7 @@ class Likeness {
           places.push_back(bounded(shapes[k] + kStart * VectorXd::Unit(size(), i)));
           shape_of.push_back(k);
         }
-    const std::vector<Smooth> ours = subject_.catalogue(entry_, places);
+    const std::vector<BasisCoefficients> ours = subject_.catalogue(entry_, places);
     std::vector<double> likeness(shapes.size(), 0);
     for (std::size_t p = 0; p < places.size(); ++p) {
       if (ours[p].size() == 0) continue;
@@ -106,8 +109,8 @@ class Likeness {
     std::vector<VectorXd> places = {at};
     for (Index i = 0; i < size(); ++i)
       for (const double to : {kReach, -kReach}) places.push_back(bounded(at + to * VectorXd::Unit(size(), i)));
-    const std::vector<Smooth> left = left_at(places);
-    std::vector<Smooth> columns;
+    const std::vector<BasisCoefficients> left = left_at(places);
+    std::vector<BasisCoefficients> columns;
     std::vector<Index> moved;
     for (Index i = 0; i < size(); ++i) {
       const auto k = static_cast<std::size_t>(1 + 2 * i);
@@ -139,16 +142,17 @@ class Likeness {
   }
 
   const Subject& subject_;
-  const std::vector<Smooth>& parameters_;
+  const std::vector<BasisCoefficients>& parameters_;
   std::string entry_;
   std::vector<gap::Unknown> unknowns_;
-  Smooth wanted_;
+  BasisCoefficients wanted_;
 };
 
 }  // namespace
 
-TrueValue true_value(const Subject& subject, const std::vector<Smooth>& parameters, blind::Effect effect, double size) {
-  Smooth wanted = subject.added({{effect, size, subject.flown().seed}})[0];
+TrueValue true_value(const Subject& subject, const std::vector<BasisCoefficients>& parameters, blind::Effect effect,
+                     double size) {
+  BasisCoefficients wanted = subject.added({{effect, size, subject.flown().seed}})[0];
   if (wanted.size() == 0) return {};
   return Likeness(subject, parameters, blind::effect_names()[static_cast<std::size_t>(effect)], std::move(wanted))
       .find();
@@ -163,14 +167,14 @@ std::map<std::string, std::optional<double>> true_values(const blind::Case& c,
   plain.sizes = {};
   plain.power = plain.wings = false;
   plain.programme = blind::Programme::rich;
-  std::vector<blind::Flight> flights = fly_all(plain, threads);
+  std::vector<blind::RobotFlight> flights = fly_all(plain, threads);
   std::unique_ptr<const Subject> subject;
-  std::vector<Smooth> parameters;
-  if (std::ranges::none_of(flights, &blind::Flight::crashed)) {
+  std::vector<BasisCoefficients> parameters;
+  if (std::ranges::none_of(flights, &blind::RobotFlight::crashed)) {
     subject = std::make_unique<const Subject>(plain, std::move(flights), threads);
     parameters = subject->simulated_parameters(uncertain);
   }
-  for (std::size_t e = 0; e < blind::kEffects; ++e) {
+  for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
     const auto effect = static_cast<blind::Effect>(e);
     if (!sizes.has(effect) || !in_catalogue(effect)) continue;
     const std::string& id = blind::effect_names()[e];

@@ -4,7 +4,7 @@
 
 #include "benchmark/records.hpp"
 #include "benchmark/work.hpp"
-#include "blind/drawn.hpp"
+#include "blind/sampled_robot.hpp"
 #include "io/append_file.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"
@@ -24,7 +24,7 @@ class Maker {
         plan_(plan_cases(detectability_, command.plan)),
         declared_(blind::declared_case(command.vehicle)),
         as_declared_(declared_.vehicle),
-        drawn_(sim::read_randomisation(declared_.vehicle, io::Config::load(command.randomise).root())) {}
+        sampled_(sim::read_randomisation(declared_.vehicle, io::Config::load(command.randomise).root())) {}
 
   bool run() {
     io::make_folder(sealed_);
@@ -68,7 +68,7 @@ class Maker {
     try {
       fs::remove_all(case_folder(p));  // half of it may be there
       io::make_folder(case_folder(p));
-      const blind::Drawn flown = blind::fly_drawn(c, p.randomised ? drawn_ : as_declared_, p.seed);
+      const blind::SampledRobot flown = blind::fly_sampled(c, p.randomised ? sampled_ : as_declared_, p.seed);
       for (std::size_t k = 0; k < flown.flights.size(); ++k)
         flightlog::write_flight_log(case_folder(p) / ("flight_" + std::to_string(k + 1)), flown.flights[k].log);
       label = to_json(Label{p, flown.draw, true_values(p, flown.flown)});
@@ -127,7 +127,7 @@ class Maker {
   std::map<std::string, Detectability> detectability_;
   std::vector<PlannedCase> plan_;
   blind::Case declared_;
-  sim::Randomisation as_declared_, drawn_;
+  sim::Randomisation as_declared_, sampled_;
 };
 
 }  // namespace

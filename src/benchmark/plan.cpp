@@ -9,7 +9,7 @@
 namespace flappy::benchmark {
 namespace {
 
-/// First seeds. Robots flown by hand and by the oracle have seeds below; a part has 1,000.
+/// First seeds. Robots flown by hand and for the table of detectable sizes have seeds below; a part has 1,000.
 constexpr std::uint64_t kDevelopment = 10001, kReported = 700001, kSeedsOfAPart = 1000;
 constexpr std::size_t kSingles = 5, kNone = 40, kParameters = 40, kWithheld = 30, kOutside = 30, kPairs = 40,
                       kHover = 6, kTypical = 2;
@@ -28,7 +28,7 @@ class Planner {
       catalogue_.push_back(id);
       if (!of_.at(id).undetectable) detectable_.push_back(id);
     }
-    for (std::size_t k = catalogue_.size(); k < blind::kEffects; ++k) {
+    for (std::size_t k = catalogue_.size(); k < blind::kBlindEffects; ++k) {
       const std::string& id = blind::effect_names()[k];
       const auto known = of_.find(id);
       if (known == of_.end()) outside_.push_back({id, kOutsideSize});
@@ -36,9 +36,9 @@ class Planner {
     }
     if (outside_.empty())
       throw io::InputError(
-          "--detectable: nothing outside the catalogue is detectable; accepted: a table of the oracle");
+          "--detectable: nothing outside the catalogue is detectable; accepted: a table of flappy-blind detectability");
     if (detectable_.size() < 2)
-      throw io::InputError("--detectable: fewer than two effects are detectable; accepted: a table of the oracle");
+      throw io::InputError("--detectable: fewer than two effects are detectable; accepted: a table of flappy-blind detectability");
   }
 
   std::vector<PlannedCase> run() {
@@ -110,7 +110,7 @@ class Planner {
     const std::vector<std::string> group = model::whole_group(first);
     std::vector<std::string> others = detectable_;
     std::erase_if(others, [&](const std::string& id) { return std::ranges::count(group, id) > 0; });
-    if (others.empty()) throw io::InputError("--detectable: all are of one group; accepted: a table of the oracle");
+    if (others.empty()) throw io::InputError("--detectable: all are of one group; accepted: a table of flappy-blind detectability");
     c.effects = {at_twice(first), at_twice(others[below(others.size())])};
   }
 

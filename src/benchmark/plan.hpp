@@ -12,7 +12,7 @@
 
 namespace flappy::benchmark {
 
-/// What the oracle on the maker's side found of an effect, in the blind robot's sizes.
+/// What flappy-blind detectability found of an effect, in the blind robot's sizes.
 struct Detectability {
   double detectable = 0;
   bool undetectable = false;  ///< twice the size is beyond what can be, or beyond the prior

@@ -66,8 +66,8 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   }
 }
 
-Truth Label::truth() const {
-  Truth t{planned.part, {}, planned.inseparable.empty(), true_values};
+CaseTruth Label::truth() const {
+  CaseTruth t{planned.part, {}, planned.inseparable.empty(), true_values};
   for (const blind::BlindEffect& e : planned.effects) t.effects.push_back(e.id);
   return t;
 }

@@ -40,7 +40,7 @@ struct Label {
   PlannedCase planned;
   std::uint64_t draw = 0;                     ///< of the robots of its seed, the first that did not crash
   std::map<std::string, double> true_values;  ///< by "effect.parameter"
-  Truth truth() const;
+  CaseTruth truth() const;
 };
 Json to_json(const PlannedCase& planned);
 Json to_json(const Label& label);

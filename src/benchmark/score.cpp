@@ -102,7 +102,7 @@ std::optional<double> f1(const std::vector<std::pair<Names, Names>>& named_and_t
   return 2 * hits / sum;
 }
 
-Score f1_score(const std::vector<std::pair<Names, Names>>& named_and_true) {
+ScoreValue f1_score(const std::vector<std::pair<Names, Names>>& named_and_true) {
   return resampled(named_and_true.size(),
                    [&](const std::vector<std::size_t>& which) { return f1(named_and_true, which); });
 }
@@ -120,15 +120,15 @@ Cases separable(Cases cases) {
 }
 
 template <class Is>
-Score share(const Cases& cases, const Is& is) {
+ScoreValue share(const Cases& cases, const Is& is) {
   return proportion(static_cast<std::size_t>(std::ranges::count_if(cases, [&](const ScoredCase* c) { return is(*c); })),
                     cases.size());
 }
 
 /// The same of every baseline that all of the cases have.
 template <class Is>
-std::map<std::string, Score> of_baselines(const Cases& cases, const Is& is) {
-  std::map<std::string, Score> scores;
+std::map<std::string, ScoreValue> of_baselines(const Cases& cases, const Is& is) {
+  std::map<std::string, ScoreValue> scores;
   for (const char* name : kBaselines) {
     Cases had = cases;
     std::erase_if(had, [&](const ScoredCase* c) { return !c->prediction.baselines.contains(name); });
@@ -139,15 +139,15 @@ std::map<std::string, Score> of_baselines(const Cases& cases, const Is& is) {
   return scores;
 }
 
-bool baseline_first(const Truth& t, const Baseline& b) {
+bool baseline_first(const CaseTruth& t, const Baseline& b) {
   return !b.named.empty() && b.ranking.front() == t.effects.front();
 }
 
-bool baseline_group(const Truth& t, const Baseline& b) {
+bool baseline_group(const CaseTruth& t, const Baseline& b) {
   return !b.named.empty() && group_of(b.ranking.front()) == group_of(t.effects.front());
 }
 
-bool baseline_among_three(const Truth& t, const Baseline& b) {
+bool baseline_among_three(const CaseTruth& t, const Baseline& b) {
   const auto end = b.ranking.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(3, b.ranking.size()));
   return std::find(b.ranking.begin(), end, t.effects.front()) != end;
 }
@@ -155,8 +155,8 @@ bool baseline_among_three(const Truth& t, const Baseline& b) {
 enum class Bar { at_least, at_most, within };
 
 /// A line of the table; of `within`, must and aim are ranges.
-ScoreLine line(std::string key, std::string what, Bar bar, double must, double aim, Score score,
-               std::map<std::string, Score> baselines = {}, double must_high = 0, double aim_high = 0) {
+ScoreLine line(std::string key, std::string what, Bar bar, double must, double aim, ScoreValue score,
+               std::map<std::string, ScoreValue> baselines = {}, double must_high = 0, double aim_high = 0) {
   const auto text = [&](double b, double high) {
     char t[40];
     if (bar == Bar::within) std::snprintf(t, sizeof t, "%.2f to %.2f", b, high);
@@ -184,7 +184,7 @@ std::vector<Claim> claims_of(const Cases& cases) {
 
 ScoreLine calibration_line(const Cases& cases, double& calibrated_95) {
   const std::vector<Claim> claims = claims_of(cases);
-  const Score s = resampled(claims.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
+  const ScoreValue s = resampled(claims.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
     std::vector<Claim> some;
     for (const std::size_t i : which) some.push_back(claims[i]);
     return calibration_error(std::move(some));
@@ -233,14 +233,14 @@ ScoreLine pairs_line(const Cases& cases) {
     own.emplace_back(at_work(c->prediction), c->truth.effects);
     for (const auto& [name, b] : c->prediction.baselines) others[name].emplace_back(b.named, c->truth.effects);
   }
-  std::map<std::string, Score> baselines;
+  std::map<std::string, ScoreValue> baselines;
   for (const auto& [name, list] : others) baselines[name] = f1_score(list);
   return line("pairs_f1", "pairs: F1 of names", Bar::at_least, 0.65, 0.88, f1_score(own), std::move(baselines));
 }
 
 }  // namespace
 
-bool right(const Truth& t, const Prediction& p) {
+bool right(const CaseTruth& t, const Prediction& p) {
   if (t.part == "none") return p.kind == "none" || p.kind == "parameters";
   if (t.part == "parameters") return p.kind == "parameters";
   if (t.part == "withheld") return p.kind == "unknown";
@@ -279,7 +279,7 @@ Scores score(const std::vector<ScoredCase>& cases) {
   add_naming(s.main, singles);
   s.main.push_back(line("false_alarm", "false alarm on none and on parameters only", Bar::at_most, 0.05, 0.02,
                         share(harmless, false_alarm),
-                        of_baselines(harmless, [](const Truth&, const Baseline& b) { return !b.named.empty(); })));
+                        of_baselines(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
   s.main.push_back(line("withheld_unknown", "effect withheld or outside the catalogue: \"unknown\"", Bar::at_least,
                         0.60, 0.85,
                         share(withheld, [](const ScoredCase& c) { return c.prediction.kind == "unknown"; })));

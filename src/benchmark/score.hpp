@@ -11,17 +11,17 @@
 namespace flappy::benchmark {
 
 /// What was so.
-struct Truth {
+struct CaseTruth {
   std::string part;                           ///< of kParts
   std::vector<std::string> effects;           ///< that the robot had
-  bool separable = true;                      ///< whether the oracle could tell it from every rival
+  bool separable = true;                      ///< whether flappy-blind detectability could tell it from every rival
   std::map<std::string, double> true_values;  ///< by "effect.parameter", where the catalogue's form has one
 };
 inline constexpr const char* kParts[] = {"singles",  "singles_current", "none",  "parameters",
                                          "withheld", "pairs",           "hover", "typical"};
 
 struct ScoredCase {
-  Truth truth;
+  CaseTruth truth;
   Prediction prediction;
   /// With the true effect alone in the catalogue, where `prediction` has not fitted it.
   std::optional<Prediction> true_fit;
@@ -30,9 +30,9 @@ struct ScoredCase {
 /// One line of the table.
 struct ScoreLine {
   std::string key, what, must, aim;
-  Score score;
+  ScoreValue score;
   std::optional<bool> meets_must, meets_aim;
-  std::map<std::string, Score> baselines;  ///< those that can be judged by it
+  std::map<std::string, ScoreValue> baselines;  ///< those that can be judged by it
 };
 
 struct Scores {
@@ -43,7 +43,7 @@ struct Scores {
 Scores score(const std::vector<ScoredCase>& cases);
 
 /// Whether the verdict is what it should be.
-bool right(const Truth& truth, const Prediction& prediction);
+bool right(const CaseTruth& truth, const Prediction& prediction);
 
 /// Share of the closable gap that the verdict closes: (E_refit - E_named) / (E_refit - E_true effect refitted); 0 for a
 /// verdict without effects; nothing where the true effect's own gain is below two of its sd.

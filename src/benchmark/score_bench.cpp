@@ -130,7 +130,7 @@ std::string figure(const std::optional<double>& value) {
   return text;
 }
 
-std::string interval(const Score& s) { return s.value ? figure(s.low) + " to " + figure(s.high) : "-"; }
+std::string interval(const ScoreValue& s) { return s.value ? figure(s.low) + " to " + figure(s.high) : "-"; }
 
 std::string table(const std::string& title, const std::vector<ScoreLine>& lines) {
   std::string text = "| " + title +
@@ -149,7 +149,7 @@ std::string table(const std::string& title, const std::vector<ScoreLine>& lines)
   return text;
 }
 
-void add(Json& json, const std::string& key, const Score& s) {
+void add(Json& json, const std::string& key, const ScoreValue& s) {
   const auto number = [&](double v) { return s.value ? Json(v) : Json(nullptr); };
   json[key] = s.value ? Json(*s.value) : Json(nullptr);
   json[key + "_low"] = number(s.low);

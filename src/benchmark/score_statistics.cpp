@@ -38,17 +38,17 @@ double error_of(const std::vector<Claim>& sorted) {
 
 }  // namespace
 
-Score proportion(std::size_t successes, std::size_t count) {
+ScoreValue proportion(std::size_t successes, std::size_t count) {
   if (count == 0) return {};
   const io::Interval interval = io::wilson_interval(successes, count);
   return {static_cast<double>(successes) / static_cast<double>(count), interval.low, interval.high, count};
 }
 
-Score resampled(std::size_t count,
-                const std::function<std::optional<double>(const std::vector<std::size_t>&)>& statistic) {
+ScoreValue resampled(std::size_t count,
+                     const std::function<std::optional<double>(const std::vector<std::size_t>&)>& statistic) {
   std::vector<std::size_t> cases(count);
   for (std::size_t i = 0; i < count; ++i) cases[i] = i;
-  Score score;
+  ScoreValue score;
   if (count == 0 || !(score.value = statistic(cases))) return {};
   score.count = count;
   Draws draws;

@@ -9,19 +9,19 @@
 namespace flappy::benchmark {
 
 /// A figure with its 95 % interval; nothing where no case speaks of it.
-struct Score {
+struct ScoreValue {
   std::optional<double> value;
   double low = 0, high = 0;
   std::size_t count = 0;  ///< of cases
 };
 
 /// `successes` of `count`, with Wilson's interval (Wilson, J. Am. Stat. Assoc. 22, 1927).
-Score proportion(std::size_t successes, std::size_t count);
+ScoreValue proportion(std::size_t successes, std::size_t count);
 
 /// A statistic of `count` cases, with the percentile interval of 2,000 resamples of cases (Efron 1981), the same ones every
 /// time. `statistic` gets the cases' indices; nothing where it has no value.
-Score resampled(std::size_t count,
-                const std::function<std::optional<double>(const std::vector<std::size_t>&)>& statistic);
+ScoreValue resampled(std::size_t count,
+                     const std::function<std::optional<double>(const std::vector<std::size_t>&)>& statistic);
 
 /// A probability that was stated, and whether what it was stated of was so.
 struct Claim {

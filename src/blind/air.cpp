@@ -22,13 +22,13 @@ void Robot::blow() {
 
   for (const std::size_t k : {0u, 1u}) {
     const Side& s = side_[k];
-    SideState& state = x_.side[k];
+    RobotSideState& state = x_.side[k];
     const Wing& q = state.wing;
     const Pose& p = pose_[k];
     const Vector3d shoulder = p.edge.transpose() * (through_air + w.cross(s.shoulder_m));
     const Vector3d rate = p.edge.transpose() * p.edge_rate;
     const double stroking = s.sign * rate.z(), lifting = s.sign * rate.x();
-    const Turn rotation = turn_of(q.rotation_rad);
+    const SinCos rotation = sin_cos(q.rotation_rad);
 
     double memory = 0;  // a wing that turns back meets the air it has set in motion
     if (const double size = sizes_[Effect::wake_capture]; size > 0) {

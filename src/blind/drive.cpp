@@ -22,7 +22,7 @@ void Robot::drive(double left_V, double right_V) {
   }
   for (const std::size_t k : {0u, 1u}) {
     const double limit = side_[k].motor.voltage_limit_V;
-    SideState& s = x_.side[k];
+    RobotSideState& s = x_.side[k];
     double volts = std::clamp(command[k], -limit, limit);
     if (const double size = sizes_[Effect::driver_dead_zone]; size > 0) {
       const double knee = 0.4 * size;  // the half bridges' dead time eats it, softly
@@ -43,7 +43,7 @@ void Robot::drive(double left_V, double right_V) {
 
 double Robot::motor_torque(std::size_t k) {
   const Side& side = side_[k];
-  SideState& s = x_.side[k];
+  RobotSideState& s = x_.side[k];
   const model::Motor& m = side.motor;
   const bool backlash = sizes_.has(Effect::gear_backlash);
   const double rate = backlash ? s.rotor_rad_s : s.wing.stroke_rad_s, geared = m.gear_ratio * rate;
@@ -96,7 +96,7 @@ void Robot::update_drive(double dt_s) {
     brush_open = x_.brush_left_s > 0;
   }
   for (const std::size_t k : {0u, 1u}) {
-    SideState& s = x_.side[k];
+    RobotSideState& s = x_.side[k];
     s.resistance_gain = 1;
     if (const double size = sizes_[Effect::winding_heating]; size > 0) {
       // winding and case of a 6 mm motor: 0.3 J/K and 3 J/K, 12 and 30 K/W

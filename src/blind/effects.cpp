@@ -7,11 +7,11 @@
 
 namespace flappy::blind {
 
-const std::array<std::string, kEffects>& effect_names() {
+const std::array<std::string, kBlindEffects>& effect_names() {
 #define FLAPPY_TEXT(...) #__VA_ARGS__
 #define FLAPPY_TEXT_OF(list) FLAPPY_TEXT(list)
-  static const std::array<std::string, kEffects> kNames = [] {
-    std::array<std::string, kEffects> names;
+  static const std::array<std::string, kBlindEffects> kNames = [] {
+    std::array<std::string, kBlindEffects> names;
     std::istringstream list(FLAPPY_TEXT_OF(FLAPPY_BLIND_EFFECTS));
     for (std::string& name : names) std::getline(list >> std::ws, name, ',');
     return names;
@@ -23,10 +23,10 @@ const std::array<std::string, kEffects>& effect_names() {
 
 Sizes::Sizes(const std::vector<BlindEffect>& effects) {
   const auto& names = effect_names();
-  std::array<bool, kEffects> given{};
+  std::array<bool, kBlindEffects> given{};
   for (const BlindEffect& e : effects) {
     const auto k = static_cast<std::size_t>(std::ranges::find(names, e.id) - names.begin());
-    if (k == kEffects)
+    if (k == kBlindEffects)
       throw io::InputError("--effect " + e.id + ": no such effect; accepted: what `flappy-blind effects` lists" +
                            io::did_you_mean(e.id, {names.begin(), names.end()}));
     if (given[k]) throw io::InputError("--effect " + e.id + ": given twice; accepted: each effect once");

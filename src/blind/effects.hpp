@@ -19,10 +19,10 @@ namespace flappy::blind {
       outside_wing_interference, outside_brush_contact, outside_amplitude_hysteresis, outside_vortex_ring,             \
       outside_humidity_front, outside_mocap_lens
 enum class Effect : std::size_t { FLAPPY_BLIND_EFFECTS, count };
-inline constexpr std::size_t kEffects = static_cast<std::size_t>(Effect::count);
+inline constexpr std::size_t kBlindEffects = static_cast<std::size_t>(Effect::count);
 
 /// Identifiers in the order of Effect.
-const std::array<std::string, kEffects>& effect_names();
+const std::array<std::string, kBlindEffects>& effect_names();
 
 struct BlindEffect {
   std::string id;
@@ -39,7 +39,7 @@ class Sizes {
   bool has(Effect e) const { return (*this)[e] > 0; }
 
  private:
-  std::array<double, kEffects> size_{};
+  std::array<double, kBlindEffects> size_{};
 };
 
 }  // namespace flappy::blind

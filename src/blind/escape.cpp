@@ -10,7 +10,7 @@ constexpr double kHeight_m = 1;  ///< of the goal, far from ground and ceiling
 model::Vec3<double> vec3(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 flight::Setpoint<double> hold(const Vector3d& position_m, double heading_rad) {
-  const Turn heading = turn_of(heading_rad);
+  const SinCos heading = sin_cos(heading_rad);
   flight::Setpoint<double> s{};
   s.position_m = vec3(position_m);
   s.heading = {heading.sin, heading.cos};

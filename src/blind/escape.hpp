@@ -10,17 +10,17 @@
 namespace flappy::blind {
 
 /// From an observation to what is added to the controller's output: V, V, V, split cycle.
-using Policy = std::function<std::array<double, 4>(const std::vector<double>& observation)>;
+using ObservationPolicy = std::function<std::array<double, 4>(const std::vector<double>& observation)>;
 
 struct EscapeRules {
   flight::Task task;                        ///< its goal stands still: the path has one segment
   flight::TaskConstants<double> constants;  ///< of its task
   flight::PidConstants<double> controller;  ///< that hovers before and after, and whose trim the policy adds to
-  Policy policy;
+  ObservationPolicy policy;
 };
 
 struct Escape {
-  Flight flight;
+  RobotFlight flight;
   double captured_s = 0, lost_s = 0;  ///< 0: never
   std::uint32_t ended = 0;            ///< bits of flight::Ended
 };

@@ -25,7 +25,7 @@ std::string crash(const Robot& robot, const Room& room, double least_upright) {
   return {};
 }
 
-void add(flightlog::FlightLog& log, const Imu::Sample& s) {
+void add(flightlog::FlightLog& log, const RobotImu::Sample& s) {
   flightlog::ImuStream& m = log.imu;
   m.t_s.push_back(tidy(s.arrival_s));
   m.gyro_x_rad_s.push_back(s.gyro_rad_s.x());
@@ -36,7 +36,7 @@ void add(flightlog::FlightLog& log, const Imu::Sample& s) {
   m.accel_z_m_s2.push_back(s.accel_m_s2.z());
 }
 
-void add(flightlog::FlightLog& log, const Mocap::Sample& s) {
+void add(flightlog::FlightLog& log, const RobotMocap::Sample& s) {
   flightlog::MocapStream& m = log.mocap;
   m.t_s.push_back(tidy(s.arrival_s));
   m.x_m.push_back(s.position_m.x());
@@ -103,9 +103,9 @@ flightlog::FlightHeader header_of(const Case& c, const SensorSet& sensors, const
 
 Room flight_room() { return {}; }
 
-Flight fly(const Case& c, std::size_t flight) {
+RobotFlight fly(const Case& c, std::size_t flight) {
   const Plan plan(c.programme, flight, flight_room(), c.seed);
-  Pilot pilot(c.vehicle.driver, c.seed, flight);
+  RobotController pilot(c.vehicle.driver, c.seed, flight);
 
   // It learns to trim a metre up, in two fifths of the time, and goes where the log begins.
   const Waypoint home = plan.start();
@@ -121,7 +121,7 @@ Flight fly(const Case& c, std::size_t flight) {
     return aim;
   };
   double farthest_m = 0;
-  Flight f = fly(c, flight, start, kFlight_s, kLeastUpright, [&](double t_s, double, const Torso& torso) {
+  RobotFlight f = fly(c, flight, start, kFlight_s, kLeastUpright, [&](double t_s, double, const Torso& torso) {
     const Aim aim = aim_at(t_s);
     if (t_s >= 0) farthest_m = std::max(farthest_m, std::sqrt((torso.position_m - aim.position_m).squaredNorm()));
     return pilot.steer(torso, aim, plan.excitation(t_s));
@@ -130,15 +130,15 @@ Flight fly(const Case& c, std::size_t flight) {
   return f;
 }
 
-Flight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
-           const Steer& steer) {
+RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
+                const Steer& steer) {
   const Room room = flight_room();
   const SensorSet sensors = sensors_of(c.seed, c.power, c.wings);
   Robot robot(c.vehicle, room, c.sizes, c.seed, flight);
-  Imu imu(sensors, c.sizes, c.seed, flight, kStep_s);
-  Mocap mocap(sensors, c.sizes, c.seed, flight);
+  RobotImu imu(sensors, c.sizes, c.seed, flight, kRobotStep_s);
+  RobotMocap mocap(sensors, c.sizes, c.seed, flight);
   Random power_random(c.seed, 100 * flight + 161), wings_random(c.seed, 100 * flight + 162);
-  Flight f;
+  RobotFlight f;
   f.log.header = header_of(c, sensors, room);
   f.log.command.inputs.emplace();
   f.log.command.phase_rad.emplace();
@@ -148,22 +148,22 @@ Flight fly(const Case& c, std::size_t flight, const Torso& start, double duratio
 
   robot.place_torso(start);
 
-  const auto steps_of = [](double s) { return static_cast<std::int64_t>(std::lround(s / kStep_s)); };
+  const auto steps_of = [](double s) { return static_cast<std::int64_t>(std::lround(s / kRobotStep_s)); };
   const std::int64_t trim = steps_of(kTrim_s), end = trim + steps_of(duration_s), control = steps_of(kControl_s),
                      hold = steps_of(c.vehicle.driver.hold_s);
   std::array<double, 2> volts{};
   Inputs inputs;
   std::int64_t mocap_count = 0, power_count = 0, wings_count = 0;
   const auto due = [](std::int64_t step, double rate_hz, std::int64_t& count) {
-    if (step < std::llround(static_cast<double>(count) / (rate_hz * kStep_s))) return false;
+    if (step < std::llround(static_cast<double>(count) / (rate_hz * kRobotStep_s))) return false;
     ++count;
     return true;
   };
   for (std::int64_t n = 0; n < end; ++n) {
     const std::int64_t step = n - trim;
-    const double t_s = static_cast<double>(step) * kStep_s;
+    const double t_s = static_cast<double>(step) * kRobotStep_s;
     const bool logged = step >= 0;
-    const double turns = static_cast<double>(n) * kStep_s * c.vehicle.driver.flapping_Hz,
+    const double turns = static_cast<double>(n) * kRobotStep_s * c.vehicle.driver.flapping_Hz,
                  beat = turns - std::floor(turns);
     if (n % control == 0) {
       inputs = steer(t_s, beat, robot.torso());
@@ -182,8 +182,8 @@ Flight fly(const Case& c, std::size_t flight, const Torso& start, double duratio
       }
     }
     if (n % hold == 0) {
-      volts = {Pilot::voltage(inputs, 0, beat, c.vehicle.left.motor.voltage_limit_V),
-               Pilot::voltage(inputs, 1, beat, c.vehicle.right.motor.voltage_limit_V)};
+      volts = {RobotController::voltage(inputs, 0, beat, c.vehicle.left.motor.voltage_limit_V),
+               RobotController::voltage(inputs, 1, beat, c.vehicle.right.motor.voltage_limit_V)};
       if (logged) add_command(f.log, t_s, volts, inputs, 2 * kPi * beat);
     }
     if (logged && due(step, sensors.mocap.rate_hz, mocap_count))
@@ -199,7 +199,7 @@ Flight fly(const Case& c, std::size_t flight, const Torso& start, double duratio
     }
     robot.step(volts[0], volts[1]);
     if (!logged) continue;
-    if (const auto s = imu.after_step(robot, t_s + kStep_s)) add(f.log, *s);
+    if (const auto s = imu.after_step(robot, t_s + kRobotStep_s)) add(f.log, *s);
     if (sensors.power && due(step, sensors.power->rate_hz, power_count)) {
       flightlog::PowerStream& p = *f.log.power;  // of the instant at which the step began
       p.t_s.push_back(tidy(t_s + sensors.power->latency_s));

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "blind/pilot.hpp"
+#include "blind/robot_controller.hpp"
 #include "blind/robot_sensors.hpp"
 
 namespace flappy::blind {
@@ -21,7 +21,7 @@ struct Case {
   bool power = false, wings = false;
 };
 
-struct Flight {
+struct RobotFlight {
   bool crashed = false;
   std::string how;  ///< it crashed
   flightlog::FlightLog log;
@@ -33,7 +33,7 @@ struct Flight {
 Room flight_room();
 
 /// Flight 0, 1 or 2 of a case: it learns to trim, then the log begins. The same bytes for the same case.
-Flight fly(const Case& c, std::size_t flight);
+RobotFlight fly(const Case& c, std::size_t flight);
 
 /// Who steers: asked once each control period, from kTrim_s before the log begins; `t_s` is on the log's clock, `beat` the
 /// fraction of the beat in [0, 1).
@@ -41,7 +41,7 @@ using Steer = std::function<Inputs(double t_s, double beat, const Torso& torso)>
 
 /// A flight of `duration_s` from `start` on. It has crashed where it touches something, flies away, or its z axis comes
 /// below `least_upright` over the level (sine of the angle).
-Flight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
-           const Steer& steer);
+RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
+                const Steer& steer);
 
 }  // namespace flappy::blind

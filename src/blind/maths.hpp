@@ -25,12 +25,12 @@ inline double nearest(double x) {
   return (x + kShift) - kShift;
 }
 
-struct Turn {
+struct SinCos {
   double sin, cos;
 };
 
 /// For |x| up to about 1e6.
-inline Turn turn_of(double x) {
+inline SinCos sin_cos(double x) {
   const double n = nearest(x * (2 / kPi));
   const double r = (x - n * 0x1.921fb54400000p+0) - n * 0x1.0b4611a626331p-34, y = r * r;
   const double s =
@@ -87,7 +87,7 @@ inline double hyperbolic_tangent(double x) {
 inline Quaterniond turned_by(const Vector3d& angle_rad) {
   const double a = std::sqrt(angle_rad.squaredNorm());
   if (a < 1e-9) return Quaterniond(1, angle_rad.x() / 2, angle_rad.y() / 2, angle_rad.z() / 2).normalized();
-  const Turn half = turn_of(a / 2);
+  const SinCos half = sin_cos(a / 2);
   const Vector3d v = half.sin / a * angle_rad;
   return {half.cos, v.x(), v.y(), v.z()};
 }
@@ -103,7 +103,7 @@ class Random {
   /// Standard normal (Box and Muller 1958).
   double normal() {
     const double radius = std::sqrt(-2 * logarithm(uniform()));
-    return radius * turn_of(2 * kPi * uniform()).cos;
+    return radius * sin_cos(2 * kPi * uniform()).cos;
   }
   Vector3d normals() {
     const double x = normal(), y = normal();
@@ -111,7 +111,7 @@ class Random {
   }
   /// A level direction.
   Vector3d level() {
-    const Turn t = turn_of(2 * kPi * uniform());
+    const SinCos t = sin_cos(2 * kPi * uniform());
     return {t.cos, t.sin, 0};
   }
   double sign() { return uniform() < 0.5 ? -1 : 1; }

@@ -141,7 +141,7 @@ void Robot::pose_sides() {
   for (const std::size_t k : {0u, 1u}) {
     const Wing& q = x_.side[k].wing;
     const double sg = side_[k].sign;
-    const Turn stroke = turn_of(sg * q.stroke_rad), rotation = turn_of(q.rotation_rad);
+    const SinCos stroke = sin_cos(sg * q.stroke_rad), rotation = sin_cos(q.rotation_rad);
     Pose& p = pose_[k];
     p.edge << stroke.cos, -stroke.sin, 0, stroke.sin, stroke.cos, 0, 0, 0, 1;
     p.wing.col(1) = p.edge.col(1);

@@ -18,7 +18,7 @@
 
 namespace flappy::blind {
 
-inline constexpr double kStep_s = 2e-5;
+inline constexpr double kRobotStep_s = 2e-5;
 inline constexpr double kBattery_V = 18;  ///< nominal: at it, the motor gets what the driver is told
 
 struct Wall {
@@ -42,7 +42,7 @@ struct Wing {
 };
 
 /// All that changes of one side.
-struct SideState {
+struct RobotSideState {
   Wing wing;
   double rotor_rad = 0, rotor_rad_s = 0;         ///< of the motor behind a gear with backlash, in terms of the stroke
   double driver_V = 0, driver_V_s = 0;           ///< of a driver that lags
@@ -54,10 +54,10 @@ struct SideState {
   double resistance_gain = 1, air_gain = 1, drive_gain = 1;  ///< since the last millisecond
 };
 
-struct State {
+struct RobotState {
   double t_s = 0;
   Torso torso;
-  std::array<SideState, 2> side;  ///< left first
+  std::array<RobotSideState, 2> side;  ///< left first
   double battery_V = kBattery_V, battery_rc_V = 0, charge_C = 0, drawn_C = 0;
   Vector3d wind_m_s = Vector3d::Zero(), gust_m_s = Vector3d::Zero(), gust_lag_m_s = Vector3d::Zero();
   Vector3d slosh_m = Vector3d::Zero(), slosh_m_s = Vector3d::Zero();
@@ -72,7 +72,7 @@ class Robot {
  public:
   /// `seed`: of what effects draw once: directions, signs; `flight`: of what differs between flights: gusts, jitter.
   Robot(const model::Vehicle& vehicle, const Room& room, const Sizes& sizes, std::uint64_t seed,
-        std::uint64_t flight = 0, double step_s = kStep_s);
+        std::uint64_t flight = 0, double step_s = kRobotStep_s);
 
   /// One step under what the driver is told: volts at nominal battery.
   void step(double left_V, double right_V);
@@ -82,8 +82,8 @@ class Robot {
   /// On a stand: the torso stays where it is.
   void hold_torso(bool held) { held_ = held; }
 
-  const State& state() const { return x_; }
-  void set_state(const State& state) { x_ = state; }
+  const RobotState& state() const { return x_; }
+  void set_state(const RobotState& state) { x_ = state; }
   const Torso& torso() const { return x_.torso; }
   const Wing& wing(std::size_t side) const { return x_.side[side].wing; }
   double battery_V() const { return x_.battery_V; }
@@ -183,7 +183,7 @@ class Robot {
   std::deque<Pending> pending_;
   std::array<double, 2> told_V_{}, applied_V_{};
 
-  State x_;
+  RobotState x_;
   Matrix3d R_ = Matrix3d::Identity();  // of this step
   std::array<Pose, 2> pose_;
   Matrix10 mass_matrix_;

@@ -10,7 +10,7 @@ double square(double x) { return x * x; }
 double bandwidth_hz(double interval_s, double low_pass_hz) {
   const auto passes = [&](double hz) {
     const double x = kPi * hz * interval_s;
-    return turn_of(x).sin / x / std::sqrt(1 + square(hz / low_pass_hz));
+    return sin_cos(x).sin / x / std::sqrt(1 + square(hz / low_pass_hz));
   };
   double low = 0, high = 1 / interval_s;
   for (int i = 0; i < 60; ++i) {
@@ -41,7 +41,7 @@ SensorSet sensors_of(std::uint64_t seed, bool power, bool wings) {
   return s;
 }
 
-Imu::Imu(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight, double step_s)
+RobotImu::RobotImu(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight, double step_s)
     : set_(set),
       sizes_(sizes),
       step_s_(step_s),
@@ -61,7 +61,7 @@ Imu::Imu(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint
       for (int j = 0; j < 3; ++j) misaligned_(i, j) += size * (i == j ? 0.005 : 0.02) * fixed.normal();
 }
 
-std::optional<Imu::Sample> Imu::after_step(const Robot& robot, double t_s) {
+std::optional<RobotImu::Sample> RobotImu::after_step(const Robot& robot, double t_s) {
   const auto& at = set_.imu.position_m;
   const Vector3d rate = robot.torso().rate_rad_s;
   Vector3d force = robot.specific_force({at[0], at[1], at[2]});
@@ -95,7 +95,7 @@ std::optional<Imu::Sample> Imu::after_step(const Robot& robot, double t_s) {
   return s;
 }
 
-Mocap::Mocap(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight)
+RobotMocap::RobotMocap(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight)
     : set_(set), sizes_(sizes), random_(seed, 100 * flight + 131), delay_random_(seed, 100 * flight + 132) {
   Random fixed(seed, 22);
   if (const double size = sizes[Effect::mocap_tilt]; size > 0) tilt_ = turned_by(0.01 * size * fixed.level());
@@ -103,7 +103,7 @@ Mocap::Mocap(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::
   marker_m_ = 2e-3 * sizes[Effect::marker_offset] * normals / std::sqrt(normals.squaredNorm());
 }
 
-std::optional<Mocap::Sample> Mocap::look(const Torso& torso, double t_s) {
+std::optional<RobotMocap::Sample> RobotMocap::look(const Torso& torso, double t_s) {
   const Vector3d noise_m = set_.mocap.position_noise_m * random_.normals(),
                  noise_rad = set_.mocap.attitude_noise_rad * random_.normals();
   const double jitter_s = 3e-4 * std::clamp(random_.normal(), -3.0, 3.0), chance = random_.uniform();

@@ -22,13 +22,13 @@ struct SensorSet {
 SensorSet sensors_of(std::uint64_t seed, bool power, bool wings);
 
 /// The IMU alone, for whoever moves a torso along a path of his own.
-class Imu {
+class RobotImu {
  public:
   struct Sample {
     double arrival_s;
     Vector3d gyro_rad_s, accel_m_s2;
   };
-  Imu(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight, double step_s);
+  RobotImu(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight, double step_s);
   /// After a step that ended at `t_s` on the log's clock; a sample where its interval ended.
   std::optional<Sample> after_step(const Robot& robot, double t_s);
   const Vector3d& constant_bias_rad_s() const { return bias_; }
@@ -47,14 +47,14 @@ class Imu {
   Vector3d gyro_drift_ = Vector3d::Zero(), accel_drift_ = Vector3d::Zero(), walk_ = Vector3d::Zero();
 };
 
-class Mocap {
+class RobotMocap {
  public:
   struct Sample {
     double arrival_s;
     Vector3d position_m;
     Quaterniond attitude;
   };
-  Mocap(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight);
+  RobotMocap(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight);
   /// The pose at `t_s`, unless it is lost.
   std::optional<Sample> look(const Torso& torso, double t_s);
 

@@ -103,7 +103,7 @@ void Robot::push() {
   if (const double size = sizes_[Effect::outside_magnetic_torque]; size > 0)
     rhs_.segment<3>(0) += 1e-4 * size * magnet_.cross(R_.transpose() * field_);
   if (const double size = sizes_[Effect::outside_vortex_shedding]; size > 0)
-    add_force({0, 0, -0.015}, 0.03 * size * weight * turn_of(2 * kPi * x_.shedding_turns).sin * shedding_axis_);
+    add_force({0, 0, -0.015}, 0.03 * size * weight * sin_cos(2 * kPi * x_.shedding_turns).sin * shedding_axis_);
   if (const double size = sizes_[Effect::outside_slosh]; size > 0) {
     // 0.7 g hang on 2 cm; what they do beyond going along with the torso acts on it
     constexpr double kMass_kg = 0.7e-3, kFrequency_rad_s = 22, kRatio = 0.06;

@@ -54,16 +54,16 @@ void require_replaceable(const fs::path& folder) {
 }
 
 /// A folder beside another, gone at the end.
-struct TemporaryFolder {
-  explicit TemporaryFolder(const fs::path& beside) : path(beside.string() + ".tmp" + std::to_string(getpid())) {
+struct SiblingFolder {
+  explicit SiblingFolder(const fs::path& beside) : path(beside.string() + ".tmp" + std::to_string(getpid())) {
     fs::create_directories(path);
   }
-  ~TemporaryFolder() {
+  ~SiblingFolder() {
     std::error_code ignored;
     fs::remove_all(path, ignored);
   }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  SiblingFolder(const SiblingFolder&) = delete;
+  SiblingFolder& operator=(const SiblingFolder&) = delete;
 
   fs::path path;
 };
@@ -102,10 +102,10 @@ void write_flight_log(const fs::path& folder, const FlightLog& log) {
   try {
     const fs::path named = folder.has_filename() ? folder : folder.parent_path();
     const fs::path target = fs::weakly_canonical(named);  // or a link would be replaced instead of the folder
-    const TemporaryFolder fresh(target);
+    const SiblingFolder fresh(target);
     for (const auto& [name, text] : files) io::write_atomically(fresh.path / name, text);
     if (fs::exists(target)) {
-      const TemporaryFolder old(fresh.path);
+      const SiblingFolder old(fresh.path);
       fs::rename(target, old.path / "log");
       std::error_code failed;
       fs::rename(fresh.path, target, failed);

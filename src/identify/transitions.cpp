@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "flightlog/track.hpp"
+#include "flightlog/smoother.hpp"
 #include "identify/force_map.hpp"
 #include "io/csv.hpp"
 #include "io/statistics.hpp"
@@ -131,7 +131,7 @@ struct Transitions::Flight {
   sim::VoltageScript voltages;
   std::optional<flightlog::WingsStream> wings;
   double wings_hz;
-  flightlog::Track track;
+  flightlog::Smoother track;
   std::unique_ptr<Truth> truth;
   std::vector<double> starts_s;
   std::size_t recorded = 0, low = 0, not_covered = 0;
@@ -228,13 +228,14 @@ void Transitions::add(const std::filesystem::path& folder, const flightlog::Flig
                       const model::Vehicle& vehicle) {
   const auto refuse = [&](const std::string& what) { throw io::InputError(folder.string() + ": " + what); };
   auto flight = std::make_unique<Flight>(folder, log, vehicle, options_.source);
-  const flightlog::Track& t = flight->track;
-  const double surprise = std::sqrt(std::max({t.angle_surprise(), t.position_surprise(), t.bias_surprise()}));
+  const flightlog::Smoother& t = flight->track;
+  const double surprise = std::sqrt(
+      std::max({t.angle_normalised_innovation(), t.position_normalised_innovation(), t.bias_normalised_innovation()}));
   if (!(surprise <= kLargestSurprise) && !options_.accept_surprise)
     refuse("motion capture and IMU disagree, or are biased, by " + io::shortest_digits(std::round(10 * surprise) / 10) +
            " times their declared noise; accepted: at most " + io::shortest_digits(kLargestSurprise) +
            ", or any by --accept-surprise; flappy-gap check says more");
-  surprise_ = std::max(surprise_, surprise);
+  normalised_innovation_ = std::max(normalised_innovation_, surprise);
   flight->choose_starts();
   if (flight->starts_s.empty()) {
     if (flight->low > 0) refuse("no sample is higher than five mean chords above the ground; accepted: free flight");
@@ -250,7 +251,7 @@ void Transitions::add(const std::filesystem::path& folder, const flightlog::Flig
 
 TransitionReport Transitions::run() const {
   TransitionReport report;
-  report.surprise = surprise_;
+  report.surprise = normalised_innovation_;
   if (!flights_.empty()) report.beats_s = flights_.front()->window_s();
   std::size_t available = 0;
   for (const auto& f : flights_) {

@@ -1,4 +1,5 @@
-// The oracle's formula against draws, its search on hand-made information, and the carried robot against its own flights.
+// The formula of detectability against draws, its search on hand-made information, and the robot's reset predictions against its own
+// flights.
 #include "benchmark/detectability.hpp"
 
 #include <gtest/gtest.h>
@@ -24,7 +25,7 @@ double log_normal(const VectorXd& r, const MatrixXd& covariance) {
 
 // Twelve rows, two parameters; the truth is beside both columns of the hypothesis. Of 20,000 draws the mean of the differences,
 // each worked out from whole covariances, within four of its standard errors.
-TEST(Oracle, ExpectsWhatDrawsGive) {
+TEST(DetectabilityAnalysis, ExpectsWhatDrawsGive) {
   constexpr Index kRows = 12;
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal;
@@ -56,9 +57,11 @@ TEST(Oracle, ExpectsWhatDrawsGive) {
   EXPECT_GT(mean, 20 * error) << "nothing was tested";
 }
 
-TEST(Oracle, FindsTheSizeAndTheRivals) {
-  std::array<benchmark::Oracle::Columns, kEffects> effects;
-  const auto give = [&](Effect e) -> benchmark::Oracle::Columns& { return effects[static_cast<std::size_t>(e)]; };
+TEST(DetectabilityAnalysis, FindsTheSizeAndTheRivals) {
+  std::array<benchmark::DetectabilityAnalysis::Columns, kBlindEffects> effects;
+  const auto give = [&](Effect e) -> benchmark::DetectabilityAnalysis::Columns& {
+    return effects[static_cast<std::size_t>(e)];
+  };
   give(Effect::added_mass) = {{1, 2}, {0, 1}, {}};
   give(Effect::body_drag) = {{1}, {2}, {3}};
   give(Effect::tether) = {{1}, {4}, {}};
@@ -69,7 +72,7 @@ TEST(Oracle, FindsTheSizeAndTheRivals) {
   rows << 1, 3, 1, 1, 0, 0, 0,  //
       0, 0, 1, -1, 0, 0, 0,     //
       0, 0, 0, 0, 1, 1, 0.9;
-  const benchmark::Oracle oracle(effects, 300 * rows.transpose() * rows);
+  const benchmark::DetectabilityAnalysis analysis(effects, 300 * rows.transpose() * rows);
   // the truth is straight of the next larger size tried, 1 or 3 along x; the hypothesis, of the other one, m, with prior
   // precision of its coefficient size^2/4
   const auto expected = [](double size) {
@@ -79,20 +82,20 @@ TEST(Oracle, FindsTheSizeAndTheRivals) {
     return 0.5 * (f * f / (a + prior) + a / (a + prior) - std::log1p(a / prior)) / 3;
   };
   for (const double size : {0.2, 1.0, 1.5, 2.0})
-    EXPECT_NEAR(oracle.gain(Effect::added_mass, size), expected(size), 1e-9 * expected(size)) << size;
-  EXPECT_EQ(oracle.gain(Effect::added_mass, 2.1), 0) << "not tried";
-  EXPECT_EQ(oracle.gain(Effect::wind, 1), 0) << "not tried";
-  const double found = oracle.detectable(Effect::added_mass, 10);
+    EXPECT_NEAR(analysis.gain(Effect::added_mass, size), expected(size), 1e-9 * expected(size)) << size;
+  EXPECT_EQ(analysis.gain(Effect::added_mass, 2.1), 0) << "not tried";
+  EXPECT_EQ(analysis.gain(Effect::wind, 1), 0) << "not tried";
+  const double found = analysis.detectable(Effect::added_mass, 10);
   EXPECT_NEAR(expected(found), 10, 1e-3);
-  EXPECT_TRUE(std::isinf(oracle.detectable(Effect::added_mass, 1e6)));
-  const double lasting = oracle.detectable(Effect::wall_effect, 20);
-  EXPECT_GT(oracle.gain(Effect::wall_effect, lasting), 22);
-  EXPECT_NEAR(oracle.gain(Effect::wall_effect, 2 * lasting), 20, 1e-3);
+  EXPECT_TRUE(std::isinf(analysis.detectable(Effect::added_mass, 1e6)));
+  const double lasting = analysis.detectable(Effect::wall_effect, 20);
+  EXPECT_GT(analysis.gain(Effect::wall_effect, lasting), 22);
+  EXPECT_NEAR(analysis.gain(Effect::wall_effect, 2 * lasting), 20, 1e-3);
   // body_drag and its direction together are as good, but for what one more coefficient costs; tether says nothing of it
   // a third of 1/2 log(1 + 600 / 0.25)
   for (const double size : {1.0, 1.5})
-    EXPECT_LT(std::abs(oracle.gain_over(Effect::added_mass, size, Effect::body_drag)), 1.3) << size;
-  EXPECT_NEAR(oracle.gain_over(Effect::added_mass, 1, Effect::tether), oracle.gain(Effect::added_mass, 1), 0.5);
+    EXPECT_LT(std::abs(analysis.gain_over(Effect::added_mass, size, Effect::body_drag)), 1.3) << size;
+  EXPECT_NEAR(analysis.gain_over(Effect::added_mass, 1, Effect::tether), analysis.gain(Effect::added_mass, 1), 0.5);
 }
 
 Case flown(const std::vector<BlindEffect>& effects) {
@@ -101,15 +104,15 @@ Case flown(const std::vector<BlindEffect>& effects) {
   return c;
 }
 
-gap::CarriedFlight carried(const Case& c, std::size_t flight) {
-  Flight f = fly(c, flight);
+gap::PredictedFlight carried(const Case& c, std::size_t flight) {
+  RobotFlight f = fly(c, flight);
   EXPECT_FALSE(f.crashed) << f.how;
-  return gap::CarriedFlight(gap::Recording("flight", std::move(f.log), c.vehicle));
+  return gap::PredictedFlight(gap::Recording("flight", std::move(f.log), c.vehicle));
 }
 
 /// Rms over beats of what is left of the steady turn and force, [channel].
-std::array<double, 6> left(const gap::CarriedFlight& flight, const benchmark::Rider& rider) {
-  const gap::Rows rows = carry(flight.recording(), rider, 0);
+std::array<double, 6> left(const gap::PredictedFlight& flight, const benchmark::Perturbation& perturbation) {
+  const gap::Rows rows = predict_perturbed(flight.recording(), perturbation, 0);
   std::array<double, 6> rms{};
   double n = 0;
   for (std::size_t j = 0; j < flight.beats(); ++j) {
@@ -128,12 +131,12 @@ std::array<double, 6> left(const gap::CarriedFlight& flight, const benchmark::Ri
 // accelerometer 0.5 sqrt(2/3 / n) = 0.11 m/s^2 at 500 Hz, of the gyro differenced 0.05 sqrt(2 dt/T) / T = 0.6 rad/s^2; what
 // drifts in them, and what the record gets wrong of the torso's motion, adds half of that. Without the effect that it flew
 // with, what is left is several times as much.
-TEST(OracleCarry, KnowsItsOwnFlight) {
+TEST(ResetPrediction, KnowsItsOwnFlight) {
   for (const std::vector<BlindEffect>& effects : {std::vector<BlindEffect>{{"coulomb_friction", 1}, {"body_drag", 1}},
                                                   {{"wind", 2}},            // its gusts come as they came
                                                   {{"battery_sag", 4}}}) {  // empty by as much as the trim took
     const Case c = flown(effects);
-    const gap::CarriedFlight flight = carried(c, 0);
+    const gap::PredictedFlight flight = carried(c, 0);
     const auto with = left(flight, {c.vehicle, c.sizes, c.seed}), without = left(flight, {c.vehicle, {}, c.seed});
     double worst = 0;
     for (std::size_t s = 0; s < 6; ++s) {
@@ -144,23 +147,23 @@ TEST(OracleCarry, KnowsItsOwnFlight) {
   }
 }
 
-TEST(OracleCarry, LagsByWholeSteps) {
+TEST(ResetPrediction, LagsByWholeSteps) {
   const Case c = flown({});
   gap::Recording late = carried(c, 0).recording();
-  const gap::Rows expected = benchmark::carry(late, {c.vehicle, {}, c.seed, 1}, 0);
+  const gap::Rows expected = benchmark::predict_perturbed(late, {c.vehicle, {}, c.seed, 1}, 0);
   for (std::vector<double>* v : {&late.left_V, &late.right_V}) {
     v->insert(v->begin(), v->front());
     v->pop_back();
   }
-  EXPECT_EQ(benchmark::carry(late, {c.vehicle, {}, c.seed, 0}, 0), expected);
+  EXPECT_EQ(benchmark::predict_perturbed(late, {c.vehicle, {}, c.seed, 0}, 0), expected);
 }
 
-TEST(OracleSubject, SensorsDoNotChangeTheFlight) {
-  const Flight plain = fly(flown({}), 0);
+TEST(Subject, SensorsDoNotChangeTheFlight) {
+  const RobotFlight plain = fly(flown({}), 0);
   std::vector<BlindEffect> all;
-  for (std::size_t e = 0; e < kEffects; ++e)
+  for (std::size_t e = 0; e < kBlindEffects; ++e)
     if (benchmark::acts_on_sensors(static_cast<Effect>(e))) all.push_back({effect_names()[e], 2});
-  const Flight f = fly(flown(all), 0);
+  const RobotFlight f = fly(flown(all), 0);
   EXPECT_EQ(f.log.command, plain.log.command);
   EXPECT_NE(f.log.imu, plain.log.imu);
   EXPECT_NE(f.log.mocap, plain.log.mocap);
@@ -169,18 +172,18 @@ TEST(OracleSubject, SensorsDoNotChangeTheFlight) {
 
 // With j = b' C^-1 b of a column b of the background, what is known of a coefficient of b beside one of variance 1 is
 // j/(1 + j), and less beside others: less than the little that every vehicle has says nothing.
-TEST(OracleSubject, LessThanEveryVehicleHasSaysNothing) {
+TEST(Subject, LessThanEveryVehicleHasSaysNothing) {
   const Case c = flown({});
   const benchmark::Subject subject(c, benchmark::fly_all(c, 2), 2);
-  const std::vector<gap::Smooth> background = subject.background();
+  const std::vector<gap::BasisCoefficients> background = subject.background();
   std::size_t sizes = 0;
   for (const model::EffectEntry& e : model::effects()) sizes += static_cast<std::size_t>(e.info.sizes);
   ASSERT_EQ(background.size(), sizes);
-  const std::vector<gap::Smooth> some = {background.front(), background[sizes / 2], background.back()};
+  const std::vector<gap::BasisCoefficients> some = {background.front(), background[sizes / 2], background.back()};
   const MatrixXd alone = subject.information({}, some), beside = subject.information(background, some);
   for (Index i = 0; i < 3; ++i) {
     EXPECT_GT(alone(i, i), beside(i, i));
-    const std::vector<gap::Smooth> b = {some[static_cast<std::size_t>(i)]};
+    const std::vector<gap::BasisCoefficients> b = {some[static_cast<std::size_t>(i)]};
     const double j = alone(i, i), known = subject.information(b, b)(0, 0);
     EXPECT_NEAR(known, j / (1 + j), 1e-9);
     EXPECT_LT(beside(i, i), known * (1 + 1e-9));
@@ -191,13 +194,13 @@ TEST(OracleSubject, LessThanEveryVehicleHasSaysNothing) {
   const auto unknowns = static_cast<Index>(gap::unknowns_of(first).size());
   const double sd = gap::read_model_discrepancy().background_sd(first), reach = 0.4;
   const std::vector<VectorXd> at = {reach * VectorXd::Unit(unknowns, 0)};
-  const gap::Smooth there = subject.catalogue(first, at)[0];
+  const gap::BasisCoefficients there = subject.catalogue(first, at)[0];
   EXPECT_LT((background.front() - sd / reach * there).norm(), 1e-12 * there.norm());
 }
 
 // Effects whose size both sides state in the same units: the entry comes out as what was put in. Poses
 // are jittered by as much as a tenth of the delay.
-TEST(OracleTruth, FindsWhatWasPutIn) {
+TEST(TrueValues, FindsWhatWasPutIn) {
   const auto uncertain =
       sim::read_randomisation(test::nominal(), io::Config::load(test::source_path("configs/gap/priors.toml")).root());
   const auto values =

@@ -94,7 +94,7 @@ TEST(CalibrationError, OfACalibratedPredictorIsThatOfChance) {
   EXPECT_NEAR(calibrated_error_95(std::vector<benchmark::Claim>(1000, {0.5, true})), 0.0556, 0.002);
 }
 
-TEST(Score, RightEffectFirstIsJudgedWhereRivalsAreSeparable) {
+TEST(ScoreValue, RightEffectFirstIsJudgedWhereRivalsAreSeparable) {
   std::vector<benchmark::ScoredCase> cases = {
       judged("singles", {"tether"}, "effect", {"tether"}, 0.9, {fitted({"tether"}, 0.9)}),
       judged("singles", {"tether"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9), fitted({"tether"}, 0.1)}),
@@ -117,7 +117,7 @@ TEST(Score, RightEffectFirstIsJudgedWhereRivalsAreSeparable) {
   EXPECT_DOUBLE_EQ(*main_score(cases, "top1_current").value, 1);
 }
 
-TEST(Score, AmongThreeCountsEveryAnswer) {
+TEST(ScoreValue, AmongThreeCountsEveryAnswer) {
   benchmark::ScoredCase c = judged("singles", {"tether"}, "unknown", {}, 0.4,
                                    {fitted({"wind"}, 0.2), fitted({"tether"}, 0.1), fitted({"com_offset"}, 0.05)});
   c.prediction.unknown = 0.4;
@@ -127,7 +127,7 @@ TEST(Score, AmongThreeCountsEveryAnswer) {
   EXPECT_DOUBLE_EQ(*main_score({c}, "top3").value, 0) << "unknown, wind, none, tether";
 }
 
-TEST(Score, FalseAlarmsAndWithheldTruths) {
+TEST(ScoreValue, FalseAlarmsAndWithheldTruths) {
   const std::vector<benchmark::ScoredCase> cases = {
       judged("none", {}, "none", {}, 0.9),
       judged("none", {}, "parameters", {}, 0.9),
@@ -149,7 +149,7 @@ TEST(Score, FalseAlarmsAndWithheldTruths) {
   EXPECT_NEAR(*main_score(cases, "ece").value, error, 1e-12);
 }
 
-TEST(Score, ClosureIsMeasuredAgainstTheTrueEffect) {
+TEST(ScoreValue, ClosureIsMeasuredAgainstTheTrueEffect) {
   benchmark::ScoredCase c = judged("singles", {"tether"}, "effect", {"wind"}, 0.9,
                                    {fitted({"wind"}, 0.9, 0.7, 0.01), fitted({"tether"}, 0.1, 0.5, 0.01)});
   c.prediction.refit = 1.0;
@@ -178,7 +178,7 @@ TEST(Score, ClosureIsMeasuredAgainstTheTrueEffect) {
   EXPECT_FALSE(needs_true_fit(c));
 }
 
-TEST(Score, IntervalsCountWhereTheVerdictNamesTheTruth) {
+TEST(ScoreValue, IntervalsCountWhereTheVerdictNamesTheTruth) {
   benchmark::ScoredCase c = judged("singles", {"wind"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9)});
   c.prediction.sets[0].values = {{"wind.x_m_s", {0.3, 0.2, 0.4}}, {"wind.y_m_s", {0, -0.1, 0.1}}};
   c.truth.true_values = {{"wind.x_m_s", 0.35}, {"wind.y_m_s", 0.2}, {"wind.z_m_s", 0}};
@@ -190,7 +190,7 @@ TEST(Score, IntervalsCountWhereTheVerdictNamesTheTruth) {
   EXPECT_FALSE(main_score({c}, "interval_coverage").value);
 }
 
-TEST(Score, BarsHaveTheirSides) {
+TEST(ScoreValue, BarsHaveTheirSides) {
   benchmark::ScoredCase c = judged("singles", {"wind"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9)});
   EXPECT_TRUE(*line_of(benchmark::score({c}).main, "group_top1").meets_must);
   EXPECT_TRUE(*line_of(benchmark::score({judged("none", {}, "none", {}, 0.9)}).main, "false_alarm").meets_must);
@@ -205,7 +205,7 @@ TEST(Score, BarsHaveTheirSides) {
   EXPECT_FALSE(*line_of(benchmark::score({c}).main, "interval_coverage").meets_must);
 }
 
-TEST(Score, PairsAreScoredByTheirNames) {
+TEST(ScoreValue, PairsAreScoredByTheirNames) {
   const std::vector<benchmark::ScoredCase> cases = {
       judged("pairs", {"wind", "com_offset"}, "effect", {"com_offset", "wind"}, 0.9),
       judged("pairs", {"wind", "com_offset"}, "effect", {"wind"}, 0.9),
@@ -217,7 +217,7 @@ TEST(Score, PairsAreScoredByTheirNames) {
   EXPECT_NEAR(*main_score(cases, "pairs_f1").value, 2 * 4.0 / 16, 1e-12);
 }
 
-TEST(Score, HoverAbstains) {
+TEST(ScoreValue, HoverAbstains) {
   const std::vector<benchmark::ScoredCase> cases = {judged("hover", {"tether"}, "group", {"tether", "wind"}, 0.9),
                                                     judged("hover", {"tether"}, "effect", {"tether"}, 0.49),
                                                     judged("hover", {"tether"}, "effect", {"tether"}, 0.6),
@@ -232,7 +232,7 @@ TEST(Score, HoverAbstains) {
   EXPECT_FALSE(main_score(cases, "ece").value) << "hover is no rich excitation";
 }
 
-TEST(Score, BaselinesStandInTheSameLines) {
+TEST(ScoreValue, BaselinesStandInTheSameLines) {
   benchmark::ScoredCase c = judged("singles", {"tether"}, "effect", {"tether"}, 0.9);
   c.prediction.baselines["stlsq"] = {{"wind", "tether"}, {"wind", "tether"}};
   benchmark::ScoredCase none = judged("none", {}, "none", {}, 0.9);

@@ -18,8 +18,8 @@ std::vector<double> trace(const Sizes& sizes, double duration_s = 0.25) {
   const std::uint64_t seed = 3;
   const SensorSet set = sensors_of(seed, false, false);
   Robot robot(test::identified(), room, sizes, seed);
-  Imu imu(set, sizes, seed, 0, kStep_s);
-  Mocap mocap(set, sizes, seed, 0);
+  RobotImu imu(set, sizes, seed, 0, kRobotStep_s);
+  RobotMocap mocap(set, sizes, seed, 0);
   Torso start;
   start.position_m = {0.05, 0, 0.15};
   start.velocity_m_s = {0.3, 0.2, -0.3};
@@ -30,8 +30,8 @@ std::vector<double> trace(const Sizes& sizes, double duration_s = 0.25) {
     for (int k = 0; k < 3; ++k) all.push_back(v(k) / scale);
   };
   double volts[2] = {0, 0};
-  for (int n = 0; n < std::lround(duration_s / kStep_s); ++n) {
-    const double t = n * kStep_s;
+  for (int n = 0; n < std::lround(duration_s / kRobotStep_s); ++n) {
+    const double t = n * kRobotStep_s;
     if (n % 50 == 0) volts[0] = 12 * std::cos(2 * kPi * 34 * t), volts[1] = 10 * std::cos(2 * kPi * 34 * t);
     if (n % 250 == 0) {
       if (const auto s = mocap.look(robot.torso(), t)) {
@@ -41,7 +41,7 @@ std::vector<double> trace(const Sizes& sizes, double duration_s = 0.25) {
       }
     }
     robot.step(volts[0], volts[1]);
-    if (const auto s = imu.after_step(robot, t + kStep_s)) add(s->gyro_rad_s, 0.1), add(s->accel_m_s2, 0.1);
+    if (const auto s = imu.after_step(robot, t + kRobotStep_s)) add(s->gyro_rad_s, 0.1), add(s->accel_m_s2, 0.1);
   }
   const Torso& torso = robot.torso();
   add(torso.position_m, 1e-3);
@@ -98,7 +98,7 @@ Stand stand(const std::vector<BlindEffect>& effects, double z_m = 1, double ampl
   s.moment_Nm.setZero();
   double volts = 0, steps = 0;
   for (int n = 0; n < 75000; ++n) {
-    if (n % 50 == 0) volts = amplitude_V * std::cos(2 * kPi * 34 * n * kStep_s);
+    if (n % 50 == 0) volts = amplitude_V * std::cos(2 * kPi * 34 * n * kRobotStep_s);
     robot.step(volts, volts);
     if (n < 50000) continue;
     ++steps;

@@ -19,7 +19,7 @@ Case identified() {
   return c;
 }
 
-EscapeRules shipped(Policy policy) {
+EscapeRules shipped(ObservationPolicy policy) {
   const rollout::FlyConfig config = rollout::read_fly_config(test::source_path("configs/fly/escape.toml"));
   const flight::FlightConstants k = flight::flight_constants(config.fleet);
   return {config.fleet.task, k.task, k.controller.of<flight::PidController>(), std::move(policy)};
@@ -28,7 +28,7 @@ EscapeRules shipped(Policy policy) {
 using Rows = std::vector<std::vector<double>>;
 
 /// A policy that adds nothing to the trim, and notes what it sees.
-Policy watcher(Rows& seen) {
+ObservationPolicy watcher(Rows& seen) {
   return [&seen](const std::vector<double>& observation) {
     seen.push_back(observation);
     return std::array<double, 4>{};

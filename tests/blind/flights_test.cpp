@@ -20,7 +20,7 @@ Case identified(std::uint64_t seed, Programme programme) {
 
 TEST(BlindFlights, PassTheCheckAndReadBack) {
   for (std::size_t k = 0; k < kFlights; ++k) {
-    const Flight f = fly(identified(1, Programme::rich), k);
+    const RobotFlight f = fly(identified(1, Programme::rich), k);
     ASSERT_FALSE(f.crashed) << f.how;
     EXPECT_EQ(flightlog::parse_flight_log(flightlog::flight_log_files(f.log), "flight"), f.log);
     const flightlog::CheckReport report = flightlog::check_flight(f.log);
@@ -40,7 +40,7 @@ TEST(BlindFlights, PassTheCheckAndReadBack) {
 TEST(BlindFlights, SameSeedSameBytes) {
   Case c = identified(2, Programme::hover);
   c.sizes = Sizes({{"wind", 1}, {"command_delay", 0.5}, {"gyro_bias", 1}});
-  const Flight a = fly(c, 0), b = fly(c, 0);
+  const RobotFlight a = fly(c, 0), b = fly(c, 0);
   ASSERT_FALSE(a.crashed) << a.how;
   EXPECT_EQ(flightlog::flight_log_files(a.log), flightlog::flight_log_files(b.log));
   EXPECT_EQ(a.truth, b.truth);
@@ -53,7 +53,7 @@ TEST(BlindFlights, SameSeedSameBytes) {
 TEST(BlindFlights, SayWhenTheyCrash) {
   Case c = identified(1, Programme::hover);
   c.vehicle.driver.amplitude_limit_V = 5;
-  const Flight f = fly(c, 0);
+  const RobotFlight f = fly(c, 0);
   EXPECT_TRUE(f.crashed);
   EXPECT_TRUE(f.how.starts_with("touched the ground at -")) << f.how;
 }

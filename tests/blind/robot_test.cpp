@@ -39,7 +39,7 @@ struct Stand {
   Vector3d force_N = Vector3d::Zero(), moment_Nm = Vector3d::Zero();  ///< mean, moment about the vehicle's middle
   double amplitude_rad = 0;
 };
-Stand on_stand(const Drive& drive, double step_s = kStep_s) {
+Stand on_stand(const Drive& drive, double step_s = kRobotStep_s) {
   Robot robot(test::nominal(), {}, {}, 1, 0, step_s);
   robot.hold_torso(true);
   run(robot, drive, 0, 0.5);
@@ -73,7 +73,7 @@ TEST(BlindRobot, LiftsAsOtherEnginesSay) {
 
 // A step half as long changes thrust by 1e-4: the error of the step is far below that of the strips.
 TEST(BlindRobot, StepIsShortEnough) {
-  const double coarse = on_stand({}).force_N.z(), fine = on_stand({}, kStep_s / 2).force_N.z();
+  const double coarse = on_stand({}).force_N.z(), fine = on_stand({}, kRobotStep_s / 2).force_N.z();
   EXPECT_NEAR(coarse, fine, 5e-4 * fine);
 }
 
@@ -124,7 +124,7 @@ model::Vehicle free_vehicle() {
 }
 Robot in_space(double step_s) {
   Robot robot(free_vehicle(), {.gravity_m_s2 = 0}, {}, 1, 0, step_s);
-  State x = robot.state();
+  RobotState x = robot.state();
   x.torso.velocity_m_s = {0.4, -0.7, 0.3};
   x.torso.rate_rad_s = {3, -5, 4};
   x.side[0].wing = {0.7, 0.4, -50, 80};
@@ -194,7 +194,7 @@ TEST(BlindRobot, FeelsThePointTurn) {
 TEST(BlindRobot, CarriedTorsoKeepsWingsAndSlowStates) {
   Robot robot(test::nominal(), {}, Sizes({{"winding_heating", 1}, {"battery_sag", 1}}), 1);
   run(robot, {}, 0, 0.2);
-  const State before = robot.state();
+  const RobotState before = robot.state();
   Torso torso{{0.1, 0.2, 0.3}, turned_by({0.1, 0, 0.2}), {1, 0, 0}, {0, 0, 2}};
   robot.place_torso(torso);
   EXPECT_EQ(robot.torso().position_m, torso.position_m);
@@ -210,8 +210,8 @@ TEST(BlindRobot, CarriedTorsoKeepsWingsAndSlowStates) {
 
 TEST(BlindMaths, AgreesWithLibm) {
   for (double x = -30; x < 30; x += 0.0137) {
-    EXPECT_NEAR(turn_of(x).sin, std::sin(x), 1e-13);
-    EXPECT_NEAR(turn_of(x).cos, std::cos(x), 1e-13);
+    EXPECT_NEAR(sin_cos(x).sin, std::sin(x), 1e-13);
+    EXPECT_NEAR(sin_cos(x).cos, std::cos(x), 1e-13);
     EXPECT_NEAR(exponential(x) / std::exp(x), 1, 1e-13);
     EXPECT_NEAR(hyperbolic_tangent(x), std::tanh(x), 1e-13);
     if (x > 0) EXPECT_NEAR(logarithm(x), std::log(x), 1e-13);

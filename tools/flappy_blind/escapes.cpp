@@ -6,7 +6,6 @@
 
 #include "blind/escape.hpp"
 #include "flight/constants.hpp"
-#include "rollout/fly_config.hpp"
 #include "io/parallel.hpp"
 #include "io/progress.hpp"
 #include "io/toml_writer.hpp"
@@ -21,7 +20,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 /// A trained actor as it is on disk, or a policy from elsewhere.
-Policy policy_of(const fs::path& path, const rollout::FlyConfig& config) {
+ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& config) {
   if (const auto& actor = config.actor) {
     return [actor, task = config.fleet.task.constants](const std::vector<double>& observation) {
       policy::ActorView<double> view;

@@ -21,16 +21,16 @@ Json fly_case(const RobotOptions& o, Programme programme) {
   const std::filesystem::path folder(o.out);
   std::error_code error;
   if (std::filesystem::exists(folder, error)) io::make_folder(folder);
-  const Drawn drawn = robots.fly(programme);
+  const SampledRobot sampled = robots.fly(programme);
   Json crashes = Json::array(), list = Json::array();
-  for (std::size_t draw = 0; draw < drawn.lost.size(); ++draw) {
-    const Crash& lost = drawn.lost[draw];
+  for (std::size_t draw = 0; draw < sampled.lost.size(); ++draw) {
+    const Crash& lost = sampled.lost[draw];
     std::printf("draw %zu: flight %zu %s; the next draw\n", draw, lost.flight, lost.how.c_str());
     crashes.push_back(lost.how);
   }
   io::make_folder(folder);
   for (std::size_t k = 0; k < kFlights; ++k) {
-    const Flight& flight = drawn.flights[k];
+    const RobotFlight& flight = sampled.flights[k];
     const std::filesystem::path to = folder / ("flight_" + std::to_string(k + 1));
     write(flight, to, !o.no_truth);
     std::printf("%s: %g s, up to %.0f mm off, tilted up to %.0f deg\n", to.c_str(), kFlight_s, 1e3 * flight.farthest_m,
@@ -38,7 +38,7 @@ Json fly_case(const RobotOptions& o, Programme programme) {
     list.push_back(
         {{"folder", to.string()}, {"farthest_m", flight.farthest_m}, {"most_tilt_rad", flight.most_tilt_rad}});
   }
-  return {{"seed", o.seed}, {"draw", drawn.draw}, {"crashes", crashes}, {"flights", list}};
+  return {{"seed", o.seed}, {"draw", sampled.draw}, {"crashes", crashes}, {"flights", list}};
 }
 
 }  // namespace
@@ -82,6 +82,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   detectability->add_option("--out", command.out, "file for what is found")->required();
   detectability->add_option("--threads", command.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
+  const CLI::App* oracle = program.app().add_subcommand("oracle")->group("")->allow_extras();  // its name until now
   CLI::App* make = program.app().add_subcommand("make", "flies the cases of a benchmark and seals what they are");
   benchmark::MakeCommand made;
   std::string set;
@@ -106,6 +107,7 @@ int main(int argc, char** argv) {
   program.app().require_subcommand(1);
   return program.run(argc, argv, [&] {
     using blind::Programme;
+    if (*oracle) throw io::InputError("oracle: has another name now; accepted: detectability");
     if (*make) {
       made.plan.reported = set == "reported";
       const sim::Randomisation uncertain =

@@ -50,13 +50,13 @@ Robots::Robots(const RobotOptions& o)
   declared_.wings = o.wings;
 }
 
-Drawn Robots::fly(Programme programme) const {
+SampledRobot Robots::fly(Programme programme) const {
   Case c = declared_;
   c.programme = programme;
-  return fly_drawn(c, randomisation_, seed_);
+  return fly_sampled(c, randomisation_, seed_);
 }
 
-void write(const Flight& f, const fs::path& to, bool truth) {
+void write(const RobotFlight& f, const fs::path& to, bool truth) {
   flightlog::write_flight_log(to, f.log);
   if (truth) flightlog::write_truth(to, flightlog::kMotionNames, f.truth);
 }

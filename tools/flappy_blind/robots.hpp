@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "blind/drawn.hpp"
+#include "blind/sampled_robot.hpp"
 #include "io/program.hpp"
 
 namespace flappy::blind {
@@ -22,8 +22,8 @@ void add_robot_options(CLI::App& command, RobotOptions& o);
 class Robots {
  public:
   explicit Robots(const RobotOptions& o);
-  Case robot(std::uint64_t draw) const { return drawn_case(declared_, randomisation_, seed_, draw); }
-  Drawn fly(Programme programme) const;
+  Case robot(std::uint64_t draw) const { return sampled_case(declared_, randomisation_, seed_, draw); }
+  SampledRobot fly(Programme programme) const;
 
  private:
   Case declared_;
@@ -31,6 +31,6 @@ class Robots {
   sim::Randomisation randomisation_;
 };
 
-void write(const Flight& f, const std::filesystem::path& to, bool truth);
+void write(const RobotFlight& f, const std::filesystem::path& to, bool truth);
 
 }  // namespace flappy::blind

@@ -27,7 +27,7 @@ struct Energy {
 };
 
 template <class Use>
-void for_rows(const std::vector<gap::CarriedFlight>& flights, const std::vector<double>& noise_sd, std::size_t f,
+void for_rows(const std::vector<gap::PredictedFlight>& flights, const std::vector<double>& noise_sd, std::size_t f,
               const Use& use) {
   for (std::size_t j = 0; j < flights[f].beats(); ++j)
     for (int g = 0; g < gap::kGroups; ++g) {
@@ -39,8 +39,8 @@ void for_rows(const std::vector<gap::CarriedFlight>& flights, const std::vector<
     }
 }
 
-Energy energy(const std::vector<gap::CarriedFlight>& flights, const std::vector<double>& noise_sd,
-              const gap::Signature& s) {
+Energy energy(const std::vector<gap::PredictedFlight>& flights, const std::vector<double>& noise_sd,
+              const gap::Residuals& s) {
   Energy e;
   for (std::size_t f = 0; f < flights.size(); ++f)
     for_rows(flights, noise_sd, f, [&](std::size_t g, std::size_t row) {
@@ -73,11 +73,11 @@ Baseline largest_residual(const std::vector<Energy>& columns, const std::vector<
   return b;
 }
 
-Baseline best_rmse(const std::vector<gap::CarriedFlight>& flights, const gap::Diagnosis& d) {
+Baseline best_rmse(const std::vector<gap::PredictedFlight>& flights, const gap::Diagnosis& d) {
   Baseline b;
   double least = 1e300;
   std::vector<std::pair<double, std::string>> left;
-  for (const gap::Answer& a : d.answers) {
+  for (const gap::ScoredHypothesis& a : d.hypotheses) {
     if (!a.fitted()) continue;
     const Energy e = energy(flights, d.noise_sd, a.fit.point.residual);
     double sum = 0;
@@ -151,7 +151,7 @@ Baseline stlsq(const Regression& r) {
   return b;
 }
 
-std::map<std::string, Baseline> baselines(const std::vector<gap::CarriedFlight>& flights,
+std::map<std::string, Baseline> baselines(const std::vector<gap::PredictedFlight>& flights,
                                           const sim::Randomisation& uncertain, const gap::Diagnosis& d,
                                           const std::vector<std::string>& withheld, int threads) {
   const gap::Hypothesis plain(uncertain, {});
@@ -169,9 +169,9 @@ std::map<std::string, Baseline> baselines(const std::vector<gap::CarriedFlight>&
     candidates.push_back(std::move(s.candidate));
     effects.push_back(std::move(s.effect));
   }
-  std::vector<gap::Signature> rows = residuals(flights, candidates, threads);
-  const gap::Signature& residual = d.parameters.point.residual;
-  std::vector<gap::Signature> columns;
+  std::vector<gap::Residuals> rows = residuals(flights, candidates, threads);
+  const gap::Residuals& residual = d.parameters.point.residual;
+  std::vector<gap::Residuals> columns;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (rows[k].empty()) continue;
     for (std::size_t f = 0; f < flights.size(); ++f)
@@ -201,7 +201,7 @@ std::map<std::string, Baseline> baselines(const std::vector<gap::CarriedFlight>&
     r.rows.push_back(count);
   }
   std::vector<Energy> shown;
-  for (const gap::Signature& c : columns) shown.push_back(energy(flights, d.noise_sd, c));
+  for (const gap::Residuals& c : columns) shown.push_back(energy(flights, d.noise_sd, c));
   return {{"largest_residual", largest_residual(shown, r.effects, energy(flights, d.noise_sd, residual))},
           {"best_rmse", best_rmse(flights, d)},
           {"stlsq", stlsq(r)}};

@@ -15,7 +15,7 @@
 
 namespace flappy::benchmark {
 
-std::map<std::string, Baseline> baselines(const std::vector<gap::CarriedFlight>& flights,
+std::map<std::string, Baseline> baselines(const std::vector<gap::PredictedFlight>& flights,
                                           const sim::Randomisation& uncertain, const gap::Diagnosis& diagnosis,
                                           const std::vector<std::string>& withheld, int threads);
 

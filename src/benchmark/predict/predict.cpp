@@ -13,7 +13,7 @@ bool abstains(const Prediction& p) { return p.kind == "group" || p.probability <
 Prediction predict(const Question& q) {
   const model::Vehicle vehicle = model::read_vehicle(q.vehicle);
   const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(q.priors).root());
-  std::vector<gap::CarriedFlight> flights;
+  std::vector<gap::PredictedFlight> flights;
   for (const std::filesystem::path& folder : q.flights) {
     flightlog::FlightLog log = flightlog::read_flight_log(folder);
     if (!data_faults(log, folder).empty())
@@ -24,7 +24,7 @@ Prediction predict(const Question& q) {
   options.threads = 1;
   options.withheld = q.withheld;
   const gap::Diagnosis d = diagnose(flights, uncertain, options);
-  const gap::Report r = answers_of(flights, uncertain, d);
+  const gap::Report r = verdict_report_of(flights, uncertain, d);
   Prediction p;
   p.kind = gap::kind_name(r.conclusion.kind);
   p.effects = r.conclusion.effects;
@@ -33,12 +33,12 @@ Prediction predict(const Question& q) {
   p.refit = r.refit;
   p.floor = r.noise_floor;
   for (const gap::Reported& c : r.candidates) {
-    if (c.kind == gap::Answer::Kind::none) p.none = c.probability;
-    if (c.kind == gap::Answer::Kind::parameters) p.parameters = c.probability;
-    if (c.kind == gap::Answer::Kind::unknown) p.unknown = c.probability;
-    if (c.kind != gap::Answer::Kind::effect) continue;
+    if (c.kind == gap::ScoredHypothesis::Kind::none) p.none = c.probability;
+    if (c.kind == gap::ScoredHypothesis::Kind::parameters) p.parameters = c.probability;
+    if (c.kind == gap::ScoredHypothesis::Kind::unknown) p.unknown = c.probability;
+    if (c.kind != gap::ScoredHypothesis::Kind::effect) continue;
     FittedSet set{c.effects, c.probability, {}, c.loss, c.gain_sd};
-    for (const gap::Size& s : c.sizes) set.values[s.name] = {s.value, s.low, s.high};
+    for (const gap::SizeEstimate& s : c.sizes) set.values[s.name] = {s.value, s.low, s.high};
     p.sets.push_back(std::move(set));
   }
   if (!q.experiments.empty() && abstains(p)) {

@@ -37,11 +37,11 @@ double median_interval(const Column& t_s) {
 }
 
 /// Amplitude and phase of the wave of the beat in a motor's voltage, and the share of its variance.
-struct Wave {
+struct FittedWave {
   double cosine = 0, sine = 0, explained = 0;
 };
 
-Wave fit_wave(const Column& phase_rad, const Column& volts) {
+FittedWave fit_wave(const Column& phase_rad, const Column& volts) {
   // Least squares of volts on 1, cos and sin, by Cramer's rule on the centred sums.
   double n = 0, c = 0, s = 0, v = 0, cc = 0, ss = 0, cs = 0, cv = 0, sv = 0, vv = 0;
   for (std::size_t i = 0; i < volts.size(); ++i) {
@@ -58,19 +58,20 @@ Wave fit_wave(const Column& phase_rad, const Column& volts) {
 void check_frequency(const FlightLog& log, Findings& findings) {
   const std::string name = "flapping frequency";
   const double declared = log.header.flapping_Hz, per_beat = 1 / (declared * median_interval(log.command.t_s));
-  const auto say = [&](Verdict verdict, const std::string& text, LogPlace fault = {}) {
+  const auto add_finding = [&](Verdict verdict, const std::string& text, LogPlace fault = {}) {
     findings.push_back({name, verdict, text, {}, std::move(fault)});
   };
   if (per_beat < 4)
-    return say(Verdict::not_tested, format("command.csv has %.2g samples a beat, 4 are needed", per_beat));
+    return add_finding(Verdict::not_tested, format("command.csv has %.2g samples a beat, 4 are needed", per_beat));
   const auto left = beat_frequency(log.command.t_s, log.command.left_voltage_V);
   const auto right = beat_frequency(log.command.t_s, log.command.right_voltage_V);
-  if (!left || !right) return say(Verdict::not_tested, "fewer than five beats in the voltages");
+  if (!left || !right) return add_finding(Verdict::not_tested, "fewer than five beats in the voltages");
   const std::string seen =
       format("voltages beat at %.4g Hz left, %.4g Hz right, %.4g Hz declared", *left, *right, declared);
   const double worst = std::max(std::abs(*left / declared - 1), std::abs(*right / declared - 1));
-  if (worst > kFrequencyTolerance) say(Verdict::warning, seen + ": another beat, or t_s not in seconds", {kCommand});
-  else say(Verdict::ok, seen);
+  if (worst > kFrequencyTolerance)
+    add_finding(Verdict::warning, seen + ": another beat, or t_s not in seconds", {kCommand});
+  else add_finding(Verdict::ok, seen);
   findings.back().values = {{"left_Hz", *left}, {"right_Hz", *right}};
 }
 
@@ -82,11 +83,11 @@ void check_phase(const FlightLog& log, Findings& findings) {
   Column volts(u.t_s.size());
   // The split cycle shifts left and right apart; their sum keeps the phase.
   for (std::size_t i = 0; i < volts.size(); ++i) volts[i] = u.left_voltage_V[i] + u.right_voltage_V[i];
-  const auto say = [&](Verdict verdict, const std::string& text) {
+  const auto add_finding = [&](Verdict verdict, const std::string& text) {
     findings.push_back({name, verdict, text, {}, verdict == Verdict::warning ? LogPlace{kCommand} : LogPlace{}});
   };
   if (f * interval > 0.25 || rms(volts) < 0.1)
-    return say(Verdict::not_tested, "too few samples a beat, or hardly any voltage");
+    return add_finding(Verdict::not_tested, "too few samples a beat, or hardly any voltage");
   Column speeds;
   for (std::size_t i = 1; i < volts.size(); ++i)
     speeds.push_back(((*u.phase_rad)[i] - (*u.phase_rad)[i - 1]) / (u.t_s[i] - u.t_s[i - 1]));
@@ -96,21 +97,22 @@ void check_phase(const FlightLog& log, Findings& findings) {
     const char* cause = is(360 / kTurn) ? "likely in degrees, not rad"
                         : is(1 / kTurn) ? "likely in beats, not rad"
                                         : "another beat";
-    return say(Verdict::warning, format("phase_rad advances by %.4g rad/s, %.4g expected: ", speed, kTurn * f) + cause);
+    return add_finding(Verdict::warning,
+                       format("phase_rad advances by %.4g rad/s, %.4g expected: ", speed, kTurn * f) + cause);
   }
-  const Wave wave = fit_wave(*u.phase_rad, volts);
+  const FittedWave wave = fit_wave(*u.phase_rad, volts);
   // Changing amplitudes leave most of the variance to the wave; a wrong phase leaves nothing.
   if (wave.explained < 0.5)
-    return say(Verdict::warning,
-               format("phase_rad explains %.0f %% of the voltages, at least 50 %% expected: another clock, "
-                      "or an estimate that slipped",
-                      100 * std::max(wave.explained, 0.0)));
+    return add_finding(Verdict::warning,
+                       format("phase_rad explains %.0f %% of the voltages, at least 50 %% expected: another clock, "
+                              "or an estimate that slipped",
+                              100 * std::max(wave.explained, 0.0)));
   // The voltage is A cos(phase), held for an interval: the driver may take its phase anywhere in it.
   const double offset = std::atan2(wave.sine, wave.cosine), allowed = kTurn * f * interval + 0.1;
   const std::string seen = format("voltages lag phase_rad by %.2f rad, at most %.2f expected", offset, allowed);
   if (std::abs(offset) > allowed)
-    say(Verdict::warning, seen + ": phase 0 is where the voltage peaks, V = A cos(phase) + bias");
-  else say(Verdict::ok, seen);
+    add_finding(Verdict::warning, seen + ": phase 0 is where the voltage peaks, V = A cos(phase) + bias");
+  else add_finding(Verdict::ok, seen);
   findings.back().values = {{"lag_rad", offset}};
 }
 

@@ -33,11 +33,11 @@ std::vector<Phasor> phasors(const Column& t_s, const Column& values, double turn
 }
 
 /// How the wave in all of these columns turns from stretch to stretch, beyond `turn_rad_s`, and how steadily: 1 without noise.
-struct Turn {
+struct PhasorTurn {
   double rad_s = 0, steady = 0;
 };
 
-Turn turn_of(const Column& t_s, const std::vector<const Column*>& columns, double turn_rad_s) {
+PhasorTurn turn_of(const Column& t_s, const std::vector<const Column*>& columns, double turn_rad_s) {
   Phasor sum = 0;
   double size = 0;
   for (const Column* values : columns) {
@@ -58,7 +58,7 @@ Finding compare(const std::string& name, const Column& t_s, const std::vector<co
   const auto not_tested = [&](const char* why) { return Finding{name, Verdict::not_tested, why, {}}; };
   if (duration_s < 60 * beat_s) return not_tested("shorter than 60 beats");
   if (static_cast<double>(t_s.size()) < 4 * duration_s / beat_s) return not_tested("too few samples in a beat");
-  const Turn seen = turn_of(t_s, columns, turn_rad_s);
+  const PhasorTurn seen = turn_of(t_s, columns, turn_rad_s);
   if (seen.steady < 0.8) return not_tested("the beat is not steady, or lost in the noise");
   const double ratio = (turn_rad_s + seen.rad_s) / (turn_rad_s + volts_rad_s);
   const std::string text = format("beats %.5f times as often as the voltages", ratio);
@@ -75,7 +75,7 @@ void check_beat(const flightlog::FlightLog& log, Findings& findings) {
   const flightlog::CommandStream& u = log.command;
   const auto driven = beat_frequency(u.t_s, u.left_voltage_V);
   const double turn_rad_s = driven ? 2 * std::numbers::pi * *driven : 0;
-  const Turn volts = driven ? turn_of(u.t_s, {&u.left_voltage_V, &u.right_voltage_V}, turn_rad_s) : Turn{};
+  const PhasorTurn volts = driven ? turn_of(u.t_s, {&u.left_voltage_V, &u.right_voltage_V}, turn_rad_s) : PhasorTurn{};
   const auto look = [&](const std::string& name, const Column& t_s, const std::vector<const Column*>& columns) {
     if (volts.steady < 0.8)
       findings.push_back({name, Verdict::not_tested, "fewer than five beats in the voltages, or not steady", {}});

@@ -12,10 +12,11 @@ void check_motion(const flightlog::FlightLog& log, Findings& findings) {
   // Whole beats, in which what the beat shakes averages out; about 50 ms, and two samples of mocap or more.
   const double window_s =
       std::max(std::round(0.05 * h.flapping_Hz), std::ceil(2.5 / h.mocap.rate_hz * h.flapping_Hz)) / h.flapping_Hz;
-  Context c{log, findings, Motion(log), {}, std::max(window_s, 1 / h.flapping_Hz), 0, 0, {}, {}};
+  Context c{log, findings, SensorMotion(log), {}, std::max(window_s, 1 / h.flapping_Hz), 0, 0, {}, {}};
   c.windows = make_windows(c.motion, c.window_s);
   double squares = 0;
-  for (const Window& w : c.windows) squares += w.rate_rad_s[0].squaredNorm() / static_cast<double>(c.windows.size());
+  for (const BeatWindow& w : c.windows)
+    squares += w.rate_rad_s[0].squaredNorm() / static_cast<double>(c.windows.size());
   // Two attitudes a window apart; how far the body turns while arrival times jitter; and what interpolation between two
   // samples misses, a quarter of what it misses across a third one, noise sqrt(1.5) of one taken off.
   const double jitter_s = std::hypot(stream_statistics("", log.mocap.t_s, std::nullopt).jitter_s,

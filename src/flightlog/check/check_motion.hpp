@@ -16,16 +16,16 @@ inline constexpr char kAxes[] = "xyz";
 struct Context {
   const flightlog::FlightLog& log;
   Findings& findings;
-  Motion motion;
-  std::vector<Window> windows;
+  SensorMotion motion;
+  std::vector<BeatWindow> windows;
   double window_s;
   double rate_noise;  ///< rad/s, of a window's mean rate, from mocap
   double gyro_noise;  ///< rad/s, of a window's mean rate, from the gyro
-  Frame frame;        ///< as found; as declared where that fits or nothing was found
+  SensorFrame frame;  ///< as found; as declared where that fits or nothing was found
   Lag lag;
 
-  void say(const std::string& check, Verdict verdict, const std::string& text, Values values = {},
-           LogPlace fault = {}) {
+  void add_finding(const std::string& check, Verdict verdict, const std::string& text, Values values = {},
+                   LogPlace fault = {}) {
     findings.push_back({check, verdict, text, std::move(values), std::move(fault)});
   }
 };

@@ -45,7 +45,7 @@ constexpr double kLargestDelay_s = 0.03;
 constexpr double kLargestDrift = 1e-3;
 
 /// The whole lag at `start`'s middle, from a first one.
-std::optional<Estimate> refine_from(const Context& c, const std::vector<Window>& windows, const Lag& start) {
+std::optional<LagEstimate> refine_from(const Context& c, const std::vector<BeatWindow>& windows, const Lag& start) {
   auto lag = refine_lag(c.motion, windows, c.frame, start, c.rate_noise);
   if (lag) lag->value += start.at_middle_s;
   return lag;
@@ -55,7 +55,7 @@ std::optional<Estimate> refine_from(const Context& c, const std::vector<Window>&
 bool check_clock(Context& c) {
   const flightlog::ImuHeader& imu = c.log.header.imu;
   const auto not_tested = [&](const std::string& why) {
-    c.say("clock", Verdict::not_tested, why);
+    c.add_finding("clock", Verdict::not_tested, why);
     return false;
   };
   if (c.windows.size() < 20) return not_tested("too short, or too many gaps");
@@ -69,8 +69,8 @@ bool check_clock(Context& c) {
   if (!(mocap_turns && gyro_turns) && std::max(mocap / c.rate_noise, gyro / c.gyro_noise) < 50)
     return not_tested("too little rotation");
   const std::size_t third = c.windows.size() / 3;
-  const std::vector<Window> beginning(c.windows.begin(), c.windows.begin() + static_cast<std::ptrdiff_t>(third));
-  const std::vector<Window> end(c.windows.end() - static_cast<std::ptrdiff_t>(third), c.windows.end());
+  const std::vector<BeatWindow> beginning(c.windows.begin(), c.windows.begin() + static_cast<std::ptrdiff_t>(third));
+  const std::vector<BeatWindow> end(c.windows.end() - static_cast<std::ptrdiff_t>(third), c.windows.end());
   auto sync = find_lag(c.motion, c.windows);
   auto early = find_lag(c.motion, beginning), late = find_lag(c.motion, end);
   // Noise alone takes the correlation of one motion with itself down to this; three quarters of it are left for clocks
@@ -82,12 +82,13 @@ bool check_clock(Context& c) {
   if (apart) sync = early;
   if (!alike(sync)) {
     not_tested("gyro and mocap do not match");
-    c.say("gyro", Verdict::warning,
-          format("rates of the gyro (%s rad/s rms) and of mocap (%s) are alike by %.2f at most, in any frame and "
-                 "within a second; "
-                 "above %.2f expected: a dead axis, another body or flight, or clocks far apart",
-                 per_axis(here.gyro).c_str(), per_axis(here.mocap).c_str(), sync ? sync->correlation : 0.0, least),
-          {}, {kImu});
+    c.add_finding(
+        "gyro", Verdict::warning,
+        format("rates of the gyro (%s rad/s rms) and of mocap (%s) are alike by %.2f at most, in any frame and "
+               "within a second; "
+               "above %.2f expected: a dead axis, another body or flight, or clocks far apart",
+               per_axis(here.gyro).c_str(), per_axis(here.mocap).c_str(), sync ? sync->correlation : 0.0, least),
+        {}, {kImu});
     return false;
   }
   if (!early || early->frame != sync->frame) early = sync;
@@ -104,10 +105,10 @@ bool check_clock(Context& c) {
     c.lag = {begin_s, first->value, (last->value - first->value) / (end_s - begin_s)};
     const auto nearer = refine_from(c, beginning, c.lag), nearer_last = refine_from(c, end, c.lag);
     if (!nearer || !nearer_last) break;
-    first = Estimate{nearer->value, nearer->sd};
-    last = Estimate{nearer_last->value + c.lag.per_s * (end_s - begin_s), nearer_last->sd};
+    first = LagEstimate{nearer->value, nearer->sd};
+    last = LagEstimate{nearer_last->value + c.lag.per_s * (end_s - begin_s), nearer_last->sd};
   }
-  if (drifts) lag = Estimate{(first->value + last->value) / 2, std::hypot(first->sd, last->sd) / 2};
+  if (drifts) lag = LagEstimate{(first->value + last->value) / 2, std::hypot(first->sd, last->sd) / 2};
   if (!lag || (lag->sd > 0.0025 && !drifts)) return not_tested("too little rotation");
   if (!drifts) c.lag = {0, lag->value, 0};
 
@@ -123,37 +124,37 @@ bool check_clock(Context& c) {
   const bool good = off_s <= allowed_s;
   const double change_s = first && last ? last->value - first->value : 0, per_s = change_s / (end_s - begin_s);
   const bool runs_off = drifts && std::abs(per_s) > kLargestDrift;
-  c.say("clock", good ? Verdict::ok : Verdict::warning,
-        seen + expected + (good ? "" : ": clocks apart, or a wrong latency"),
-        {{"lag_s", lag->value}, {"lag_sd_s", lag->sd}, {"correlation", sync->correlation}},
-        off_s > allowed_s + kLargestDelay_s && !runs_off ? LogPlace{kImu} : LogPlace{});
+  c.add_finding("clock", good ? Verdict::ok : Verdict::warning,
+                seen + expected + (good ? "" : ": clocks apart, or a wrong latency"),
+                {{"lag_s", lag->value}, {"lag_sd_s", lag->sd}, {"correlation", sync->correlation}},
+                off_s > allowed_s + kLargestDelay_s && !runs_off ? LogPlace{kImu} : LogPlace{});
 
   // A millisecond over a flight is a fifth of a radian of the beat, which no check here minds.
   if (!drifts && (!first || !last || std::hypot(first->sd, last->sd) > 0.0025)) {
-    c.say("clock speed", Verdict::not_tested, "too short, or too little rotation at the beginning or the end");
+    c.add_finding("clock speed", Verdict::not_tested, "too short, or too little rotation at the beginning or the end");
     return true;
   }
-  c.say("clock speed", drifts ? Verdict::warning : Verdict::ok,
-        format("gyro against mocap moves by %.2f ms in %.3g s, at most %.2f ms expected", 1e3 * change_s,
-               end_s - begin_s, 1e3 * noticed_s()) +
-            (drifts ? format(": clocks run at different speeds, by %.0f ppm", 1e6 * per_s) : ""),
-        {{"change_s", change_s}, {"per_s", per_s}},
-        runs_off ? LogPlace{kImu, line_at(c.log.imu.t_s, noticed_s() / std::abs(per_s))} : LogPlace{});
+  c.add_finding("clock speed", drifts ? Verdict::warning : Verdict::ok,
+                format("gyro against mocap moves by %.2f ms in %.3g s, at most %.2f ms expected", 1e3 * change_s,
+                       end_s - begin_s, 1e3 * noticed_s()) +
+                    (drifts ? format(": clocks run at different speeds, by %.0f ppm", 1e6 * per_s) : ""),
+                {{"change_s", change_s}, {"per_s", per_s}},
+                runs_off ? LogPlace{kImu, line_at(c.log.imu.t_s, noticed_s() / std::abs(per_s))} : LogPlace{});
   return true;
 }
 
 // ---- the gyro
 
-struct Hypothesis {
-  Frame frame;
+struct FrameHypothesis {
+  SensorFrame frame;
   double scale;
   std::string text;
 };
 
 /// Mistakes that people make, the likelier ones first.
-std::vector<Hypothesis> mistakes() {
+std::vector<FrameHypothesis> mistakes() {
   const Matrix3d one = Matrix3d::Identity();
-  std::vector<Hypothesis> list = {
+  std::vector<FrameHypothesis> list = {
       {{Order::wxyz, one}, kDegree, "the gyro is likely in deg/s, not rad/s"},
       {{Order::xyzw, one}, 1, "the quaternion order is likely x, y, z, w, not w, x, y, z"},
       {{Order::wxyz_inverse, one},
@@ -161,7 +162,7 @@ std::vector<Hypothesis> mistakes() {
        "the quaternion is likely inverse, world to body (or the gyro has all signs flipped)"},
       {{Order::xyzw_inverse, one}, 1, "the quaternion order is likely x, y, z, w and inverse, world to body"}};
   const auto flips = [](const Matrix3d& m) { return (m.diagonal().array() < 0).count(); };
-  std::vector<Hypothesis> axes;
+  std::vector<FrameHypothesis> axes;
   for (const Matrix3d& m : signed_permutations()) {
     if (m.isIdentity()) continue;
     const bool diagonal = m.isDiagonal();
@@ -170,7 +171,7 @@ std::vector<Hypothesis> mistakes() {
     axes.push_back({{Order::wxyz, m}, 1, text + describe_axes("gyro", m)});
   }
   // One flipped axis, then two, then turned frames, then mirrored ones.
-  std::ranges::stable_sort(axes, {}, [&](const Hypothesis& h) {
+  std::ranges::stable_sort(axes, {}, [&](const FrameHypothesis& h) {
     if (h.frame.axes.isDiagonal()) return static_cast<double>(flips(h.frame.axes));
     return h.frame.axes.determinant() > 0 ? 4.0 : 5.0;
   });
@@ -184,10 +185,10 @@ std::vector<Hypothesis> mistakes() {
 
 /// The mistake that explains the rates, if any does, and in which file; leaves the frame.
 std::pair<std::string, LogPlace> find_mistake(Context& c) {
-  const std::vector<Hypothesis> all = mistakes();
+  const std::vector<FrameHypothesis> all = mistakes();
   std::vector<double> left;
   double total = 0, noise = 0;
-  for (const Hypothesis& h : all) {
+  for (const FrameHypothesis& h : all) {
     const Pairs pairs = pair_up(c.motion, c.windows, h.frame.order, c.lag);
     left.push_back(remainder(pairs, h.frame.axes, h.scale));
     total = remainder(pairs, Matrix3d::Identity(), 0);
@@ -199,7 +200,7 @@ std::pair<std::string, LogPlace> find_mistake(Context& c) {
   const double declared = remainder(pair_up(c.motion, c.windows, Order::wxyz, c.lag), Matrix3d::Identity(), 1);
   if (least > 0.5 * total || near(declared)) return {};
   const auto found = std::ranges::find_if(left, near);
-  const Hypothesis& h = all[static_cast<std::size_t>(found - left.begin())];
+  const FrameHypothesis& h = all[static_cast<std::size_t>(found - left.begin())];
   c.frame = h.frame;
   return {h.text, {h.frame.order == Order::wxyz ? kImu : kMocap}};
 }
@@ -219,7 +220,7 @@ void check_gyro(Context& c) {
     const Vector3d error = fit.gain.col(j) - Vector3d::Unit(j);
     good &= error.cwiseAbs().maxCoeff() <= 0.1 + kSigmas * fit.gain_sd(j);
   }
-  // What gains leave over: noise of both, and a twentieth for what a constant gain cannot say.
+  // What gains leave over: noise of both, and a twentieth for what a constant gain cannot explain.
   Vector3d expected;
   for (int i = 0; i < 3; ++i) expected(i) = std::hypot(c.rate_noise, c.gyro_noise, 0.05 * fit.spread.norm());
   std::string odd;
@@ -234,8 +235,9 @@ void check_gyro(Context& c) {
     for (int j = 0; j < 3; ++j) {
       const std::string name = std::string("gyro ") + kAxes[j];
       if (fit.tested[static_cast<std::size_t>(j)])
-        c.say(name, Verdict::ok, format("mocap turns %.3f x as fast", fit.gain(j, j)), j == 0 ? values : Values{});
-      else c.say(name, Verdict::not_tested, "too little rotation");
+        c.add_finding(name, Verdict::ok, format("mocap turns %.3f x as fast", fit.gain(j, j)),
+                      j == 0 ? values : Values{});
+      else c.add_finding(name, Verdict::not_tested, "too little rotation");
     }
     // Bias: the difference of the means, whose noise averages out.
     Vector3d bias = Vector3d::Zero(), rate = Vector3d::Zero(), coning = Vector3d::Zero();
@@ -254,10 +256,10 @@ void check_gyro(Context& c) {
         wrong +=
             (wrong.empty() ? "" : ", ") + format("%c %.3g rad/s (at most %.2g expected)", kAxes[i], bias(i), allowed);
     }
-    c.say("gyro bias", wrong.empty() ? Verdict::ok : Verdict::warning,
-          wrong.empty() ? format("x %.3g, y %.3g, z %.3g rad/s", bias(0), bias(1), bias(2))
-                        : wrong + ": gyro_bias_sd_rad_s is too small, or the gyro was not zeroed",
-          {{"x_rad_s", bias(0)}, {"y_rad_s", bias(1)}, {"z_rad_s", bias(2)}});
+    c.add_finding("gyro bias", wrong.empty() ? Verdict::ok : Verdict::warning,
+                  wrong.empty() ? format("x %.3g, y %.3g, z %.3g rad/s", bias(0), bias(1), bias(2))
+                                : wrong + ": gyro_bias_sd_rad_s is too small, or the gyro was not zeroed",
+                  {{"x_rad_s", bias(0)}, {"y_rad_s", bias(1)}, {"z_rad_s", bias(2)}});
     return;
   }
   std::string seen;
@@ -267,22 +269,22 @@ void check_gyro(Context& c) {
     if (fit.tested[static_cast<std::size_t>(j)])
       seen += (seen.empty() ? "" : ", ") + format("%.3g x gyro_%c about %c", fit.gain(i, j), kAxes[j], kAxes[i]);
   }
-  if (seen.empty() && odd.empty()) return c.say("gyro", Verdict::not_tested, "too little rotation");
+  if (seen.empty() && odd.empty()) return c.add_finding("gyro", Verdict::not_tested, "too little rotation");
   const auto [cause, fault] = good ? std::pair<std::string, LogPlace>() : find_mistake(c);
   if (good) c.frame = {};
-  c.say("gyro", Verdict::warning,
-        (good ? odd : "mocap turns " + seen + ", 1 x about the same axis expected") + ": " +
-            (!cause.empty() ? cause
-             : good         ? "attitude_noise_rad is too small, or markers moved"
-                            : "axes, units or a bent mount"),
-        values, fault);
+  c.add_finding("gyro", Verdict::warning,
+                (good ? odd : "mocap turns " + seen + ", 1 x about the same axis expected") + ": " +
+                    (!cause.empty() ? cause
+                     : good         ? "attitude_noise_rad is too small, or markers moved"
+                                    : "axes, units or a bent mount"),
+                values, fault);
 }
 
 }  // namespace
 
 void check_rotation(Context& c) {
   if (check_clock(c)) check_gyro(c);
-  else if (c.findings.back().check != "gyro") c.say("gyro", Verdict::not_tested, c.findings.back().text);
+  else if (c.findings.back().check != "gyro") c.add_finding("gyro", Verdict::not_tested, c.findings.back().text);
 }
 
 }  // namespace flappy::flightlog

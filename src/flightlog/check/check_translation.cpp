@@ -18,7 +18,7 @@ std::string axis_name(const Vector3d& v) {
 std::optional<Matrix3d> check_gravity(Context& c) {
   const double gravity = c.log.header.gravity_m_s2;
   const auto not_tested = [&](const char* why) {
-    c.say("accelerometer", Verdict::not_tested, why);
+    c.add_finding("accelerometer", Verdict::not_tested, why);
     return std::nullopt;
   };
   const std::vector<double>& t = c.motion.imu_t_s();
@@ -55,10 +55,10 @@ std::optional<Matrix3d> check_gravity(Context& c) {
   const std::string expected = format(", (0, 0, %.2f) +- %.1f expected: ", gravity, allowed);
   const auto is_up = [&](const Vector3d& v) { return (v - weight).norm() <= allowed; };
   const auto warn = [&](const std::string& cause, const std::string& file = kImu) {
-    c.say("accelerometer", Verdict::warning, seen + expected + cause, values, {file});
+    c.add_finding("accelerometer", Verdict::warning, seen + expected + cause, values, {file});
   };
   if (is_up(up)) {
-    c.say("accelerometer", Verdict::ok, seen, values);
+    c.add_finding("accelerometer", Verdict::ok, seen, values);
     return one;
   }
   if (!c.frame.axes.isIdentity() && is_up(mean_with(c.frame.axes))) {
@@ -98,7 +98,7 @@ std::optional<Matrix3d> check_gravity(Context& c) {
 // ---- the position
 
 void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
-  const auto not_tested = [&](const std::string& why) { c.say("position scale", Verdict::not_tested, why); };
+  const auto not_tested = [&](const std::string& why) { c.add_finding("position scale", Verdict::not_tested, why); };
   if (!correction) return not_tested("needs an accelerometer that is understood");
   const flightlog::FlightHeader& h = c.log.header;
   // Second differences of the position over T against the acceleration weighted with a triangle of 2 T.
@@ -153,7 +153,7 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
   // A quarter for vibration and for flexible mounts; no unit is that near to another.
   const double allowed = 0.25 + kSigmas * sd;
   const auto is = [&](double unit) { return std::abs(gain / unit - 1) <= allowed; };
-  if (is(1)) return c.say("position scale", Verdict::ok, seen, values);
+  if (is(1)) return c.add_finding("position scale", Verdict::ok, seen, values);
   if (!correction->isDiagonal() || !(*correction / (*correction)(0, 0)).isIdentity()) {
     if (alike < 0.7) return not_tested("needs an accelerometer that is understood");
   }
@@ -161,8 +161,8 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
   if (is(1000)) cause = "likely in mm, not m";
   if (is(100)) cause = "likely in cm, not m";
   if (is(1 / 0.0254)) cause = "likely in inches, not m";
-  c.say("position scale", Verdict::warning, seen + ", 1 expected: " + cause, values,
-        alike > 0.9 ? LogPlace{kMocap} : LogPlace{});
+  c.add_finding("position scale", Verdict::warning, seen + ", 1 expected: " + cause, values,
+                alike > 0.9 ? LogPlace{kMocap} : LogPlace{});
 }
 
 void check_speed(Context& c) {
@@ -181,11 +181,11 @@ void check_speed(Context& c) {
   const std::string seen = format("up to %.3g m/s", largest),
                     expected = seen + format(", at most %.3g expected: ", fastest);
   if (usual > fastest)
-    c.say("speed", Verdict::warning, expected + "positions likely in mm, not m, or t_s not in seconds", values,
-          {kMocap});
+    c.add_finding("speed", Verdict::warning, expected + "positions likely in mm, not m, or t_s not in seconds", values,
+                  {kMocap});
   else if (largest > fastest)
-    c.say("speed", Verdict::warning, expected + "positions jump; markers mistaken for one another?", values);
-  else c.say("speed", Verdict::ok, seen, values);
+    c.add_finding("speed", Verdict::warning, expected + "positions jump; markers mistaken for one another?", values);
+  else c.add_finding("speed", Verdict::ok, seen, values);
 }
 
 void check_upright(Context& c) {
@@ -196,11 +196,11 @@ void check_upright(Context& c) {
   const double tilt = std::acos(std::clamp(up(2), -1.0, 1.0));
   const std::string seen = format("the body's z axis points %.0f deg off +z of W on average", tilt / kDegree);
   // Wings lift along the body's z: on average it points up, or the flight is a fall.
-  if (tilt < std::numbers::pi / 3) c.say("upright", Verdict::ok, seen, {{"tilt_rad", tilt}});
+  if (tilt < std::numbers::pi / 3) c.add_finding("upright", Verdict::ok, seen, {{"tilt_rad", tilt}});
   else
-    c.say("upright", Verdict::warning,
-          seen + ", along " + axis_name(up) + ", below 60 expected: W is not z up, or B is not", {{"tilt_rad", tilt}},
-          {kMocap});
+    c.add_finding("upright", Verdict::warning,
+                  seen + ", along " + axis_name(up) + ", below 60 expected: W is not z up, or B is not",
+                  {{"tilt_rad", tilt}}, {kMocap});
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ using flightlog::FlightLog;
 /// The least share of a stream that is to be there, and the most by which its rate may be another than declared.
 constexpr double kLeastShare = 0.5, kRateTolerance = 0.2;
 
-struct Stream {
+struct DeclaredStream {
   std::string file;
   const Column* t_s;
   double rate_hz;                       ///< as declared
@@ -34,13 +34,13 @@ double command_rate_hz(const Column& t_s) {
 }
 
 /// Voltages, motion capture and IMU, which every diagnosis needs, then the others.
-std::vector<Stream> streams_of(const FlightLog& log) {
+std::vector<DeclaredStream> streams_of(const FlightLog& log) {
   const flightlog::MocapStream& m = log.mocap;
   const flightlog::ImuStream& s = log.imu;
   const flightlog::FlightHeader& h = log.header;
-  std::vector<Stream> list = {{kCommand, &log.command.t_s, command_rate_hz(log.command.t_s), {}},
-                              {kMocap, &m.t_s, h.mocap.rate_hz, {}},
-                              {kImu, &s.t_s, h.imu.rate_hz, {}}};
+  std::vector<DeclaredStream> list = {{kCommand, &log.command.t_s, command_rate_hz(log.command.t_s), {}},
+                                      {kMocap, &m.t_s, h.mocap.rate_hz, {}},
+                                      {kImu, &s.t_s, h.imu.rate_hz, {}}};
   if (h.mocap.position_noise_m > 0) list[1].measured = {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz};
   if (h.imu.gyro_noise_rad_s > 0) list[2].measured = {&s.gyro_x_rad_s, &s.gyro_y_rad_s, &s.gyro_z_rad_s};
   if (log.power) {
@@ -54,23 +54,23 @@ std::vector<Stream> streams_of(const FlightLog& log) {
   return list;
 }
 
-bool repeats(const Stream& s, std::size_t i) {
+bool repeats(const DeclaredStream& s, std::size_t i) {
   return !s.measured.empty() &&
          std::ranges::all_of(s.measured, [&](const Column* c) { return (*c)[i] == (*c)[i - 1]; });
 }
 
 /// When two of the three streams that a diagnosis needs had begun, and when all but one had ended: the flight, whatever
 /// the third does.
-std::pair<double, double> flight_of(const std::vector<Stream>& streams) {
+std::pair<double, double> flight_of(const std::vector<DeclaredStream>& streams) {
   std::vector<double> begins, ends;
   for (std::size_t k = 0; k < 3; ++k) begins.push_back(streams[k].begin_s()), ends.push_back(streams[k].end_s());
   return {io::median(begins), io::median(ends)};
 }
 
-std::vector<DataFault> missing(const std::vector<Stream>& streams) {
+std::vector<DataFault> missing(const std::vector<DeclaredStream>& streams) {
   std::vector<DataFault> faults;
   const auto [begin_s, end_s] = flight_of(streams);
-  for (const Stream& s : streams) {
+  for (const DeclaredStream& s : streams) {
     std::size_t fresh = 1, line = 0;
     for (std::size_t i = 1; i < s.t_s->size(); ++i) {
       const bool again = repeats(s, i);
@@ -94,15 +94,15 @@ std::vector<DataFault> missing(const std::vector<Stream>& streams) {
   return faults;
 }
 
-std::vector<DataFault> too_short(const std::vector<Stream>& all, double flapping_Hz) {
-  const std::vector<Stream> streams(all.begin(), all.begin() + 3);
+std::vector<DataFault> too_short(const std::vector<DeclaredStream>& all, double flapping_Hz) {
+  const std::vector<DeclaredStream> streams(all.begin(), all.begin() + 3);
   const double least_s = std::max(kLeastBeats / flapping_Hz, kLeastTime_s);
-  const auto& last = *std::ranges::max_element(streams, {}, &Stream::begin_s);
-  const auto& first = *std::ranges::min_element(streams, {}, &Stream::end_s);
+  const auto& last = *std::ranges::max_element(streams, {}, &DeclaredStream::begin_s);
+  const auto& first = *std::ranges::min_element(streams, {}, &DeclaredStream::end_s);
   const double common_s = first.end_s() - last.begin_s();
   if (common_s >= least_s) return {};
   const auto& shortest =
-      *std::ranges::min_element(streams, {}, [](const Stream& s) { return s.end_s() - s.begin_s(); });
+      *std::ranges::min_element(streams, {}, [](const DeclaredStream& s) { return s.end_s() - s.begin_s(); });
   const double shortest_s = shortest.end_s() - shortest.begin_s();
   if (shortest_s < least_s)
     return {{shortest.file, shortest.last_line(),
@@ -164,7 +164,7 @@ std::vector<DataFault> wrong_clocks(const FlightLog& log, const CheckReport& rep
 
 std::vector<DataFault> data_faults(const FlightLog& log, const CheckReport& report,
                                    const std::filesystem::path& folder) {
-  const std::vector<Stream> streams = streams_of(log);
+  const std::vector<DeclaredStream> streams = streams_of(log);
   // What is not there cannot be judged further.
   std::vector<DataFault> faults = missing(streams);
   if (faults.empty()) faults = too_short(streams, log.header.flapping_Hz);

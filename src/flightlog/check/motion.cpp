@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "flightlog/rotation.hpp"
 #include "flightlog/check/check_parts.hpp"
+#include "flightlog/rotation.hpp"
 #include "io/statistics.hpp"
 
 namespace flappy::flightlog {
@@ -60,7 +60,7 @@ const std::vector<Matrix3d>& signed_permutations() {
   return all;
 }
 
-Motion::Motion(const flightlog::FlightLog& log) {
+SensorMotion::SensorMotion(const flightlog::FlightLog& log) {
   const flightlog::MocapStream& m = log.mocap;
   const flightlog::ImuStream& s = log.imu;
   const double start_s = m.t_s.front() - log.header.mocap.latency_s;
@@ -90,52 +90,52 @@ Motion::Motion(const flightlog::FlightLog& log) {
   }
 }
 
-Quaterniond Motion::attitude(std::size_t sample, Order order) const {
+Quaterniond SensorMotion::attitude(std::size_t sample, Order order) const {
   const auto& [a, b, c, d] = quaternion_[sample];
   const bool w_first = order == Order::wxyz || order == Order::wxyz_inverse;
   const Quaterniond q = w_first ? Quaterniond(a, b, c, d) : Quaterniond(d, a, b, c);
   return order == Order::wxyz || order == Order::xyzw ? q : q.conjugate();
 }
 
-std::optional<std::size_t> Motion::bracket(double t_s) const {
+std::optional<std::size_t> SensorMotion::bracket(double t_s) const {
   const std::size_t k = index_before(mocap_t_s_, t_s);
   if (k + 1 >= mocap_t_s_.size() || mocap_t_s_[k + 1] - mocap_t_s_[k] > longest_mocap_s_) return std::nullopt;
   return k;
 }
 
-std::optional<Quaterniond> Motion::attitude_at(double t_s, Order order) const {
+std::optional<Quaterniond> SensorMotion::attitude_at(double t_s, Order order) const {
   const auto k = bracket(t_s);
   if (!k) return std::nullopt;
   const double share = (t_s - mocap_t_s_[*k]) / (mocap_t_s_[*k + 1] - mocap_t_s_[*k]);
   return attitude(*k, order).slerp(share, attitude(*k + 1, order));
 }
 
-std::optional<Vector3d> Motion::position_at(double t_s) const {
+std::optional<Vector3d> SensorMotion::position_at(double t_s) const {
   const auto k = bracket(t_s);
   if (!k) return std::nullopt;
   const double share = (t_s - mocap_t_s_[*k]) / (mocap_t_s_[*k + 1] - mocap_t_s_[*k]);
   return position_m_[*k] + share * (position_m_[*k + 1] - position_m_[*k]);
 }
 
-Vector3d Motion::gyro_integral(std::size_t k, double t_s) const {
+Vector3d SensorMotion::gyro_integral(std::size_t k, double t_s) const {
   const double dt = t_s - imu_t_s_[k];
   const Vector3d slope = (gyro_rad_s_[k + 1] - gyro_rad_s_[k]) / (imu_t_s_[k + 1] - imu_t_s_[k]);
   return gyro_integral_rad_[k] + dt * gyro_rad_s_[k] + dt * dt / 2 * slope;
 }
 
-std::optional<Vector3d> Motion::mean_rate(double begin_s, double end_s) const {
+std::optional<Vector3d> SensorMotion::mean_rate(double begin_s, double end_s) const {
   const std::size_t first = index_before(imu_t_s_, begin_s), last = index_before(imu_t_s_, end_s);
   if (first + 1 >= imu_t_s_.size() || last + 1 >= imu_t_s_.size()) return std::nullopt;
   if (gaps_before_[last + 1] != gaps_before_[first]) return std::nullopt;
   return (gyro_integral(last, end_s) - gyro_integral(first, begin_s)) / (end_s - begin_s);
 }
 
-Vector3d Motion::gyro_at(std::size_t k, double t_s) const {
+Vector3d SensorMotion::gyro_at(std::size_t k, double t_s) const {
   const double share = (t_s - imu_t_s_[k]) / (imu_t_s_[k + 1] - imu_t_s_[k]);
   return gyro_rad_s_[k] + share * (gyro_rad_s_[k + 1] - gyro_rad_s_[k]);
 }
 
-std::optional<Vector3d> Motion::mean_turn(double begin_s, double end_s) const {
+std::optional<Vector3d> SensorMotion::mean_turn(double begin_s, double end_s) const {
   if (!mean_rate(begin_s, end_s)) return std::nullopt;
   Quaterniond turn = Quaterniond::Identity();
   double from_s = begin_s;
@@ -149,7 +149,7 @@ std::optional<Vector3d> Motion::mean_turn(double begin_s, double end_s) const {
   return flightlog::logarithm(turn) / (end_s - begin_s);
 }
 
-double Motion::roughness_rad() const {
+double SensorMotion::roughness_rad() const {
   double squares = 0, count = 0;
   for (std::size_t i = 1; i + 1 < mocap_t_s_.size(); ++i) {
     const double before = mocap_t_s_[i] - mocap_t_s_[i - 1], after = mocap_t_s_[i + 1] - mocap_t_s_[i];
@@ -162,12 +162,12 @@ double Motion::roughness_rad() const {
   return count > 0 ? std::sqrt(squares / count) : 0;
 }
 
-std::vector<Window> make_windows(const Motion& motion, double length_s) {
+std::vector<BeatWindow> make_windows(const SensorMotion& motion, double length_s) {
   const std::vector<double>& t = motion.mocap_t_s();
-  std::vector<Window> windows;
+  std::vector<BeatWindow> windows;
   for (std::size_t i = 0; i < t.size();) {
     const double end_s = t[i] + length_s;
-    Window w{t[i], end_s, {}};
+    BeatWindow w{t[i], end_s, {}};
     bool whole = true;
     for (const Order order : kOrders) {
       const auto end = motion.attitude_at(end_s, order);
@@ -184,11 +184,11 @@ std::vector<Window> make_windows(const Motion& motion, double length_s) {
   return windows;
 }
 
-Pairs pair_up(const Motion& motion, const std::vector<Window>& windows, Order order, const Lag& lag) {
+Pairs pair_up(const SensorMotion& motion, const std::vector<BeatWindow>& windows, Order order, const Lag& lag) {
   constexpr double kStep_s = 0.005;  // wide enough to smooth the change over the gyro's samples
   Pairs pairs;
   for (std::size_t i = 0; i < windows.size(); ++i) {
-    const Window& w = windows[i];
+    const BeatWindow& w = windows[i];
     const double shift = lag.at(w.middle_s());
     const auto rate = motion.mean_rate(w.begin_s + shift, w.end_s + shift);
     const auto before = motion.mean_rate(w.begin_s + shift - kStep_s, w.end_s + shift - kStep_s);
@@ -202,17 +202,18 @@ Pairs pair_up(const Motion& motion, const std::vector<Window>& windows, Order or
   return pairs;
 }
 
-Pairs with_turns(const Motion& motion, const std::vector<Window>& windows, const Pairs& pairs, const Lag& lag) {
+Pairs with_turns(const SensorMotion& motion, const std::vector<BeatWindow>& windows, const Pairs& pairs,
+                 const Lag& lag) {
   Pairs turned = pairs;
   for (std::size_t i = 0; i < pairs.gyro.size(); ++i) {
-    const Window& w = windows[pairs.window[i]];
+    const BeatWindow& w = windows[pairs.window[i]];
     const double shift = lag.at(w.middle_s());
     if (const auto turn = motion.mean_turn(w.begin_s + shift, w.end_s + shift)) turned.gyro[i] = *turn;
   }
   return turned;
 }
 
-std::optional<Sync> find_lag(const Motion& motion, const std::vector<Window>& windows) {
+std::optional<Sync> find_lag(const SensorMotion& motion, const std::vector<BeatWindow>& windows) {
   constexpr double kRange_s = 1, kStep_s = 0.005;
   // Of nearly periodic motion, the lag that is nearer and the frame that is declared.
   constexpr double kPenalty_per_s = 0.1, kOtherFrame = 0.01;
@@ -240,8 +241,8 @@ std::optional<Sync> find_lag(const Motion& motion, const std::vector<Window>& wi
   return best;
 }
 
-std::optional<Estimate> refine_lag(const Motion& motion, const std::vector<Window>& windows, const Frame& frame,
-                                   Lag start, double noise) {
+std::optional<LagEstimate> refine_lag(const SensorMotion& motion, const std::vector<BeatWindow>& windows,
+                                      const SensorFrame& frame, Lag start, double noise) {
   double moved_s = 0, sd = 0;
   for (int iteration = 0; iteration < 4; ++iteration) {
     // mocap = a gyro + a step gyro_change + constant, for a and a step
@@ -269,7 +270,7 @@ std::optional<Estimate> refine_lag(const Motion& motion, const std::vector<Windo
     start.at_middle_s += step;
     moved_s += step;
   }
-  return Estimate{moved_s, sd};
+  return LagEstimate{moved_s, sd};
 }
 
 double remainder(const Pairs& pairs, const Matrix3d& axes, double scale) {

@@ -25,9 +25,9 @@ const std::vector<Matrix3d>& signed_permutations();
 
 /// Times of the IMU and of mocap less their declared latencies, from the first mocap sample on. A pose that repeats the
 /// one before is none.
-class Motion {
+class SensorMotion {
  public:
-  explicit Motion(const flightlog::FlightLog& log);
+  explicit SensorMotion(const flightlog::FlightLog& log);
 
   const std::vector<double>& mocap_t_s() const { return mocap_t_s_; }
   const std::vector<double>& imu_t_s() const { return imu_t_s_; }
@@ -57,20 +57,20 @@ class Motion {
 };
 
 /// Whole beats, in which the shaking of the beat cancels: it repeats, and would match at the wrong lag.
-struct Window {
+struct BeatWindow {
   double begin_s, end_s;
   std::array<Vector3d, 4> rate_rad_s;  ///< mean from mocap, in the body, for each Order
   double middle_s() const { return (begin_s + end_s) / 2; }
 };
 
 /// One after another, each of `length_s`, without gaps.
-std::vector<Window> make_windows(const Motion& motion, double length_s);
+std::vector<BeatWindow> make_windows(const SensorMotion& motion, double length_s);
 
 /// The frame a log is in: mocap's rate = scale x axes x gyro's.
-struct Frame {
+struct SensorFrame {
   Order order = Order::wxyz;
   Matrix3d axes = Matrix3d::Identity();
-  bool operator==(const Frame&) const = default;
+  bool operator==(const SensorFrame&) const = default;
 };
 
 /// The IMU's clock against mocap's, beyond the latencies declared: gyro(t + lag_s(t)) belongs to mocap(t).
@@ -84,12 +84,12 @@ struct Pairs {
   std::vector<Vector3d> mocap, gyro, gyro_change;  ///< change of the gyro's rate per second of lag
   std::vector<std::size_t> window;                 ///< of which window
 };
-Pairs pair_up(const Motion& motion, const std::vector<Window>& windows, Order order, const Lag& lag);
+Pairs pair_up(const SensorMotion& motion, const std::vector<BeatWindow>& windows, Order order, const Lag& lag);
 
 struct Sync {
   double lag_s = 0;
   double correlation = 0;  ///< of the rates at that lag, in the best frame
-  Frame frame;             ///< at which it is best
+  SensorFrame frame;       ///< at which it is best
 };
 
 /// `pairs` with the gyro's turns in place of its mean rates, where it has them.
@@ -97,17 +97,18 @@ struct Sync {
 // A body that shakes about two axes out of phase turns about the third though its mean rate there is 0 (coning): the
 // rotation vector p of a rate w has p' = w + p x w / 2 + ... (Bortz, IEEE Trans. AES-7, 1971), so that a beat of rates
 // a cos and b sin about two axes adds a b / (2 x 2 pi f) to the third: 0.1 rad/s where these are 7 rad/s at 34 Hz.
-Pairs with_turns(const Motion& motion, const std::vector<Window>& windows, const Pairs& pairs, const Lag& lag);
+Pairs with_turns(const SensorMotion& motion, const std::vector<BeatWindow>& windows, const Pairs& pairs,
+                 const Lag& lag);
 
 /// The lag, within a second, and frame at which mocap follows the gyro best; nothing without common windows.
-std::optional<Sync> find_lag(const Motion& motion, const std::vector<Window>& windows);
+std::optional<Sync> find_lag(const SensorMotion& motion, const std::vector<BeatWindow>& windows);
 
-struct Estimate {
+struct LagEstimate {
   double value = 0, sd = 0;
 };
 /// What is to be added to a first lag, to a fraction of a sample, by least squares; `noise` of a window's mean mocap rate.
-std::optional<Estimate> refine_lag(const Motion& motion, const std::vector<Window>& windows, const Frame& frame,
-                                   Lag start, double noise);
+std::optional<LagEstimate> refine_lag(const SensorMotion& motion, const std::vector<BeatWindow>& windows,
+                                      const SensorFrame& frame, Lag start, double noise);
 
 /// Sum of squares that mocap's rates keep once `scale x axes x gyro` and a constant are taken off.
 double remainder(const Pairs& pairs, const Matrix3d& axes, double scale);

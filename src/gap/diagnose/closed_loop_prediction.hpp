@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/replay/carry.hpp"
+#include "gap/replay/reset_prediction.hpp"
 #include "rollout/fly_config.hpp"
 
 namespace flappy::gap {
@@ -36,7 +36,7 @@ struct ClosedLoopOptions {
 };
 
 /// Rows of every flight in the order above. `pilot`: controller or actor, and sensors; its vehicle is not used.
-std::vector<ClosedLoop> predict_closed_loop(const std::vector<CarriedFlight>& flights, const model::Vehicle& nominal,
+std::vector<ClosedLoop> predict_closed_loop(const std::vector<PredictedFlight>& flights, const model::Vehicle& nominal,
                                             const model::Vehicle& corrected, const rollout::FlyConfig& pilot,
                                             const ClosedLoopOptions& options = {});
 

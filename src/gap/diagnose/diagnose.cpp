@@ -21,7 +21,7 @@ using Eigen::VectorXd;
 
 class Diagnoser {
  public:
-  Diagnoser(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
+  Diagnoser(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
             const DiagnoseOptions& options)
       : flights_(flights),
         uncertain_(uncertain),
@@ -39,61 +39,62 @@ class Diagnoser {
     const Linearised nominal = fit_parameters(plain);
     progress(0.3, "screening effects");
     const std::vector<SizeColumn> columns = size_columns({}, parameters_);
-    std::vector<Smooth> background;
+    std::vector<BasisCoefficients> background;
     for (const SizeColumn& c : columns) background.push_back(options_.discrepancy.background_sd(c.effect) * c.change);
     fitter_.set_background(std::move(background));
     parameters_ = fitter_.refit(plain, parameters_, 4);
     d.parameters = parameters_;
-    around_ = surroundings_of(flights_, noise_sd());
+    around_ = row_context_of(flights_, noise_sd());
     loss_ = losses_of(around_, parameters_.point.residual);
-    d.answers.push_back(weigh(Answer::Kind::none, plain, nominal, std::log(rule_.prior.none)));
+    d.hypotheses.push_back(weigh(ScoredHypothesis::Kind::none, plain, nominal, std::log(rule_.prior.none)));
     plain_ = log_evidence(plain, parameters_.point);
-    d.answers.push_back(weigh(Answer::Kind::parameters, plain, parameters_.point, std::log(rule_.prior.parameters)));
-    Answer unknown = explain_freely(plain, parameters_.point, std::log(rule_.prior.unknown));
-    const double parameters = d.answers[1].log_evidence;
+    d.hypotheses.push_back(
+        weigh(ScoredHypothesis::Kind::parameters, plain, parameters_.point, std::log(rule_.prior.parameters)));
+    ScoredHypothesis unknown = explain_freely(plain, parameters_.point, std::log(rule_.prior.unknown));
+    const double parameters = d.hypotheses[1].log_evidence;
 
-    std::vector<Answer> singles;
+    std::vector<ScoredHypothesis> singles;
     const std::vector<Screened> screened = screen(evidence_, fitter_, parameters_, columns);
     for (std::size_t i = 0; i < screened.size(); ++i) {
       const Screened& s = screened[i];
-      Answer a;
+      ScoredHypothesis a;
       if (static_cast<int>(i) < options_.finalists && s.gain > 0 &&
           progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + s.effect))
         a = fit_effects({s});
       singles.push_back(vanished(a) ? leave_open(s, columns) : std::move(a));
     }
-    std::ranges::sort(singles, std::greater{}, &Answer::log_evidence);
+    std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::log_evidence);
     // further effects beside the best
     if (!singles.empty() && singles.front().fitted() && singles.front().log_evidence > parameters) {
-      Answer best = singles.front();
+      ScoredHypothesis best = singles.front();
       for (int n = 2; n <= options_.most_effects; ++n) {
         if (!progress(0.7 + 0.1 * n, "looking beside " + best.effects.back())) break;
         const auto beside = screen(evidence_, fitter_, best.fit, size_columns(best.effects, best.fit));
         if (beside.empty() || beside.front().gain < rule_.gain.further_screened_nats) break;
         std::vector<Screened> set = screened_of(best);
         set.push_back(beside.front());
-        Answer more = fit_effects(set);
+        ScoredHypothesis more = fit_effects(set);
         if (vanished(more) || more.log_evidence < best.log_evidence) break;
         singles.push_back(more);
         best = std::move(more);
       }
     }
     // what looks like an entry at first, and leaves more than that entry's equation may
-    const auto best = std::ranges::max_element(singles, {}, &Answer::log_evidence);
+    const auto best = std::ranges::max_element(singles, {}, &ScoredHypothesis::log_evidence);
     if (best != singles.end() && best->fitted()) {
       const double log_prior = std::log(rule_.prior.unknown / static_cast<double>(model::effects().size()));
-      Answer beside = explain_freely(Hypothesis(uncertain_, best->effects), best->fit.point, log_prior);
+      ScoredHypothesis beside = explain_freely(Hypothesis(uncertain_, best->effects), best->fit.point, log_prior);
       if (!beside.terms.empty() && beside.log_evidence > unknown.log_evidence) unknown = std::move(beside);
       unknown.log_evidence -= std::max(0.0, best->log_evidence - parameters - rule_.unknown.large_effect_nats);
     }
-    d.answers.push_back(std::move(unknown));
-    for (Answer& a : singles) {
+    d.hypotheses.push_back(std::move(unknown));
+    for (ScoredHypothesis& a : singles) {
       if (a.fitted()) widen(a.fit, Hypothesis(uncertain_, a.effects), rule_);
-      d.answers.push_back(std::move(a));
+      d.hypotheses.push_back(std::move(a));
     }
     d.complete = !stopped_;
-    set_probabilities(d.answers, rule_);
-    d.conclusion = conclude(d.answers, rule_);
+    set_probabilities(d.hypotheses, rule_);
+    d.conclusion = conclude(d.hypotheses, rule_);
     d.nominal = nominal.residual;
     hold_out(d);
     d.noise_sd = noise_sd();
@@ -122,18 +123,20 @@ class Diagnoser {
     return fitter_.linearise(plain, plain.start(), none);
   }
 
-  Posterior posterior(const Linearised& l, const Columns& c, const std::vector<char>& use, const Smooth& sd) const {
+  Posterior posterior(const Linearised& l, const Columns& c, const std::vector<char>& use,
+                      const BasisCoefficients& sd) const {
     return Evidence::posterior(evidence_.reduce(l.statistics, c.columns, use, sd), c.chosen, c.mean());
   }
 
   /// Whatever models are mistaken by; of what so many effects gain over the parameters, what is more than chance.
   double log_evidence(const Hypothesis& h, const Linearised& l) const {
     const Columns c = fitter_.columns_of(l);
-    const Smooth own = fitter_.form_error(h, l);
-    const Smooth floor = evidence_.floor();
+    const BasisCoefficients own = fitter_.form_error(h, l);
+    const BasisCoefficients discrepancy = evidence_.discrepancy_sd();
     std::vector<double> each;
     for (const ModelDiscrepancy::Scale& m : options_.discrepancy.scales)
-      each.push_back(std::log(m.probability) + posterior(l, c, all_, together(m.factor * floor, own)).log_evidence);
+      each.push_back(std::log(m.probability) +
+                     posterior(l, c, all_, together(m.factor * discrepancy, own)).log_evidence);
     const double most = *std::ranges::max_element(each);
     double sum = 0;
     for (const double e : each) sum += std::exp(e - most);
@@ -144,10 +147,13 @@ class Diagnoser {
     return plain_ + std::max(gain - by_chance, std::min(gain, 0.0));
   }
 
-  static Smooth together(const Smooth& a, const Smooth& b) { return (a.array().square() + b.array().square()).sqrt(); }
+  static BasisCoefficients together(const BasisCoefficients& a, const BasisCoefficients& b) {
+    return (a.array().square() + b.array().square()).sqrt();
+  }
 
-  Answer weigh(Answer::Kind kind, const Hypothesis& h, const Linearised& l, double log_prior) const {
-    Answer a;
+  ScoredHypothesis weigh(ScoredHypothesis::Kind kind, const Hypothesis& h, const Linearised& l,
+                         double log_prior) const {
+    ScoredHypothesis a;
     a.kind = kind;
     a.effects = h.effects();
     a.log_evidence = log_evidence(h, l) + log_prior;
@@ -183,23 +189,23 @@ class Diagnoser {
   }
 
   /// Gives single functions of the regime more room than every model needs, as long as that pays.
-  Answer explain_freely(const Hypothesis& h, const Linearised& l, double log_prior) const {
+  ScoredHypothesis explain_freely(const Hypothesis& h, const Linearised& l, double log_prior) const {
     const Columns c = fitter_.columns_of(l);
-    const Smooth floor = evidence_.floor();
-    Smooth sd = together(floor, fitter_.form_error(h, l));
+    const BasisCoefficients discrepancy = evidence_.discrepancy_sd();
+    BasisCoefficients sd = together(discrepancy, fitter_.form_error(h, l));
     Posterior now = posterior(l, c, all_, sd);
-    Answer a;
-    a.kind = Answer::Kind::unknown;
-    a.beside = h.effects();
+    ScoredHypothesis a;
+    a.kind = ScoredHypothesis::Kind::unknown;
+    a.jointly_with = h.effects();
     double gained = 0;
     std::vector<Possible> possible = possible_terms();
     for (int n = 0; n < rule_.unknown.terms; ++n) {
-      Statistics settled = l.statistics;  // with the columns where they are most probable
+      SufficientStatistics settled = l.statistics;  // with the columns where they are most probable
       for (std::size_t k = 0; k < c.columns.size(); ++k)
         evidence_.add(-now.mean[static_cast<Index>(k)], *c.columns[k], settled);
-      std::map<double, Smooth> gains;
+      std::map<double, BasisCoefficients> gains;
       for (const double times : rule_.unknown.times)
-        gains[times] = evidence_.local_gains(settled, all_, sd, times * floor);
+        gains[times] = evidence_.local_gains(settled, all_, sd, times * discrepancy);
       for (Possible& p : possible) {
         p.term.gain = -p.cost;
         for (int g = 0; g < kGroups; ++g)
@@ -209,13 +215,13 @@ class Diagnoser {
                                 [](const Possible& p) { return p.term.gain; });
       // of the first, what they gain with columns that follow
       std::optional<Term> best;
-      Smooth best_sd;
+      BasisCoefficients best_sd;
       Posterior best_posterior;
       for (int i = 0; i < rule_.unknown.tried; ++i) {
         Term t = possible[static_cast<std::size_t>(i)].term;
-        Smooth room = sd;
+        BasisCoefficients room = sd;
         for (int g = 0; g < kGroups; ++g)
-          if (t.has(g)) room(g, t.function) = std::hypot(sd(g, t.function), t.times * floor(g, t.function));
+          if (t.has(g)) room(g, t.function) = std::hypot(sd(g, t.function), t.times * discrepancy(g, t.function));
         Posterior p = posterior(l, c, all_, room);
         t.gain = p.log_evidence - now.log_evidence - possible[static_cast<std::size_t>(i)].cost;
         if (best && t.gain <= best->gain) continue;
@@ -243,20 +249,20 @@ class Diagnoser {
       columns.push_back({s.effect, s.unknown, {}});
       candidates.push_back(std::move(s.candidate));
     }
-    std::vector<Signature> rows = residuals(flights_, candidates, threads_);
+    std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
     for (std::size_t i = 0; i < columns.size(); ++i) {
       if (rows[i].empty()) continue;  // it comes apart
       for (std::size_t f = 0; f < rows[i].size(); ++f)
         for (std::size_t k = 0; k < rows[i][f].size(); ++k)
           rows[i][f][k] = (fit.point.residual[f][k] - rows[i][f][k]) / kSizeReach;
-      columns[i].change = evidence_.smooth(rows[i]);
+      columns[i].change = evidence_.basis_coefficients(rows[i]);
     }
     std::erase_if(columns, [](const SizeColumn& c) { return c.change.size() == 0; });
     return columns;
   }
 
   /// Where a fit left its effects, to go on from.
-  std::vector<Screened> screened_of(const Answer& a) const {
+  std::vector<Screened> screened_of(const ScoredHypothesis& a) const {
     std::vector<Screened> list;
     Index at = Hypothesis(uncertain_, {}).size();
     for (const std::string& e : a.effects) {
@@ -268,7 +274,7 @@ class Diagnoser {
   }
 
   /// Whether a fit left one of its effects without any size.
-  bool vanished(const Answer& a) const {
+  bool vanished(const ScoredHypothesis& a) const {
     if (!a.fitted()) return true;
     const Hypothesis h(uncertain_, a.effects);
     for (const std::string& e : a.effects) {
@@ -283,12 +289,12 @@ class Diagnoser {
   }
 
   /// An entry that would gain nothing: what the flights do not tell of it stays as it was thought before.
-  Answer leave_open(const Screened& s, const std::vector<SizeColumn>& columns) const {
-    Answer a;
-    a.kind = Answer::Kind::effect;
+  ScoredHypothesis leave_open(const Screened& s, const std::vector<SizeColumn>& columns) const {
+    ScoredHypothesis a;
+    a.kind = ScoredHypothesis::Kind::effect;
     a.effects = {s.effect};
     const Hypothesis h(uncertain_, a.effects);
-    std::vector<Smooth> own(unknowns_of(s.effect).size());
+    std::vector<BasisCoefficients> own(unknowns_of(s.effect).size());
     for (const SizeColumn& c : columns)
       if (c.effect == s.effect) own[static_cast<std::size_t>(c.unknown)] = c.change;
     a.fit = fitter_.linear(h, parameters_, own);
@@ -308,7 +314,7 @@ class Diagnoser {
     return std::log(rule_.prior.effect / static_cast<double>(model::effects().size()));
   }
 
-  Answer fit_effects(const std::vector<Screened>& set) const {
+  ScoredHypothesis fit_effects(const std::vector<Screened>& set) const {
     std::vector<std::string> effects;
     for (const Screened& s : set) effects.push_back(s.effect);
     const Hypothesis h(uncertain_, effects);
@@ -321,8 +327,8 @@ class Diagnoser {
     }
     Fit fit = fitter_.fit(h, h.bounded(start), parameters_, 6);
     if (fit.point.residual.empty() || refuted(loss_, losses_of(around_, fit.point.residual), rule_)) {
-      Answer none;
-      none.kind = Answer::Kind::effect;
+      ScoredHypothesis none;
+      none.kind = ScoredHypothesis::Kind::effect;
       none.effects = effects;
       return none;
     }
@@ -333,7 +339,7 @@ class Diagnoser {
       const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
       if (u.size && u.low >= 0) log_prior += std::log(2.0);
     }
-    Answer a = weigh(Answer::Kind::effect, h, fit.point, log_prior);
+    ScoredHypothesis a = weigh(ScoredHypothesis::Kind::effect, h, fit.point, log_prior);
     a.fit = std::move(fit);
     return a;
   }
@@ -341,8 +347,8 @@ class Diagnoser {
   /// What is left in every flight with the fit to the others; of a single flight, with its own.
   void hold_out(Diagnosis& d) const {
     std::vector<Candidate> candidates;
-    std::vector<Signature*> of;
-    const auto add = [&](const Hypothesis& h, const Linearised& l, const Smooth& sd, Signature& left) {
+    std::vector<Residuals*> of;
+    const auto add = [&](const Hypothesis& h, const Linearised& l, const BasisCoefficients& sd, Residuals& left) {
       const Columns c = fitter_.columns_of(l);
       for (std::size_t f = 0; f < all_.size(); ++f) {
         std::vector<char> others = all_;
@@ -356,16 +362,16 @@ class Diagnoser {
       }
       of.push_back(&left);
     };
-    add(Hypothesis(uncertain_, {}), parameters_.point, evidence_.floor(), d.refit);
-    for (Answer& a : d.answers)
+    add(Hypothesis(uncertain_, {}), parameters_.point, evidence_.discrepancy_sd(), d.refit);
+    for (ScoredHypothesis& a : d.hypotheses)
       if (a.fitted()) {
         const Hypothesis h(uncertain_, a.effects);
-        add(h, a.fit.point, together(evidence_.floor(), fitter_.form_error(h, a.fit.point)), a.left);
+        add(h, a.fit.point, together(evidence_.discrepancy_sd(), fitter_.form_error(h, a.fit.point)), a.left);
       }
-    std::vector<Signature> rows = residuals(flights_, candidates, threads_);
+    std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
     for (std::size_t i = 0; i < of.size(); ++i)
       for (std::size_t f = 0; f < all_.size(); ++f) {
-        Signature& s = rows[i * all_.size() + f];
+        Residuals& s = rows[i * all_.size() + f];
         of[i]->push_back(s.empty() ? Rows() : std::move(s[f]));
       }
   }
@@ -376,7 +382,7 @@ class Diagnoser {
     return !stopped_;
   }
 
-  const std::vector<CarriedFlight>& flights_;
+  const std::vector<PredictedFlight>& flights_;
   const sim::Randomisation& uncertain_;
   const DiagnoseOptions& options_;
   const VerdictRule& rule_;
@@ -385,7 +391,7 @@ class Diagnoser {
   Evidence evidence_;
   Fitter fitter_;
   Fit parameters_;
-  Surroundings around_;
+  RowContext around_;
   Losses loss_;       ///< of the parameters alone
   double plain_ = 0;  ///< log evidence of the parameters alone
   bool stopped_ = false;
@@ -393,7 +399,7 @@ class Diagnoser {
 
 }  // namespace
 
-Diagnosis diagnose(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
+Diagnosis diagnose(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
                    const DiagnoseOptions& options) {
   return Diagnoser(flights, uncertain, options).run();
 }

@@ -24,8 +24,8 @@ struct Term {
   }
 };
 
-/// What explains the flights, one of several answers that exclude each other.
-struct Answer {
+/// What explains the flights, one of several hypotheses that exclude each other.
+struct ScoredHypothesis {
   enum class Kind { none, parameters, effect, unknown } kind = Kind::parameters;
   std::vector<std::string> effects;
   double log_evidence = 0;  ///< of all flights
@@ -35,7 +35,7 @@ struct Answer {
   /// Of effects and parameters. An effect that would gain nothing is weighed as far as a linear model sees: no residual, and
   /// its size is what flights that tell nothing of it leave probable.
   Fit fit;
-  Signature left;  ///< of an effect that was fitted: in each flight what is left with the fit to the others
+  Residuals left;  ///< of an effect that was fitted: in each flight what is left with the fit to the others
   bool fitted() const { return !fit.point.residual.empty(); }
 };
 
@@ -49,25 +49,25 @@ struct DiagnoseOptions {
   VerdictRule rule = read_verdict_rule();
 };
 
-/// What is claimed of the answers.
+/// What is claimed of the hypotheses.
 struct Conclusion {
   enum class Kind { effect, group, parameters, none, unknown, data } kind = Kind::unknown;
   std::vector<std::string> effects;  ///< of a group: of its sets that hold a twentieth of it
   double probability = 0;            ///< of a group: all of it
-  std::size_t answer = 0;            ///< the most probable one of what is concluded
+  std::size_t hypothesis = 0;        ///< the most probable one of what is concluded
 };
 
 struct Diagnosis {
-  bool complete = true;         ///< false: progress had it stop before every effect was weighed
-  std::vector<Answer> answers;  ///< most probable first
+  bool complete = true;                      ///< false: progress had it stop before every effect was weighed
+  std::vector<ScoredHypothesis> hypotheses;  ///< most probable first
   Conclusion conclusion;
   Fit parameters;                ///< without any effect
-  Signature nominal;             ///< what is left of the measurement with the vehicle's file
-  Signature refit;               ///< with parameters alone: in each flight what is left with the fit to the others
+  Residuals nominal;             ///< what is left of the measurement with the vehicle's file
+  Residuals refit;               ///< with parameters alone: in each flight what is left with the fit to the others
   std::vector<double> noise_sd;  ///< [group] of the rows of noise alone, as found
 };
 
-Diagnosis diagnose(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
+Diagnosis diagnose(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
                    const DiagnoseOptions& options);
 
 }  // namespace flappy::gap

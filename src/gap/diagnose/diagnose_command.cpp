@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Probability of the second answer from which on a flight is looked for that tells it from the first.
+/// Probability of the second hypothesis from which on a flight is looked for that tells it from the first.
 constexpr double kLeastRival = 0.01;
 
 struct Logs {
@@ -38,7 +38,7 @@ Logs read_logs(const DiagnoseCommand& command) {
   return r;
 }
 
-Diagnosis diagnose_visibly(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
+Diagnosis diagnose_visibly(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
                            DiagnoseOptions options) {
   io::ProgressLine line("diagnosing");
   std::string noted;
@@ -53,11 +53,11 @@ Diagnosis diagnose_visibly(const std::vector<CarriedFlight>& flights, const sim:
 /// The vehicle with what was concluded, and what remains uncertain of it.
 model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Diagnosis& d, const Conclusion& conclusion,
                                  const sim::Randomisation& uncertain) {
-  const Answer& best = d.answers[conclusion.answer];
+  const ScoredHypothesis& best = d.hypotheses[conclusion.hypothesis];
   const Hypothesis h(uncertain, best.effects);
-  const Fit& fit = best.kind == Answer::Kind::effect ? best.fit : d.parameters;
+  const Fit& fit = best.kind == ScoredHypothesis::Kind::effect ? best.fit : d.parameters;
   model::Vehicle corrected = vehicle;
-  if (best.kind != Answer::Kind::none) {
+  if (best.kind != ScoredHypothesis::Kind::none) {
     const Eigen::VectorXd mean = h.bounded(fit.mean());
     const Eigen::MatrixXd covariance = fit.covariance();
     std::vector<std::vector<double>> rows;
@@ -106,7 +106,7 @@ struct Asked {
 };
 
 Asked read_asked(const DiagnoseCommand& command) {
-  const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kStep_s);
+  const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kPredictionStep_s);
   if (!vehicle.effects.empty())
     io::Config::load(command.vehicle)
         .root()
@@ -131,7 +131,7 @@ Asked read_asked(const DiagnoseCommand& command) {
 }
 
 /// In closed loop, and what to fly next; each left out after Ctrl-C.
-void look_ahead(const DiagnoseCommand& command, const Asked& asked, const std::vector<CarriedFlight>& flights,
+void look_ahead(const DiagnoseCommand& command, const Asked& asked, const std::vector<PredictedFlight>& flights,
                 const Diagnosis& d, const model::Vehicle& corrected, Report& report) {
   io::ProgressLine line("looking ahead");
   if (io::interrupted()) return;
@@ -140,7 +140,7 @@ void look_ahead(const DiagnoseCommand& command, const Asked& asked, const std::v
   closed.own_path = !command.manoeuvre.empty();
   closed.threads = command.threads;
   report.closed_loop = predict_closed_loop(flights, asked.vehicle, corrected, asked.pilot, closed);
-  if (io::interrupted() || d.answers.size() < 2 || d.answers[1].probability < kLeastRival) return;
+  if (io::interrupted() || d.hypotheses.size() < 2 || d.hypotheses[1].probability < kLeastRival) return;
   line.show(0.5, "weighing what to fly next");
   NextOptions next;
   next.threads = command.threads;
@@ -162,7 +162,7 @@ Json run_diagnose(const DiagnoseCommand& command) {
   io::stop_on_interrupt();
   Logs read = read_logs(command);
   const bool faulty = !read.faults.empty();
-  std::vector<CarriedFlight> flights;
+  std::vector<PredictedFlight> flights;
   for (std::size_t f = 0; !faulty && f < read.logs.size(); ++f)
     flights.emplace_back(Recording(command.flights[f], std::move(read.logs[f]), asked.vehicle));
   const Diagnosis d = faulty ? Diagnosis() : diagnose_visibly(flights, asked.uncertain, asked.options);

@@ -40,7 +40,7 @@ std::string residual_script(const Report& r) {
   return script + ", 1 with lines lc '#a63603' title 'noise alone'\n";
 }
 
-/// Probabilities of the top answers, the largest above.
+/// Probabilities of the top hypotheses, the largest above.
 std::string probability_script(const Report& r) {
   std::vector<const Reported*> top;
   for (const Reported& c : r.candidates) top.push_back(&c);
@@ -51,7 +51,7 @@ std::string probability_script(const Report& r) {
       "set xlabel 'probability'\nset yrange [-0.6:" +
       digits(static_cast<double>(top.size()) - 0.4) + "]\n$rows << end_of_rows\n";
   for (std::size_t i = 0; i < top.size(); ++i) {
-    const bool effect = top[i]->kind == Answer::Kind::effect;
+    const bool effect = top[i]->kind == ScoredHypothesis::Kind::effect;
     script += digits(static_cast<double>(top.size() - 1 - i)) + " " + digits(top[i]->probability) + " \"" +
               (effect ? io::joined(top[i]->effects) : "(" + top[i]->group + ")") + "\"\n";
   }
@@ -64,7 +64,7 @@ std::string probability_script(const Report& r) {
 
 void write_tables(const std::filesystem::path& folder, const Report& r) {
   std::string places = "stage,test,channel,regime,gap,noise_floor,unit,p_value,discovered\n";
-  for (const Place& p : r.places)
+  for (const GapLocation& p : r.places)
     places += p.stage + "," + p.test + "," + channel_name(p.channel) + "," + p.regime + "," + digits(p.gap) + "," +
               digits(p.noise_floor) + "," + channel_unit(p.channel) + "," + digits(p.p_value) + "," +
               (p.discovered ? "1" : "0") + "\n";
@@ -82,7 +82,7 @@ void write_tables(const std::filesystem::path& folder, const Report& r) {
                    : std::string(",,")) +
         ",";
     if (c.sizes.empty()) candidates += first + ",,,,\n";
-    for (const Size& s : c.sizes)
+    for (const SizeEstimate& s : c.sizes)
       candidates +=
           first + s.name + "," + digits(s.value) + "," + digits(s.low) + "," + digits(s.high) + "," + s.unit + "\n";
   }

@@ -13,7 +13,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// An answer where the flights so far leave it.
+/// A hypothesis where the flights so far leave it.
 struct Rival {
   std::string name;
   double probability;
@@ -24,9 +24,9 @@ struct Rival {
   Candidate candidate() const { return hypothesis.candidate(at); }
 };
 
-std::string name_of(const Answer& a) {
-  if (a.kind == Answer::Kind::none) return "none";
-  if (a.kind == Answer::Kind::parameters) return "parameters";
+std::string name_of(const ScoredHypothesis& a) {
+  if (a.kind == ScoredHypothesis::Kind::none) return "none";
+  if (a.kind == ScoredHypothesis::Kind::parameters) return "parameters";
   std::string name;
   for (const std::string& e : a.effects) name += (name.empty() ? "" : "+") + e;
   return name;
@@ -34,15 +34,15 @@ std::string name_of(const Answer& a) {
 
 std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncertain, std::size_t most) {
   std::vector<Rival> rivals;
-  for (const Answer& a : d.answers) {
+  for (const ScoredHypothesis& a : d.hypotheses) {
     if (rivals.size() == most) break;
-    if (a.kind == Answer::Kind::unknown) continue;
+    if (a.kind == ScoredHypothesis::Kind::unknown) continue;
     const Hypothesis h(uncertain, a.effects);
-    if (a.kind == Answer::Kind::none) {
+    if (a.kind == ScoredHypothesis::Kind::none) {
       rivals.push_back({name_of(a), a.probability, h, h.start(), {MatrixXd(h.size(), 0), VectorXd(0)}, MatrixXd(0, 0)});
       continue;
     }
-    const Fit& fit = a.kind == Answer::Kind::parameters ? d.parameters : a.fit;
+    const Fit& fit = a.kind == ScoredHypothesis::Kind::parameters ? d.parameters : a.fit;
     rivals.push_back(
         {name_of(a), a.probability, h, h.bounded(fit.mean()), fit.point.directions, fit.posterior.covariance});
   }
@@ -51,9 +51,9 @@ std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncer
 
 /// What a rival expects of a flight that was flown.
 struct Expected {
-  Statistics residual;
-  std::vector<Smooth> uncertain;  ///< changes for one standard deviation each, independent of each other
-  Smooth form;                    ///< what its effects' equations get wrong
+  SufficientStatistics residual;
+  std::vector<BasisCoefficients> uncertain;  ///< changes for one standard deviation each, independent of each other
+  BasisCoefficients form;                    ///< what its effects' equations get wrong
 };
 
 /// Nothing where its vehicle comes apart.
@@ -65,9 +65,9 @@ std::optional<Expected> expect(const Rival& rival, const Fitter& fitter) {
   if (k == 0) return e;  // without a gap nothing is uncertain
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(rival.covariance);
   for (Index i = 0; i < k; ++i) {
-    Smooth sum = Smooth::Zero(e.form.rows(), e.form.cols());
+    BasisCoefficients sum = BasisCoefficients::Zero(e.form.rows(), e.form.cols());
     for (Index d = 0; d < k; ++d) {
-      const Smooth& column = l.columns[static_cast<std::size_t>(d)];
+      const BasisCoefficients& column = l.columns[static_cast<std::size_t>(d)];
       if (column.size() > 0) sum += eigen.eigenvectors()(d, i) * column;
     }
     e.uncertain.emplace_back(std::sqrt(std::max(0.0, eigen.eigenvalues()[i])) * sum);
@@ -77,16 +77,17 @@ std::optional<Expected> expect(const Rival& rival, const Fitter& fitter) {
 
 /// For a over b where a is true.
 double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
-  Statistics difference = b.residual;
+  SufficientStatistics difference = b.residual;
   for (std::size_t f = 0; f < difference.sums.size(); ++f)
     for (std::size_t g = 0; g < difference.sums[f].size(); ++g) difference.sums[f][g] -= a.residual.sums[f][g];
-  std::vector<const Smooth*> columns;
+  std::vector<const BasisCoefficients*> columns;
   std::vector<int> chosen;
-  for (const Smooth& column : b.uncertain) {
+  for (const BasisCoefficients& column : b.uncertain) {
     chosen.push_back(static_cast<int>(columns.size()));
     columns.push_back(&column);
   }
-  const Smooth sd = (evidence.floor().array().square() + a.form.array().square() + b.form.array().square()).sqrt();
+  const BasisCoefficients sd =
+      (evidence.discrepancy_sd().array().square() + a.form.array().square() + b.form.array().square()).sqrt();
   Reduced reduced = evidence.reduce(difference, columns, {1}, sd);
   const VectorXd prior_mean = VectorXd::Zero(static_cast<Index>(columns.size()));
   const double with = Evidence::posterior(reduced, chosen, prior_mean).log_evidence;
@@ -95,15 +96,15 @@ double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
   return Evidence::posterior(reduced, chosen, prior_mean).log_evidence - with;
 }
 
-std::optional<NextExperiment> judge(const Manoeuvre& m, const std::vector<Rival>& rivals,
-                                    const ModelDiscrepancy& discrepancy) {
+std::optional<NextExperiment> expected_separation(const Manoeuvre& m, const std::vector<Rival>& rivals,
+                                                  const ModelDiscrepancy& discrepancy) {
   std::vector<rollout::SimulatedFlight> flown;
   for (const Rival& r : rivals) {
     flown.push_back(std::move(simulate(m.config, r.candidate().vehicle, 1, m.config.settle_s)[0]));
     if (flown.back().lost || !flown.back().log) return {};
   }
-  const std::vector<CarriedFlight> flight = [&] {
-    std::vector<CarriedFlight> list;
+  const std::vector<PredictedFlight> flight = [&] {
+    std::vector<PredictedFlight> list;
     list.emplace_back(Recording(m.name, std::move(*flown.front().log), rivals.front().candidate().vehicle));
     return list;
   }();
@@ -149,7 +150,7 @@ std::vector<NextExperiment> rank_experiments(const Diagnosis& diagnosis, const s
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
   io::parallel_for(manoeuvres.size(), options.threads,
-                   [&](std::size_t i) { found[i] = judge(manoeuvres[i], rivals, options.discrepancy); });
+                   [&](std::size_t i) { found[i] = expected_separation(manoeuvres[i], rivals, options.discrepancy); });
   std::vector<NextExperiment> list;
   for (std::optional<NextExperiment>& e : found)
     if (e) list.push_back(std::move(*e));

@@ -1,4 +1,4 @@
-// Which flight to fly next: the manoeuvre that best tells apart the answers that are left.
+// Which flight to fly next: the manoeuvre that best tells apart the hypotheses that are left.
 //
 // Every manoeuvre is flown by the most probable vehicle in our own simulator; its log is then carried by every rival. With
 // Delta the difference of what two rivals A and B predict, where the flights so far leave each of them,
@@ -29,8 +29,9 @@ std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder);
 
 struct NextExperiment {
   std::string manoeuvre;
-  std::vector<std::string> separates;  ///< the two answers that it tells apart most: effects joined by +, or their kind
-  double expected_nats = 0;            ///< mean over pairs
+  std::vector<std::string>
+      separates;             ///< the two hypotheses that it tells apart most: effects joined by +, or their kind
+  double expected_nats = 0;  ///< mean over pairs
 };
 
 struct NextOptions {
@@ -39,7 +40,7 @@ struct NextOptions {
   ModelDiscrepancy discrepancy = read_model_discrepancy();
 };
 
-/// Best first. Rivals are the most probable answers that can fly: an unknown cause cannot. Without two of them, and for a
+/// Best first. Rivals are the most probable hypotheses that can fly: an unknown cause cannot. Without two of them, and for a
 /// manoeuvre that one of their vehicles would not survive, there is nothing.
 std::vector<NextExperiment> rank_experiments(const Diagnosis& diagnosis, const sim::Randomisation& uncertain,
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options = {});

@@ -22,26 +22,26 @@ std::vector<Moved> moved_by(const Fit& fit, const Hypothesis& hypothesis) {
 }
 
 /// Of what the channel's table has for all beats.
-std::vector<double> over_noise(const std::vector<Place>& places, const std::string& stage) {
+std::vector<double> over_noise(const std::vector<GapLocation>& places, const std::string& stage) {
   std::vector<double> ratio(kChannels, 0);
-  for (const Place& p : places)
+  for (const GapLocation& p : places)
     if (p.stage == stage && p.test == "channel" && p.noise_floor > 0)
       ratio[static_cast<std::size_t>(p.channel)] = p.gap / p.noise_floor;
   return ratio;
 }
 
 /// The most probable one.
-const Answer* best_fitted(const Diagnosis& d) {
-  const auto best = std::ranges::find_if(d.answers, &Answer::fitted);
-  return best == d.answers.end() ? nullptr : &*best;
+const ScoredHypothesis* best_fitted(const Diagnosis& d) {
+  const auto best = std::ranges::find_if(d.hypotheses, &ScoredHypothesis::fitted);
+  return best == d.hypotheses.end() ? nullptr : &*best;
 }
 
 Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 }  // namespace
 
-std::vector<Size> sizes_of(const Answer& a, const sim::Randomisation& uncertain) {
-  std::vector<Size> sizes;
+std::vector<SizeEstimate> sizes_of(const ScoredHypothesis& a, const sim::Randomisation& uncertain) {
+  std::vector<SizeEstimate> sizes;
   if (a.fit.point.at.size() == 0) return sizes;
   const Hypothesis h(uncertain, a.effects);
   const Eigen::VectorXd mean = a.fit.mean();
@@ -80,18 +80,19 @@ std::string unit_of(const std::string& name) {
   return text;
 }
 
-Report answers_of(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain, const Diagnosis& d) {
+Report verdict_report_of(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
+                         const Diagnosis& d) {
   Report r;
   r.complete = d.complete;
   r.conclusion = d.conclusion;
-  const Surroundings around = surroundings_of(flights, d.noise_sd);
+  const RowContext around = row_context_of(flights, d.noise_sd);
   r.noise_floor = huber_floor();
   const Losses refit = losses_of(around, d.refit);
   r.nominal = losses_of(around, d.nominal).mean();
   r.refit = refit.mean();
   std::vector<Reported> others;
-  for (const Answer& a : d.answers) {
-    const bool effect = a.kind == Answer::Kind::effect;
+  for (const ScoredHypothesis& a : d.hypotheses) {
+    const bool effect = a.kind == ScoredHypothesis::Kind::effect;
     Reported c;
     c.kind = a.kind;
     c.effects = a.effects;
@@ -109,34 +110,34 @@ Report answers_of(const std::vector<CarriedFlight>& flights, const sim::Randomis
         r.closure = c.closure;
       }
     }
-    if (a.kind == Answer::Kind::unknown) {
+    if (a.kind == ScoredHypothesis::Kind::unknown) {
       const RegimeBasis basis(flights);
       for (const Term& t : a.terms)
         r.unexplained.push_back({t.channel == Term::kAll ? "all" : channel_name(t.channel),
                                  t.harmonic == Term::kAll ? "all" : std::to_string(t.harmonic), basis.name(t.function),
                                  t.times, t.gain});
-      r.beside = a.beside;
+      r.jointly_with = a.jointly_with;
     }
     (effect ? r.candidates : others).push_back(std::move(c));
   }
   r.candidates.insert(r.candidates.end(), others.begin(), others.end());
-  const Answer& concluded = d.answers[r.conclusion.answer];
-  if (concluded.kind == Answer::Kind::effect)
+  const ScoredHypothesis& concluded = d.hypotheses[r.conclusion.hypothesis];
+  if (concluded.kind == ScoredHypothesis::Kind::effect)
     r.moved = moved_by(concluded.fit, Hypothesis(uncertain, concluded.effects));
   else r.moved = moved_by(d.parameters, Hypothesis(uncertain, {}));
   return r;
 }
 
-Report report_of(const std::vector<std::string>& names, const std::vector<CarriedFlight>& flights,
+Report report_of(const std::vector<std::string>& names, const std::vector<PredictedFlight>& flights,
                  const sim::Randomisation& uncertain, const Diagnosis& d) {
-  Report r = answers_of(flights, uncertain, d);
+  Report r = verdict_report_of(flights, uncertain, d);
   r.flights = names;
-  const Surroundings around = surroundings_of(flights, d.noise_sd);
-  const Answer* best = best_fitted(d);
-  const Signature* stages[] = {&d.nominal, &d.refit, best != nullptr ? &best->left : nullptr};
+  const RowContext around = row_context_of(flights, d.noise_sd);
+  const ScoredHypothesis* best = best_fitted(d);
+  const Residuals* stages[] = {&d.nominal, &d.refit, best != nullptr ? &best->left : nullptr};
   for (std::size_t i = 0; i < 3; ++i) {
     if (stages[i] != nullptr) {
-      const std::vector<Place> places = locate(around, *stages[i], kStages[i]);
+      const std::vector<GapLocation> places = locate(around, *stages[i], kStages[i]);
       r.places.insert(r.places.end(), places.begin(), places.end());
     }
     r.over_noise[i] = over_noise(r.places, kStages[i]);
@@ -171,7 +172,7 @@ Json diagnosis_json(const Report& r) {
                            {"corrected", finite(c.corrected)}});
   for (const flightlog::DataFault& f : r.faults)
     faults.push_back({{"file", f.file}, {"line", f.line}, {"what", f.what}});
-  for (const Place& p : largest_discoveries(r.places, "refit", kMostPlaces))
+  for (const GapLocation& p : largest_discoveries(r.places, "refit", kMostPlaces))
     where.push_back({{"channel", channel_name(p.channel)},
                      {"regime", p.regime},
                      {"gap", p.gap},
@@ -179,7 +180,7 @@ Json diagnosis_json(const Report& r) {
                      {"p_value", p.p_value}});
   for (const Reported& c : r.candidates) {
     Json parameters = Json::object();
-    for (const Size& s : c.sizes)
+    for (const SizeEstimate& s : c.sizes)
       parameters[s.name] = {{"value", s.value}, {"low", s.low}, {"high", s.high}, {"unit", s.unit}};
     candidates.push_back({{"effects", c.effects},
                           {"group", c.group},
@@ -197,7 +198,7 @@ Json diagnosis_json(const Report& r) {
                  {"probability", r.conclusion.probability}}},
                {"where", where},
                {"candidates", candidates},
-               {"unexplained", {{"beside", r.beside}, {"terms", unexplained}}},
+               {"unexplained", {{"jointly_with", r.jointly_with}, {"terms", unexplained}}},
                {"gap",
                 {{"nominal", number(r.nominal)},
                  {"refit", number(r.refit)},

@@ -15,22 +15,22 @@
 namespace flappy::gap {
 
 /// What an effect's parameter is, with its 90 % interval.
-struct Size {
+struct SizeEstimate {
   std::string name;  ///< effect.parameter
   double value = 0, low = 0, high = 0;
   std::string unit;
 };
 
-/// Of the effects of an answer.
-std::vector<Size> sizes_of(const Answer& answer, const sim::Randomisation& uncertain);
+/// Of the effects of a hypothesis.
+std::vector<SizeEstimate> sizes_of(const ScoredHypothesis& hypothesis, const sim::Randomisation& uncertain);
 
-/// An answer as reported.
+/// A hypothesis as reported.
 struct Reported {
-  Answer::Kind kind = Answer::Kind::effect;
+  ScoredHypothesis::Kind kind = ScoredHypothesis::Kind::effect;
   std::vector<std::string> effects;
   std::string group;  ///< of no effect: its kind
   double probability = 0, log_evidence = 0;
-  std::vector<Size> sizes;
+  std::vector<SizeEstimate> sizes;
   std::optional<double> loss;  ///< E, where it was fitted
   double gain_sd = 0;          ///< of E_refit - E
   std::optional<Closure> closure;
@@ -58,13 +58,13 @@ struct Report {
   std::vector<Unexplained> unexplained;
   std::vector<std::string> beside;  ///< effects that are in force beside what is unexplained
   std::vector<Moved> moved;         ///< parameters beside the concluded effects, the farthest first
-  std::vector<Place> places;
+  std::vector<GapLocation> places;
   std::optional<double> nominal, refit, effect;  ///< E; the effect: of the best candidate with one
   double noise_floor = 0;
   std::optional<Closure> closure;
   std::vector<double> over_noise[3];  ///< by stage: rms of residual over noise, [channel], 0 where there is none
   std::vector<ClosedLoop> closed_loop;
-  std::optional<NextExperiment> next;  ///< none where no two answers are left
+  std::optional<NextExperiment> next;  ///< none where no two hypotheses are left
 };
 
 /// Names of the stages of places.
@@ -73,10 +73,10 @@ inline constexpr const char* kStages[] = {"nominal", "refit", "effect"};
 /// Of data that forbid a diagnosis.
 Report report_of(const std::vector<std::string>& names, std::vector<flightlog::DataFault> faults);
 /// Without names and places.
-Report answers_of(const std::vector<CarriedFlight>& flights, const sim::Randomisation& uncertain,
-                  const Diagnosis& diagnosis);
+Report verdict_report_of(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
+                         const Diagnosis& diagnosis);
 /// `names`: of the flights' folders.
-Report report_of(const std::vector<std::string>& names, const std::vector<CarriedFlight>& flights,
+Report report_of(const std::vector<std::string>& names, const std::vector<PredictedFlight>& flights,
                  const sim::Randomisation& uncertain, const Diagnosis& diagnosis);
 
 /// Its candidates without effects stand for parameters, none and unknown, whose name is their group: all add up to 1.

@@ -66,10 +66,10 @@ std::string next_line(const Conclusion& c, const std::string& out) {
 }
 
 /// What stands out most in the stroke, in what the vehicle did and in frequency.
-std::vector<Place> one_of_each_test(const Report& r) {
-  std::vector<Place> list;
+std::vector<GapLocation> one_of_each_test(const Report& r) {
+  std::vector<GapLocation> list;
   for (const char* test : {"phase", "regime", "frequency"})
-    for (const Place& p : largest_discoveries(r.places, "refit", r.places.size()))
+    for (const GapLocation& p : largest_discoveries(r.places, "refit", r.places.size()))
       if (p.test == test) {
         list.push_back(p);
         break;
@@ -90,7 +90,7 @@ const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
 }
 
 std::string name_of(const Reported& c) {
-  return c.kind == Answer::Kind::effect ? listed(c.effects, "and") : "(" + c.group + ")";
+  return c.kind == ScoredHypothesis::Kind::effect ? listed(c.effects, "and") : "(" + c.group + ")";
 }
 
 }  // namespace
@@ -113,21 +113,22 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   // its sizes: of the most probable one
   const Reported* concluded = nullptr;
   for (const Reported* c : ranked)
-    if (concluded == nullptr && named && c->kind == Answer::Kind::effect &&
+    if (concluded == nullptr && named && c->kind == ScoredHypothesis::Kind::effect &&
         std::ranges::all_of(c->effects,
                             [&](const std::string& e) { return std::ranges::count(r.conclusion.effects, e) > 0; }))
       concluded = c;
   if (concluded != nullptr) {
     lines.push_back("size, with its 90 % interval:");
     for (std::size_t i = 0; i < concluded->sizes.size() && i < kSizes; ++i) {
-      const Size& s = concluded->sizes[i];
+      const SizeEstimate& s = concluded->sizes[i];
       lines.push_back(flightlog::format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
                                         s.unit.empty() ? "" : " ", s.unit.c_str()));
     }
   }
   if (r.conclusion.kind == Conclusion::Kind::unknown && !r.unexplained.empty()) {
-    lines.push_back(r.beside.empty() ? "what is left depends on:"
-                                     : "what is left, with " + listed(r.beside, "and") + " in force, depends on:");
+    lines.push_back(r.jointly_with.empty()
+                        ? "what is left depends on:"
+                        : "what is left, with " + listed(r.jointly_with, "and") + " in force, depends on:");
     for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
       lines.push_back(flightlog::format("  %s on %s, %.0f times what models usually get wrong (%.0f nats)",
                                         place_of(r.unexplained[i]).c_str(), r.unexplained[i].function.c_str(),
@@ -142,10 +143,10 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     ++shown;
   }
   lines.push_back("runners-up: " + others);
-  const std::vector<Place> places = one_of_each_test(r);
+  const std::vector<GapLocation> places = one_of_each_test(r);
   lines.push_back(places.empty() ? "with parameters refitted nothing stands out of the noise"
                                  : "where the gap lies, with parameters refitted (rms, that of noise):");
-  for (const Place& p : places)
+  for (const GapLocation& p : places)
     lines.push_back(flightlog::format("  %-12s %-34s %8.3g, noise %.3g %s (p %.1g)", channel_name(p.channel),
                                       p.regime.c_str(), p.gap, p.noise_floor, channel_unit(p.channel), p.p_value));
   const auto loss = [](const std::optional<double>& e) { return e ? flightlog::format("%.3g", *e) : std::string("-"); };

@@ -13,7 +13,7 @@ const char* kind_name(Conclusion::Kind kind) {
   return kNames[static_cast<int>(kind)];
 }
 
-const char* kind_name(Answer::Kind kind) {
+const char* kind_name(ScoredHypothesis::Kind kind) {
   static const char* const kNames[] = {"none", "parameters", "effect", "unknown"};
   return kNames[static_cast<int>(kind)];
 }
@@ -43,63 +43,63 @@ void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
   }
 }
 
-void set_probabilities(std::vector<Answer>& answers, const VerdictRule& rule) {
-  std::ranges::sort(answers, std::greater{}, &Answer::log_evidence);
-  const double most = answers.empty() ? 0 : answers.front().log_evidence;
+void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule) {
+  std::ranges::sort(hypotheses, std::greater{}, &ScoredHypothesis::log_evidence);
+  const double most = hypotheses.empty() ? 0 : hypotheses.front().log_evidence;
   double sum = 0, of_effects = 0, effects = 0;
-  for (Answer& a : answers) sum += a.probability = std::exp(a.log_evidence - most);
-  for (Answer& a : answers) {
+  for (ScoredHypothesis& a : hypotheses) sum += a.probability = std::exp(a.log_evidence - most);
+  for (ScoredHypothesis& a : hypotheses) {
     a.probability /= sum;
-    if (a.kind == Answer::Kind::effect) of_effects += a.probability, effects += 1;
+    if (a.kind == ScoredHypothesis::Kind::effect) of_effects += a.probability, effects += 1;
   }
-  for (Answer& a : answers) {
-    if (a.kind == Answer::Kind::unknown) a.probability += rule.doubt.unknown * of_effects;
-    if (a.kind == Answer::Kind::effect)
+  for (ScoredHypothesis& a : hypotheses) {
+    if (a.kind == ScoredHypothesis::Kind::unknown) a.probability += rule.doubt.unknown * of_effects;
+    if (a.kind == ScoredHypothesis::Kind::effect)
       a.probability +=
           rule.doubt.confused * of_effects / effects - (rule.doubt.unknown + rule.doubt.confused) * a.probability;
   }
-  std::ranges::stable_sort(answers, std::greater{}, &Answer::probability);
+  std::ranges::stable_sort(hypotheses, std::greater{}, &ScoredHypothesis::probability);
 }
 
-Conclusion conclude(const std::vector<Answer>& answers, const VerdictRule& rule) {
+Conclusion conclude(const std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule) {
   struct Pool {
     double mass = 0;
     std::size_t best = 0;
   };
   std::map<std::string, Pool> pools;  // no effect has the name of another kind
-  const auto key = [](const Answer& a) {
-    return a.kind == Answer::Kind::effect ? pool_name(a.effects) : "/" + std::string(kind_name(a.kind));
+  const auto key = [](const ScoredHypothesis& a) {
+    return a.kind == ScoredHypothesis::Kind::effect ? pool_name(a.effects) : "/" + std::string(kind_name(a.kind));
   };
-  for (std::size_t i = 0; i < answers.size(); ++i) {
-    const auto [at, fresh] = pools.try_emplace(key(answers[i]), Pool{0, i});
-    at->second.mass += answers[i].probability;
-    if (answers[i].probability > answers[at->second.best].probability) at->second.best = i;
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    const auto [at, fresh] = pools.try_emplace(key(hypotheses[i]), Pool{0, i});
+    at->second.mass += hypotheses[i].probability;
+    if (hypotheses[i].probability > hypotheses[at->second.best].probability) at->second.best = i;
   }
   Conclusion c;
   if (pools.empty()) return c;
   const auto& [name, pool] = *std::ranges::max_element(pools, {}, [](const auto& named) { return named.second.mass; });
-  const Answer& best = answers[pool.best];
-  c.answer = pool.best;
+  const ScoredHypothesis& best = hypotheses[pool.best];
+  c.hypothesis = pool.best;
   c.probability = best.probability;
   c.effects = best.effects;
   switch (best.kind) {
-    case Answer::Kind::none:
+    case ScoredHypothesis::Kind::none:
       c.kind = Conclusion::Kind::none;
       return c;
-    case Answer::Kind::parameters:
+    case ScoredHypothesis::Kind::parameters:
       c.kind = Conclusion::Kind::parameters;
       return c;
-    case Answer::Kind::unknown:
+    case ScoredHypothesis::Kind::unknown:
       c.kind = Conclusion::Kind::unknown;
       return c;
-    case Answer::Kind::effect:
+    case ScoredHypothesis::Kind::effect:
       break;
   }
   c.kind = Conclusion::Kind::effect;
   if (best.probability >= rule.naming.of_all || best.probability >= rule.naming.of_pool * pool.mass) return c;
   c.kind = Conclusion::Kind::group;
   c.probability = pool.mass;
-  for (const Answer& a : answers) {
+  for (const ScoredHypothesis& a : hypotheses) {
     if (key(a) != name || a.probability < rule.naming.member_of_pool * pool.mass) continue;
     for (const std::string& e : a.effects)
       if (!std::ranges::count(c.effects, e)) c.effects.push_back(e);

@@ -16,16 +16,16 @@ bool refuted(const Losses& parameters, const Losses& effects, const VerdictRule&
 /// Makes the figures of the effects of a fit, along whose coordinates its directions are, as uncertain as they are.
 void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule);
 
-/// Of every answer, from its log evidence; the most probable first. Of what speaks for entries a little goes to an unknown cause,
+/// Of every hypothesis, from its log evidence; the most probable first. Of what speaks for entries a little goes to an unknown cause,
 /// which may look like one, and to all entries alike.
-void set_probabilities(std::vector<Answer>& answers, const VerdictRule& rule);
+void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule);
 
 /// The largest mass, rivals that such flights often cannot separate (EffectInfo::group) pooled: a set of effects pools with those whose
 /// effects are of the same groups. Of a pool the most probable set is named where it holds half of everything or four fifths of its
 /// pool; otherwise the pool is, and its verdict is `group`.
-Conclusion conclude(const std::vector<Answer>& answers, const VerdictRule& rule);
+Conclusion conclude(const std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule);
 const char* kind_name(Conclusion::Kind kind);
-const char* kind_name(Answer::Kind kind);
+const char* kind_name(ScoredHypothesis::Kind kind);
 
 /// Groups of the effects, an effect without one being its own: "drive_lag", "body_drag+world_force".
 std::string pool_name(const std::vector<std::string>& effects);

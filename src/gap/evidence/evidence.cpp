@@ -21,9 +21,9 @@ constexpr double kMostPast = 0.95;
 
 std::size_t row_of(std::size_t beat, int group) { return beat * kRowsPerBeat + static_cast<std::size_t>(group); }
 
-/// A group with eta integrated out: sums a' b over its rows become a' b - of(a)' of(b).
-struct WithoutEta {
-  WithoutEta(const MatrixXd& normal, VectorXd eta_sd) : sd(std::move(eta_sd)) {
+/// A group with delta integrated out: sums a' b over its rows become a' b - of(a)' of(b).
+struct WithoutDiscrepancy {
+  WithoutDiscrepancy(const MatrixXd& normal, VectorXd discrepancy_sd) : sd(std::move(discrepancy_sd)) {
     MatrixXd precision = sd.asDiagonal() * normal * sd.asDiagonal();
     precision.diagonal().array() += 1;
     llt.compute(precision);
@@ -33,21 +33,21 @@ struct WithoutEta {
   MatrixXd of(const MatrixXd& sums) const { return llt.matrixL().solve(sd.asDiagonal() * sums); }
 
   VectorXd sd;
-  Eigen::LLT<MatrixXd> llt;  ///< of eta's precision given the rest, in units of its prior's sd
+  Eigen::LLT<MatrixXd> llt;  ///< of delta's precision given the rest, in units of its prior's sd
   MatrixXd half;             ///< of the basis
 };
 
 }  // namespace
 
-Evidence::Evidence(const std::vector<CarriedFlight>& flights, ModelDiscrepancy discrepancy, int threads)
+Evidence::Evidence(const std::vector<PredictedFlight>& flights, ModelDiscrepancy discrepancy, int threads)
     : flights_(flights), discrepancy_(std::move(discrepancy)), threads_(threads), basis_(flights), groups_(kGroups) {
-  for (const CarriedFlight& f : flights) weights_.emplace_back(f.beats() * kRowsPerBeat, 1.0);
+  for (const PredictedFlight& f : flights) weights_.emplace_back(f.beats() * kRowsPerBeat, 1.0);
   for (int channel = 0; channel < kChannels; ++channel) {
     double all = 0;
     for (int c = 0; c < kCoefficients; ++c) {
       const int g = channel * kCoefficients + c;
       double sum = 0, n = 0;
-      for (const CarriedFlight& f : flights)
+      for (const PredictedFlight& f : flights)
         for (std::size_t j = 0; j < f.beats(); ++j)
           if (f.covers(j, channel)) sum += f.signal()[row_of(j, g)] * f.signal()[row_of(j, g)], n += 1;
       groups_[static_cast<std::size_t>(g)].signal = n > 0 ? sum / n : 0;
@@ -59,7 +59,7 @@ Evidence::Evidence(const std::vector<CarriedFlight>& flights, ModelDiscrepancy d
       s = std::sqrt((s + all) / 2);
     }
   }
-  Signature declared;
+  Residuals declared;
   for (std::size_t f = 0; f < flights.size(); ++f) declared.push_back(flights[f].declared_noise(f + 1));
   const Index q = basis_.size();
   for (int channel = 0; channel < kChannels; ++channel) {
@@ -78,12 +78,12 @@ Evidence::Evidence(const std::vector<CarriedFlight>& flights, ModelDiscrepancy d
   sum_basis();
 }
 
-void Evidence::learn_weights(const Signature& residual) {
+void Evidence::learn_weights(const Residuals& residual) {
   find_noise(residual, Find::weights);
   sum_basis();
 }
 
-void Evidence::learn_noise(const Signature& residual) {
+void Evidence::learn_noise(const Residuals& residual) {
   find_noise(residual, Find::noise);
   sum_basis();
 }
@@ -91,7 +91,7 @@ void Evidence::learn_noise(const Signature& residual) {
 /// Calls use(beat, whether the one before it counts) for the beats of a flight that a channel covers.
 template <class Use>
 void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
-  const CarriedFlight& f = flights_[flight];
+  const PredictedFlight& f = flights_[flight];
   bool before = false;
   for (std::size_t j = 0; j < f.beats(); ++j) {
     const bool now = f.covers(j, channel);
@@ -100,7 +100,7 @@ void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
   }
 }
 
-void Evidence::find_noise(const Signature& residual, Find what) {
+void Evidence::find_noise(const Residuals& residual, Find what) {
   const Index q = basis_.size();
   io::parallel_for(static_cast<std::size_t>(kGroups), threads_, [&](std::size_t k) {
     const int g = static_cast<int>(k);
@@ -114,9 +114,9 @@ void Evidence::find_noise(const Signature& residual, Find what) {
         n += 1;
       });
     if (n == 0) return;
-    const VectorXd eta = plain_inverse_[static_cast<std::size_t>(channel)] * right;
+    const VectorXd delta = plain_inverse_[static_cast<std::size_t>(channel)] * right;
     const auto left = [&](std::size_t f, std::size_t j) {
-      return residual[f][row_of(j, g)] - basis_.values(f).row(static_cast<Index>(j)).dot(eta);
+      return residual[f][row_of(j, g)] - basis_.values(f).row(static_cast<Index>(j)).dot(delta);
     };
     std::vector<double> sizes;
     for (std::size_t f = 0; f < flights_.size(); ++f)
@@ -186,9 +186,9 @@ void Evidence::sum_basis() {
   }
 }
 
-Smooth Evidence::smooth(const Signature& rows) const {
+BasisCoefficients Evidence::basis_coefficients(const Residuals& rows) const {
   const Index q = basis_.size();
-  Smooth result = Smooth::Zero(kGroups, q);
+  BasisCoefficients result = BasisCoefficients::Zero(kGroups, q);
   for (int channel = 0; channel < kChannels; ++channel) {
     MatrixXd right = MatrixXd::Zero(q, kCoefficients);
     for (std::size_t f = 0; f < flights_.size(); ++f)
@@ -202,9 +202,9 @@ Smooth Evidence::smooth(const Signature& rows) const {
   return result;
 }
 
-Statistics Evidence::statistics(const Signature& residual) const {
+SufficientStatistics Evidence::statistics(const Residuals& residual) const {
   const Index q = basis_.size();
-  Statistics s{{flights_.size(), std::vector<VectorXd>(kGroups, VectorXd::Zero(q))}};
+  SufficientStatistics s{{flights_.size(), std::vector<VectorXd>(kGroups, VectorXd::Zero(q))}};
   for (std::size_t f = 0; f < flights_.size(); ++f) {
     const MatrixXd& basis = basis_.values(f);
     for (int g = 0; g < kGroups; ++g) {
@@ -221,7 +221,7 @@ Statistics Evidence::statistics(const Signature& residual) const {
   return s;
 }
 
-void Evidence::add(double share, const Smooth& change, Statistics& to) const {
+void Evidence::add(double share, const BasisCoefficients& change, SufficientStatistics& to) const {
   for (std::size_t f = 0; f < flights_.size(); ++f)
     for (int g = 0; g < kGroups; ++g)
       to.sums[f][static_cast<std::size_t>(g)] +=
@@ -233,8 +233,8 @@ double Evidence::noise_sd(int group) const {
   return g.sd / std::sqrt(1 - g.past * g.past);
 }
 
-Smooth Evidence::floor() const {
-  Smooth sd(kGroups, basis_.size());
+BasisCoefficients Evidence::discrepancy_sd() const {
+  BasisCoefficients sd(kGroups, basis_.size());
   for (int g = 0; g < kGroups; ++g)
     for (int i = 0; i < basis_.size(); ++i)
       sd(g, i) = groups_[static_cast<std::size_t>(g)].signal *
@@ -243,7 +243,7 @@ Smooth Evidence::floor() const {
 }
 
 /// Of a group over the chosen flights: basis x basis, and basis x residual.
-std::pair<MatrixXd, VectorXd> Evidence::sums_of(const Statistics& residual, const std::vector<char>& use,
+std::pair<MatrixXd, VectorXd> Evidence::sums_of(const SufficientStatistics& residual, const std::vector<char>& use,
                                                 int group) const {
   const auto g = static_cast<std::size_t>(group);
   std::pair<MatrixXd, VectorXd> sums{MatrixXd::Zero(basis_.size(), basis_.size()), VectorXd::Zero(basis_.size())};
@@ -255,8 +255,8 @@ std::pair<MatrixXd, VectorXd> Evidence::sums_of(const Statistics& residual, cons
   return sums;
 }
 
-Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smooth*>& columns,
-                         const std::vector<char>& use, const Smooth& eta_sd) const {
+Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
+                         const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const {
   const Index q = basis_.size(), k = static_cast<Index>(columns.size());
   Reduced result{MatrixXd::Zero(k + 1, k + 1), 0};
   MatrixXd change(q, k), weighed(q, k);
@@ -264,7 +264,7 @@ Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smo
     const auto [normal, right] = sums_of(residual, use, g);
     if (normal(0, 0) == 0) continue;  // nothing was seen
     for (Index i = 0; i < k; ++i) change.col(i) = columns[static_cast<std::size_t>(i)]->row(g).transpose();
-    const WithoutEta without(normal, eta_sd.row(g).transpose());
+    const WithoutDiscrepancy without(normal, discrepancy_sd.row(g).transpose());
     weighed.noalias() = (normal - without.half.transpose() * without.half) * change;
     result.sums.topLeftCorner(k, k).triangularView<Eigen::Lower>() += change.transpose() * weighed;
     const VectorXd half_right = without.of(right);
@@ -278,13 +278,14 @@ Reduced Evidence::reduce(const Statistics& residual, const std::vector<const Smo
   return result;
 }
 
-Smooth Evidence::local_gains(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd,
-                             const Smooth& more_sd) const {
-  Smooth gains = Smooth::Zero(kGroups, basis_.size());
+BasisCoefficients Evidence::local_gains(const SufficientStatistics& residual, const std::vector<char>& use,
+                                        const BasisCoefficients& discrepancy_sd,
+                                        const BasisCoefficients& more_sd) const {
+  BasisCoefficients gains = BasisCoefficients::Zero(kGroups, basis_.size());
   for (int g = 0; g < kGroups; ++g) {
     const auto [normal, right] = sums_of(residual, use, g);
     if (normal(0, 0) == 0) continue;
-    const WithoutEta without(normal, eta_sd.row(g).transpose());
+    const WithoutDiscrepancy without(normal, discrepancy_sd.row(g).transpose());
     // one more coefficient, beside those that were there
     const VectorXd known = normal.diagonal() - without.half.colwise().squaredNorm().transpose();
     const VectorXd left = right - without.half.transpose() * without.of(right);

@@ -1,13 +1,13 @@
 // How probable residuals are under a hypothesis, in closed form.
 //
-// Rows (gap/beat_rows.hpp) fall into groups: one channel, one coefficient. In a group, over the beats of a flight,
-//   residual = columns theta + basis eta + noise
-//   theta    what the hypothesis leaves free, standard normal a priori: shared by all groups
-//   eta      what every model of a flapping wing gets wrong: a smooth function of input and motion (RegimeBasis) in every
-//            group, N(0, (its floor x size of the signal)^2). An effect must explain more than this.
-//   noise    first-order autoregressive from beat to beat, with a scale and an autocorrelation of its own in every group,
-//            found from what even the whole basis does not explain; heavy-tailed: rows far off count less (Student t)
-// theta and eta are integrated out (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 2.7), so
+// Rows (gap/replay/beat_rows.hpp) fall into groups: one channel, one coefficient. In a group, over the beats of a flight,
+//   residual = columns theta + basis delta + noise
+//   theta  what the hypothesis leaves free, standard normal a priori: shared by all groups
+//   delta  what every model of a flapping wing gets wrong: a smooth function of input and motion (RegimeBasis) in every
+//          group, N(0, (its share x size of the signal)^2): the model discrepancy. An effect must explain more than this.
+//   noise  first-order autoregressive from beat to beat, with a scale and an autocorrelation of its own in every group,
+//          found from what even the whole basis does not explain; heavy-tailed: rows far off count less (Student t)
+// theta and delta are integrated out (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 2.7), so
 //   log p(residual) = -1/2 r^T K^-1 r - 1/2 log det K + const
 #pragma once
 
@@ -20,14 +20,14 @@
 namespace flappy::gap {
 
 /// Rows of all flights.
-using Signature = std::vector<Rows>;
+using Residuals = std::vector<Rows>;
 
 inline constexpr int kGroups = kChannels * kCoefficients;
 
 /// Smooth functions of what a beat did, over all flights of mean 0 and rms 1 but for the constant.
 class RegimeBasis {
  public:
-  explicit RegimeBasis(const std::vector<CarriedFlight>& flights);
+  explicit RegimeBasis(const std::vector<PredictedFlight>& flights);
   int size() const { return static_cast<int>(names_.size()); }
   const std::string& name(int i) const { return names_[static_cast<std::size_t>(i)]; }
   BasisFunction kind(int i) const { return kinds_[static_cast<std::size_t>(i)]; }
@@ -40,16 +40,16 @@ class RegimeBasis {
   std::vector<Eigen::MatrixXd> values_;
 };
 
-/// The part of rows that is a smooth function of the regime: coefficients of the basis, [group][basis].
-using Smooth = Eigen::MatrixXd;
+/// The part of rows that is a smooth function of the regime, as coefficients of its basis: [group][basis].
+using BasisCoefficients = Eigen::MatrixXd;
 
 /// All that the rows of flights say of smooth residuals: sums over the whitened rows of a group, basis x
 /// residual, [flight][group].
-struct Statistics {
+struct SufficientStatistics {
   std::vector<std::vector<Eigen::VectorXd>> sums;
 };
 
-/// Columns and residual with eta integrated out.
+/// Columns and residual with delta integrated out.
 struct Reduced {
   Eigen::MatrixXd sums;  ///< columns, then the residual: square
   double log_scale = 0;  ///< of what was integrated out
@@ -63,29 +63,29 @@ struct Posterior {
 
 class Evidence {
  public:
-  Evidence(const std::vector<CarriedFlight>& flights, ModelDiscrepancy discrepancy, int threads);
+  Evidence(const std::vector<PredictedFlight>& flights, ModelDiscrepancy discrepancy, int threads);
 
   const RegimeBasis& basis() const { return basis_; }
   const ModelDiscrepancy& discrepancy() const { return discrepancy_; }
   /// Noise is as the headers declare it, until it is learnt from what a good fit leaves: its scale, its autocorrelation, and
   /// which rows count less. The weights alone are for residuals that are no noise yet.
-  void learn_weights(const Signature& residual);
-  void learn_noise(const Signature& residual);
+  void learn_weights(const Residuals& residual);
+  void learn_noise(const Residuals& residual);
   /// By least squares. Differences of simulations are rough: where in its step a wing meets its stop decides on more than
   /// the parameter that was moved. What is no smooth function of the regime is noise, whatever the hypothesis.
-  Smooth smooth(const Signature& rows) const;
-  Statistics statistics(const Signature& residual) const;
+  BasisCoefficients basis_coefficients(const Residuals& rows) const;
+  SufficientStatistics statistics(const Residuals& residual) const;
   /// Adds to a residual `share` times a smooth one.
-  void add(double share, const Smooth& change, Statistics& to) const;
-  /// Sd of eta that every model of a wing has.
-  Smooth floor() const;
-  /// `use`: which flights. `eta_sd`: of eta's coefficients.
-  Reduced reduce(const Statistics& residual, const std::vector<const Smooth*>& columns, const std::vector<char>& use,
-                 const Smooth& eta_sd) const;
-  /// What log p gains when a coefficient of eta, each for itself, may be as large as `more_sd` besides, while the columns
+  void add(double share, const BasisCoefficients& change, SufficientStatistics& to) const;
+  /// Sd of delta that every model of a wing has.
+  BasisCoefficients discrepancy_sd() const;
+  /// `use`: which flights. `discrepancy_sd`: of delta's coefficients.
+  Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
+                 const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const;
+  /// What log p gains when a coefficient of delta, each for itself, may be as large as `more_sd` besides, while the columns
   /// stay as they are.
-  Smooth local_gains(const Statistics& residual, const std::vector<char>& use, const Smooth& eta_sd,
-                     const Smooth& more_sd) const;
+  BasisCoefficients local_gains(const SufficientStatistics& residual, const std::vector<char>& use,
+                                const BasisCoefficients& discrepancy_sd, const BasisCoefficients& more_sd) const;
   /// Of the chosen columns, whose theta has the given prior means and sd 1.
   static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns,
                              const Eigen::VectorXd& prior_mean);
@@ -100,21 +100,21 @@ class Evidence {
     double least_sd = 0;  ///< as declared
   };
   void sum_basis();
-  std::pair<Eigen::MatrixXd, Eigen::VectorXd> sums_of(const Statistics& residual, const std::vector<char>& use,
-                                                      int group) const;
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> sums_of(const SufficientStatistics& residual,
+                                                      const std::vector<char>& use, int group) const;
   enum class Find { declared, weights, noise };
-  void find_noise(const Signature& residual, Find what);
+  void find_noise(const Residuals& residual, Find what);
   template <class Use>
   void for_rows(std::size_t flight, int channel, const Use& use) const;
   template <class Use>
   void for_whitened(std::size_t flight, int group, const Use& use) const;
 
-  const std::vector<CarriedFlight>& flights_;
+  const std::vector<PredictedFlight>& flights_;
   ModelDiscrepancy discrepancy_;
   int threads_;
   RegimeBasis basis_;
   std::vector<Group> groups_;
-  Signature weights_;
+  Residuals weights_;
   std::vector<Eigen::MatrixXd> plain_inverse_;        ///< of basis x basis, by channel
   std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< basis x basis of the whitened rows, [flight][group]
 };

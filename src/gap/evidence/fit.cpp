@@ -30,25 +30,26 @@ VectorXd Columns::mean() const {
   return Eigen::Map<const VectorXd>(prior_mean.data(), static_cast<Index>(prior_mean.size()));
 }
 
-void Columns::add(const Smooth& column, double mean) {
+void Columns::add(const BasisCoefficients& column, double mean) {
   chosen.push_back(static_cast<int>(columns.size()));
   columns.push_back(&column);
   prior_mean.push_back(mean);
 }
 
-std::vector<Signature> residuals(const std::vector<CarriedFlight>& flights, const std::vector<Candidate>& candidates,
+std::vector<Residuals> residuals(const std::vector<PredictedFlight>& flights, const std::vector<Candidate>& candidates,
                                  int threads) {
   // candidates whose sensors agree share a log
   std::map<EffectValues, std::vector<std::size_t>> by_sensors;
   for (std::size_t i = 0; i < candidates.size(); ++i)
     by_sensors[sensor_effects(candidates[i].vehicle.effects)].push_back(i);
-  std::vector<Signature> list(candidates.size());
-  const auto compare = [&](const std::vector<CarriedFlight>& seen, const std::vector<std::size_t>& which, int at_once) {
+  std::vector<Residuals> list(candidates.size());
+  const auto compare = [&](const std::vector<PredictedFlight>& seen, const std::vector<std::size_t>& which,
+                           int at_once) {
     std::vector<Candidate> group;
     for (const std::size_t i : which) group.push_back(candidates[i]);
-    std::vector<Signature> predicted = predict_all(seen, group, at_once);
+    std::vector<Residuals> predicted = predict_all(seen, group, at_once);
     for (std::size_t g = 0; g < which.size(); ++g) {
-      Signature& s = predicted[g];
+      Residuals& s = predicted[g];
       const bool whole = std::ranges::none_of(s, [](const Rows& rows) { return rows.empty(); });
       for (std::size_t f = 0; whole && f < seen.size(); ++f)
         for (std::size_t i = 0; i < s[f].size(); ++i) s[f][i] = seen[f].measured()[i] - s[f][i];
@@ -61,8 +62,8 @@ std::vector<Signature> residuals(const std::vector<CarriedFlight>& flights, cons
     else corrected.emplace_back(sensors, which);
   }
   io::parallel_for(corrected.size(), threads, [&](std::size_t k) {
-    std::vector<CarriedFlight> seen;
-    for (const CarriedFlight& f : flights) seen.push_back(f.with_log(without(corrected[k].first, f.recording().log)));
+    std::vector<PredictedFlight> seen;
+    for (const PredictedFlight& f : flights) seen.push_back(f.with_log(without(corrected[k].first, f.recording().log)));
     compare(seen, corrected[k].second, 1);
   });
   return list;
@@ -73,7 +74,7 @@ Directions Fitter::axes(const Hypothesis& hypothesis) {
 }
 
 Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions,
-                             const std::vector<Smooth>& known) const {
+                             const std::vector<BasisCoefficients>& known) const {
   std::vector<Candidate> candidates = {hypothesis.candidate(at)};
   std::vector<double> spans;
   const auto first = static_cast<Index>(known.size());
@@ -85,15 +86,15 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
     candidates.push_back(hypothesis.candidate(up));
     candidates.push_back(hypothesis.candidate(down));
   }
-  std::vector<Signature> rows = residuals(flights_, candidates, threads_);
+  std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
   Linearised l{at, std::move(directions), std::move(rows[0]), {}, known};
   for (std::size_t d = 0; d < spans.size(); ++d) {
-    Signature &up = rows[1 + 2 * d], &down = rows[2 + 2 * d];
+    Residuals &up = rows[1 + 2 * d], &down = rows[2 + 2 * d];
     l.columns.emplace_back();
     if (up.empty() || down.empty() || !(spans[d] > 0)) continue;
     for (std::size_t f = 0; f < up.size(); ++f)
       for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / spans[d];
-    l.columns.back() = evidence_.smooth(up);
+    l.columns.back() = evidence_.basis_coefficients(up);
   }
   if (l.residual.empty()) return l;
   l.statistics = evidence_.statistics(l.residual);
@@ -121,11 +122,11 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
     shifts.push_back(l.directions.axes.leftCols(k).transpose() * (there - l.at));
     candidates.push_back(hypothesis.candidate(there));
   }
-  const std::vector<Signature> rows = residuals(flights_, candidates, threads_);
+  const std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
   double n = 1;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (rows[i].empty()) continue;
-    Statistics there = evidence_.statistics(rows[i]);
+    SufficientStatistics there = evidence_.statistics(rows[i]);
     for (Index d = 0; d < k; ++d)
       if (shifts[i][d] != 0 && l.columns[static_cast<std::size_t>(d)].size() > 0)
         evidence_.add(shifts[i][d], l.columns[static_cast<std::size_t>(d)], there);
@@ -142,27 +143,27 @@ Columns Fitter::columns_of(const Linearised& point) const {
   for (std::size_t d = 0; d < point.columns.size(); ++d)
     if (point.columns[d].size() > 0)
       c.add(point.columns[d], -point.directions.axes.col(static_cast<Index>(d)).dot(point.at));
-  for (const Smooth& b : background_) c.add(b, 0);
+  for (const BasisCoefficients& b : background_) c.add(b, 0);
   return c;
 }
 
-Smooth Fitter::form_error(const Hypothesis& hypothesis, const Linearised& point) const {
-  std::map<std::string, Smooth> whole;
+BasisCoefficients Fitter::form_error(const Hypothesis& hypothesis, const Linearised& point) const {
+  std::map<std::string, BasisCoefficients> whole;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
     const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(i)];
-    const Smooth& column = point.columns[static_cast<std::size_t>(i)];
+    const BasisCoefficients& column = point.columns[static_cast<std::size_t>(i)];
     if (!u.size || column.size() == 0) continue;
-    Smooth& own = whole[u.effect];
-    if (own.size() == 0) own = Smooth::Zero(column.rows(), column.cols());
+    BasisCoefficients& own = whole[u.effect];
+    if (own.size() == 0) own = BasisCoefficients::Zero(column.rows(), column.cols());
     own += point.at[i] * column;
   }
-  Smooth squares = Smooth::Zero(kGroups, evidence_.basis().size());
+  BasisCoefficients squares = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
   for (const auto& [effect, own] : whole) squares += (evidence_.discrepancy().form_error * own).cwiseAbs2();
   return squares.cwiseSqrt();
 }
 
 Reduced Fitter::reduce(const Linearised& point, const Columns& columns) const {
-  return evidence_.reduce(point.statistics, columns.columns, all_flights(), evidence_.floor());
+  return evidence_.reduce(point.statistics, columns.columns, all_flights(), evidence_.discrepancy_sd());
 }
 
 Posterior Fitter::solve(const Linearised& point, const Columns& columns, Reduced reduced, double damping) const {
@@ -183,15 +184,15 @@ MatrixXd Fit::covariance() const {
   return point.directions.axes * posterior.covariance * point.directions.axes.transpose();
 }
 
-double Fitter::cost(const Statistics& residual, const VectorXd& at) const {
+double Fitter::cost(const SufficientStatistics& residual, const VectorXd& at) const {
   Columns c;
-  for (const Smooth& b : background_) c.add(b, 0);
-  const Reduced reduced = evidence_.reduce(residual, c.columns, all_flights(), evidence_.floor());
+  for (const BasisCoefficients& b : background_) c.add(b, 0);
+  const Reduced reduced = evidence_.reduce(residual, c.columns, all_flights(), evidence_.discrepancy_sd());
   return 0.5 * at.squaredNorm() - Evidence::posterior(reduced, c.chosen, c.mean()).log_evidence;
 }
 
 /// Those of the parameters' fit, and the effects' own.
-Directions Fitter::beside(const Hypothesis& hypothesis, const Fit& parameters) {
+Directions Fitter::joint_directions(const Hypothesis& hypothesis, const Fit& parameters) {
   Directions d = axes(hypothesis);
   const Index shared = hypothesis.shared();
   d.axes.topLeftCorner(shared, shared) = parameters.point.directions.axes.topLeftCorner(shared, shared);
@@ -199,7 +200,7 @@ Directions Fitter::beside(const Hypothesis& hypothesis, const Fit& parameters) {
   return d;
 }
 
-std::vector<Smooth> Fitter::known(const Hypothesis& hypothesis, const Fit& parameters) {
+std::vector<BasisCoefficients> Fitter::known(const Hypothesis& hypothesis, const Fit& parameters) {
   const auto& columns = parameters.point.columns;
   return {columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(hypothesis.shared())};
 }
@@ -226,19 +227,20 @@ Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int iterations) co
 
 Fit Fitter::fit(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters, int iterations) const {
   Fit result;
-  result.point =
-      linearise(hypothesis, hypothesis.bounded(start), beside(hypothesis, parameters), known(hypothesis, parameters));
+  result.point = linearise(hypothesis, hypothesis.bounded(start), joint_directions(hypothesis, parameters),
+                           known(hypothesis, parameters));
   return improve(hypothesis, std::move(result), iterations, &parameters);
 }
 
-Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters, const std::vector<Smooth>& own) const {
+Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters,
+                   const std::vector<BasisCoefficients>& own) const {
   Fit result;
   Linearised& l = result.point;
   l = parameters.point;
   l.residual.clear();
   l.at = hypothesis.start();
   l.at.head(hypothesis.shared()) = parameters.point.at;
-  l.directions = beside(hypothesis, parameters);
+  l.directions = joint_directions(hypothesis, parameters);
   l.columns.insert(l.columns.end(), own.begin(), own.end());
   const Columns columns = columns_of(l);
   result.posterior = solve(l, columns, reduce(l, columns));
@@ -269,7 +271,7 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
       tries.push_back(hypothesis.bounded(l.at + l.directions.axes * solve(l, columns, reduced, damping).mean));
     std::vector<Candidate> candidates;
     for (const VectorXd& at : tries) candidates.push_back(hypothesis.candidate(at));
-    const std::vector<Signature> left = residuals(flights_, candidates, threads_);
+    const std::vector<Residuals> left = residuals(flights_, candidates, threads_);
     const double before = cost(evidence_.statistics(l.residual), l.at);
     std::size_t best = tries.size();
     double best_cost = before;

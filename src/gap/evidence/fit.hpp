@@ -17,9 +17,9 @@ struct Directions {
 struct Linearised {
   Eigen::VectorXd at;
   Directions directions;
-  Signature residual;     ///< empty: the vehicle comes apart
-  Statistics statistics;  ///< of the residual, less rough
-  std::vector<Smooth>
+  Residuals residual;               ///< empty: the vehicle comes apart
+  SufficientStatistics statistics;  ///< of the residual, less rough
+  std::vector<BasisCoefficients>
       columns;  ///< change of the prediction for a unit along each direction; empty: it comes apart there
 };
 
@@ -33,33 +33,33 @@ struct Fit {
 
 /// Columns beside each other, and the prior means of their coefficients.
 struct Columns {
-  std::vector<const Smooth*> columns;
+  std::vector<const BasisCoefficients*> columns;
   std::vector<int> chosen;  ///< all of them
   std::vector<double> prior_mean;
   Eigen::VectorXd mean() const;
-  void add(const Smooth& column, double mean);
+  void add(const BasisCoefficients& column, double mean);
 };
 
-/// Residuals under many candidates; empty signatures for vehicles that come apart.
-std::vector<Signature> residuals(const std::vector<CarriedFlight>& flights, const std::vector<Candidate>& candidates,
+/// Residuals under many candidates; empty residuals for vehicles that come apart.
+std::vector<Residuals> residuals(const std::vector<PredictedFlight>& flights, const std::vector<Candidate>& candidates,
                                  int threads);
 
 class Fitter {
  public:
-  Fitter(const std::vector<CarriedFlight>& flights, const Evidence& evidence, int threads)
+  Fitter(const std::vector<PredictedFlight>& flights, const Evidence& evidence, int threads)
       : flights_(flights), evidence_(evidence), threads_(threads) {}
 
   /// Columns that may take what they can beside every hypothesis, with standard normal coefficients.
-  void set_background(std::vector<Smooth> columns) { background_ = std::move(columns); }
+  void set_background(std::vector<BasisCoefficients> columns) { background_ = std::move(columns); }
   std::vector<char> all_flights() const { return std::vector<char>(flights_.size(), 1); }
   /// The columns of a point that do not come apart, then the background's.
   Columns columns_of(const Linearised& point) const;
   /// What the equations of its effects get wrong of themselves: shares of all that the sizes of each change.
-  Smooth form_error(const Hypothesis& hypothesis, const Linearised& point) const;
+  BasisCoefficients form_error(const Hypothesis& hypothesis, const Linearised& point) const;
 
   /// `known`: columns of the first directions, which need not be found again.
   Linearised linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
-                       const std::vector<Smooth>& known = {}) const;
+                       const std::vector<BasisCoefficients>& known = {}) const;
   /// Every coordinate.
   static Directions axes(const Hypothesis& hypothesis);
   /// From `start` on, at most `iterations` linearisations; empty residual where the vehicle comes apart at once.
@@ -70,23 +70,23 @@ class Fitter {
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const;
   /// Without any effect's size, taken as linear in the hypothesis' own unknowns, whose columns are given (empty: unseen), beside
   /// a fit of the parameters. No residual.
-  Fit linear(const Hypothesis& hypothesis, const Fit& parameters, const std::vector<Smooth>& own) const;
+  Fit linear(const Hypothesis& hypothesis, const Fit& parameters, const std::vector<BasisCoefficients>& own) const;
 
  private:
-  static Directions beside(const Hypothesis& hypothesis, const Fit& parameters);
-  static std::vector<Smooth> known(const Hypothesis& hypothesis, const Fit& parameters);
+  static Directions joint_directions(const Hypothesis& hypothesis, const Fit& parameters);
+  static std::vector<BasisCoefficients> known(const Hypothesis& hypothesis, const Fit& parameters);
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
   Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const;
   void average(const Hypothesis& hypothesis, Linearised& l) const;
   Reduced reduce(const Linearised& point, const Columns& columns) const;
   /// Along all directions. `damping`: of the steps, as so much more precision around the point itself (Levenberg).
   Posterior solve(const Linearised& point, const Columns& columns, Reduced reduced, double damping = 0) const;
-  double cost(const Statistics& residual, const Eigen::VectorXd& at) const;
+  double cost(const SufficientStatistics& residual, const Eigen::VectorXd& at) const;
 
-  const std::vector<CarriedFlight>& flights_;
+  const std::vector<PredictedFlight>& flights_;
   const Evidence& evidence_;
   int threads_;
-  std::vector<Smooth> background_;
+  std::vector<BasisCoefficients> background_;
 };
 
 }  // namespace flappy::gap

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/replay/carry.hpp"
+#include "gap/replay/reset_prediction.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::gap {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/replay/carry.hpp"
+#include "gap/replay/reset_prediction.hpp"
 
 namespace flappy::gap {
 

@@ -12,7 +12,7 @@ constexpr int kAmplitude = 1, kDifference = 2, kBias = 3, kSplitCycle = 4, kVelo
 
 }  // namespace
 
-RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
+RegimeBasis::RegimeBasis(const std::vector<PredictedFlight>& flights) {
   values_.resize(flights.size());
   // centred and of rms 1, but for the constant; what never changes is the constant
   const auto append = [&](const std::string& name, BasisFunction kind, std::vector<Eigen::VectorXd> column) {
@@ -32,7 +32,7 @@ RegimeBasis::RegimeBasis(const std::vector<CarriedFlight>& flights) {
   };
   const auto add = [&](const char* name, BasisFunction kind, auto&& value) {
     std::vector<Eigen::VectorXd> column;
-    for (const CarriedFlight& f : flights) {
+    for (const PredictedFlight& f : flights) {
       column.emplace_back(static_cast<Eigen::Index>(f.beats()));
       for (std::size_t j = 0; j < f.beats(); ++j)
         column.back()[static_cast<Eigen::Index>(j)] = value(f.recording(), f.recording().regimes[j]);

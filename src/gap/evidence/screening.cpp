@@ -25,7 +25,7 @@ class Screening {
     Columns c = fitter.columns_of(fit.point);
     base_ = c.chosen;
     for (const SizeColumn& column : columns) c.add(column.change, 0);
-    reduced_ = evidence.reduce(fit.point.statistics, c.columns, fitter.all_flights(), evidence.floor());
+    reduced_ = evidence.reduce(fit.point.statistics, c.columns, fitter.all_flights(), evidence.discrepancy_sd());
     mean_ = c.mean();
     without_ = solve({}).log_evidence;
   }
@@ -76,12 +76,12 @@ class Screening {
 
 }  // namespace
 
-std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const std::vector<std::string>& beside,
+std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const std::vector<std::string>& jointly_with,
                                  const VectorXd& at, const std::vector<std::string>& withheld) {
   std::vector<SizeStep> steps;
   for (const model::EffectEntry& e : model::effects()) {
     const std::string id = e.info.id;
-    if (std::ranges::count(beside, id) || std::ranges::count(withheld, id)) continue;
+    if (std::ranges::count(jointly_with, id) || std::ranges::count(withheld, id)) continue;
     std::vector<std::string> set = beside;
     set.push_back(id);
     const Hypothesis h(uncertain, set);

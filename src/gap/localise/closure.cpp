@@ -37,7 +37,7 @@ std::optional<double> Losses::mean() const {
   return s / n;
 }
 
-Losses losses_of(const Surroundings& around, const Signature& residual) {
+Losses losses_of(const RowContext& around, const Residuals& residual) {
   Losses l;
   for (std::size_t f = 0; f < around.beats.size(); ++f) {
     if (residual.size() <= f || residual[f].empty()) return {};

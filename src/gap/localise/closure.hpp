@@ -20,7 +20,7 @@ struct Losses {
   std::vector<double> sum, count;
   std::optional<double> mean() const;
 };
-Losses losses_of(const Surroundings& around, const Signature& residual);
+Losses losses_of(const RowContext& around, const Residuals& residual);
 /// Sd of the difference of two means, from its scatter over blocks.
 double sd_of_difference(const Losses& a, const Losses& b);
 

@@ -28,12 +28,12 @@ std::vector<int> blocks_of(const std::vector<std::size_t>& beats, int length) {
   return block;
 }
 
-std::optional<Slope> slope_test(const std::vector<double>& x, const std::vector<double>& y,
-                                const std::vector<int>& block) {
+std::optional<FittedSlope> slope_test(const std::vector<double>& x, const std::vector<double>& y,
+                                      const std::vector<int>& block) {
   double squares = 0, products = 0;
   for (std::size_t i = 0; i < x.size(); ++i) squares += x[i] * x[i], products += x[i] * y[i];
   if (!(squares > 0)) return std::nullopt;
-  Slope s{products / squares, 1};
+  FittedSlope s{products / squares, 1};
   std::map<int, double> sums, weights;
   for (std::size_t i = 0; i < x.size(); ++i)
     if (x[i] != 0) sums[block[i]] += x[i] * (y[i] - s.slope * x[i]), weights[block[i]] += x[i] * x[i] / squares;

@@ -12,14 +12,14 @@ namespace flappy::gap {
 /// flights are far apart.
 std::vector<int> blocks_of(const std::vector<std::size_t>& beats, int length);
 
-struct Slope {
+struct FittedSlope {
   double slope = 0, p_value = 1;
 };
 /// Least squares of y = slope x, tested against 0. The slope's variance is that of sums of x (y - slope x) over blocks, and
 /// of neighbouring blocks, in full, where they agree (Hansen and Hodrick 1980; Newey and West 1987 give them half); memory far
 /// beyond a block makes it too small. Blocks count by how much of x they hold (1 / sum of their squared shares: Carter, Schnepel, Steigerwald 2017); nothing with fewer than five. With x = 1 in some beats and 0 in others this tests their mean.
-std::optional<Slope> slope_test(const std::vector<double>& x, const std::vector<double>& y,
-                                const std::vector<int>& block);
+std::optional<FittedSlope> slope_test(const std::vector<double>& x, const std::vector<double>& y,
+                                      const std::vector<int>& block);
 
 struct Whiteness {
   double rms = 0;  ///< of the blocks' means

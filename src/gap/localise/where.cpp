@@ -42,7 +42,7 @@ struct Beat {
 /// The rows of one channel.
 class ChannelRows {
  public:
-  ChannelRows(const Surroundings& around, const Signature& residual, int channel, const std::string& stage)
+  ChannelRows(const RowContext& around, const Residuals& residual, int channel, const std::string& stage)
       : around_(around), channel_(channel), stage_(stage) {
     const std::vector<int> all = blocks_of(around.beats, kBlock), fine = blocks_of(around.beats, kShortBlock);
     std::size_t i = 0;
@@ -60,7 +60,7 @@ class ChannelRows {
     }
   }
 
-  void test_all(std::vector<Place>& places) const {
+  void test_all(std::vector<GapLocation>& places) const {
     if (beats_.empty()) return;
     const std::vector<double> all(beats_.size(), 1);
     add_cell("channel", "all", all, 0, kCoefficients, places);
@@ -77,13 +77,13 @@ class ChannelRows {
  private:
   double noise_sd(int coefficient) const { return around_.noise_sd[group_of(channel_, coefficient)]; }
   void add(const char* test, const std::string& regime, double gap, double floor, double p,
-           std::vector<Place>& places) const {
+           std::vector<GapLocation>& places) const {
     places.push_back({stage_, test, channel_, regime, gap, floor, p, false});
   }
 
   /// Coefficients from `first` to before `last`, in the beats where `in` is 1.
   void add_cell(const char* test, const std::string& regime, const std::vector<double>& in, int first, int last,
-                std::vector<Place>& places) const {
+                std::vector<GapLocation>& places) const {
     double squares = 0, noise = 0, n = 0, least_p = 1;
     int tests = 0;
     for (const double i : in) n += i;
@@ -106,7 +106,7 @@ class ChannelRows {
     return x;
   }
 
-  void test_thirds(const Quantity& q, std::vector<Place>& places) const {
+  void test_thirds(const Quantity& q, std::vector<GapLocation>& places) const {
     const std::vector<double> x = of(q);
     std::vector<double> sorted = x;
     std::ranges::sort(sorted);
@@ -145,7 +145,7 @@ class ChannelRows {
     return std::clamp((products / squares + 1.0 / kBlock) / (1 - 3.0 / kBlock), -kMostMemory, kMostMemory);
   }
 
-  void test_bands(std::vector<Place>& places) const {
+  void test_bands(std::vector<GapLocation>& places) const {
     std::vector<double> ends(std::begin(kBandEnds_Hz), std::end(kBandEnds_Hz));
     ends.push_back(*std::ranges::max_element(around_.beats_Hz) / 2);
     const double past = memory();
@@ -177,7 +177,7 @@ class ChannelRows {
             places);
   }
 
-  void test_input(const Quantity& q, std::vector<Place>& places) const {
+  void test_input(const Quantity& q, std::vector<GapLocation>& places) const {
     std::vector<double> x = of(q);
     const double n = static_cast<double>(x.size());
     double mean = 0, square = 0;
@@ -202,14 +202,14 @@ class ChannelRows {
     add("input", q.name, std::sqrt(explained), std::sqrt(noise), std::min(1.0, tests * least_p), places);
   }
 
-  void test_whiteness(std::vector<Place>& places) const {
+  void test_whiteness(std::vector<GapLocation>& places) const {
     if (channel_ >= kPathX) return;
     if (const auto w = whiteness_test(rows_[0], short_block_))
       add("whiteness", "means of " + std::to_string(kShortBlock) + " beats", w->rms,
           noise_sd(0) / std::sqrt(double{kShortBlock}), w->p_value, places);
   }
 
-  const Surroundings& around_;
+  const RowContext& around_;
   int channel_;
   const std::string& stage_;
   std::vector<Beat> beats_;
@@ -227,18 +227,18 @@ const char* channel_unit(int channel) {
   return channel < kTurnX ? "m/s^2" : "rad/s";
 }
 
-Surroundings surroundings_of(const std::vector<CarriedFlight>& flights, std::vector<double> noise_sd) {
-  Surroundings s;
+RowContext row_context_of(const std::vector<PredictedFlight>& flights, std::vector<double> noise_sd) {
+  RowContext s;
   s.noise_sd = std::move(noise_sd);
   const auto quantity = [&](const char* name, const char* unit, auto&& value) {
     Quantity q{name, unit, {}};
-    for (const CarriedFlight& f : flights) {
+    for (const PredictedFlight& f : flights) {
       q.values.emplace_back();
       for (const Regime& r : f.recording().regimes) q.values.back().push_back(value(f.recording(), r));
     }
     return q;
   };
-  for (const CarriedFlight& f : flights) {
+  for (const PredictedFlight& f : flights) {
     s.beats.push_back(f.beats());
     s.beats_Hz.push_back(f.recording().log.header.flapping_Hz);
     s.covered.emplace_back();
@@ -255,7 +255,7 @@ Surroundings surroundings_of(const std::vector<CarriedFlight>& flights, std::vec
       quantity("time", "s", [](R r, B b) { return b.t_s - r.begin_s; }),
       quantity("heading", "rad", [](R, B b) { return b.heading_rad; }),
   };
-  if (std::ranges::all_of(flights, [](const CarriedFlight& f) { return f.recording().log.power.has_value(); }))
+  if (std::ranges::all_of(flights, [](const PredictedFlight& f) { return f.recording().log.power.has_value(); }))
     s.regimes.push_back(quantity("battery", "V", [](R r, B b) {
       // the mean over the beat, or of what is nearest
       const flightlog::PowerStream& p = *r.log.power;
@@ -275,22 +275,23 @@ Surroundings surroundings_of(const std::vector<CarriedFlight>& flights, std::vec
   return s;
 }
 
-std::vector<Place> locate(const Surroundings& around, const Signature& residual, const std::string& stage) {
-  std::vector<Place> places;
+std::vector<GapLocation> locate(const RowContext& around, const Residuals& residual, const std::string& stage) {
+  std::vector<GapLocation> places;
   for (int channel = 0; channel < kChannels; ++channel) ChannelRows(around, residual, channel, stage).test_all(places);
   std::vector<double> p_values;
-  for (const Place& p : places) p_values.push_back(p.p_value);
+  for (const GapLocation& p : places) p_values.push_back(p.p_value);
   const std::vector<char> found = discoveries(p_values, kFalseDiscoveries);
   for (std::size_t i = 0; i < places.size(); ++i) places[i].discovered = found[i] != 0;
   return places;
 }
 
-std::vector<Place> largest_discoveries(const std::vector<Place>& places, const std::string& stage, std::size_t most) {
-  std::vector<Place> list;
-  for (const Place& p : places)
+std::vector<GapLocation> largest_discoveries(const std::vector<GapLocation>& places, const std::string& stage,
+                                             std::size_t most) {
+  std::vector<GapLocation> list;
+  for (const GapLocation& p : places)
     if (p.stage == stage && p.discovered && p.test != "input" && p.test != "whiteness") list.push_back(p);
   std::ranges::stable_sort(list, std::greater{},
-                           [](const Place& p) { return p.gap / std::max(p.noise_floor, 1e-300); });
+                           [](const GapLocation& p) { return p.gap / std::max(p.noise_floor, 1e-300); });
   if (list.size() > most) list.resize(most);
   return list;
 }

@@ -31,7 +31,7 @@ struct Quantity {
 };
 
 /// What rows of flights lie in.
-struct Surroundings {
+struct RowContext {
   std::vector<std::size_t> beats;          ///< of each flight
   std::vector<double> beats_Hz;            ///< of each flight
   std::vector<std::vector<char>> covered;  ///< [flight][beat][channel]
@@ -41,11 +41,11 @@ struct Surroundings {
     return covered[flight][beat * kChannels + static_cast<std::size_t>(channel)] != 0;
   }
 };
-Surroundings surroundings_of(const std::vector<CarriedFlight>& flights, std::vector<double> noise_sd);
+RowContext row_context_of(const std::vector<PredictedFlight>& flights, std::vector<double> noise_sd);
 
 /// One line. `gap` and `noise_floor`: rms of the rows, and what it would be of noise alone, in the channel's unit; of an input, of what is
 /// proportional to it.
-struct Place {
+struct GapLocation {
   std::string stage, test;
   int channel = 0;
   std::string regime;
@@ -55,9 +55,10 @@ struct Place {
 const char* channel_unit(int channel);
 
 /// All lines of one stage. `residual` may lack flights that a vehicle did not survive.
-std::vector<Place> locate(const Surroundings& around, const Signature& residual, const std::string& stage);
+std::vector<GapLocation> locate(const RowContext& around, const Residuals& residual, const std::string& stage);
 
 /// Of a stage, discoveries that say where, the largest beside its noise first.
-std::vector<Place> largest_discoveries(const std::vector<Place>& places, const std::string& stage, std::size_t most);
+std::vector<GapLocation> largest_discoveries(const std::vector<GapLocation>& places, const std::string& stage,
+                                             std::size_t most);
 
 }  // namespace flappy::gap

@@ -42,9 +42,9 @@ Recording::Recording(const std::filesystem::path& folder, flightlog::FlightLog f
       least_z_m(flight_log.header.ambient.ground_z_m + nominal.extent.below_m + kLeastClearance_m),
       density_ratio(flight_log.header.ambient.air_density_kg_m3 / nominal.air_density_kg_m3),
       log(std::move(flight_log)),
-      track(log, folder),
-      begin_s(std::max(track.begin_s(), log.command.t_s.front()) + kMargin_s),
-      last_s(std::min(track.end_s(), log.command.t_s.back()) - kMargin_s) {
+      smoother(log, folder),
+      begin_s(std::max(smoother.begin_s(), log.command.t_s.front()) + kMargin_s),
+      last_s(std::min(smoother.end_s(), log.command.t_s.back()) - kMargin_s) {
   prepare(folder.string());
 }
 
@@ -53,7 +53,7 @@ Recording::Recording(const Recording& other, flightlog::FlightLog flight_log)
       least_z_m(other.least_z_m),
       density_ratio(other.density_ratio),
       log(std::move(flight_log)),
-      track(log, other.name),
+      smoother(log, other.name),
       begin_s(other.begin_s),
       last_s(other.last_s) {
   prepare(name);
@@ -71,31 +71,32 @@ void Recording::prepare(const std::string& place) {
 }
 
 void Recording::lay_grid() {
-  const std::vector<double>& bounds = track.bounds_s();
+  const std::vector<double>& bounds = smoother.bounds_s();
   const double usual_s = 1 / log.header.imu.rate_hz;
-  const auto first = static_cast<std::size_t>(std::ranges::lower_bound(bounds, begin_s - kStep_s / 2) - bounds.begin());
+  const auto first =
+      static_cast<std::size_t>(std::ranges::lower_bound(bounds, begin_s - kPredictionStep_s / 2) - bounds.begin());
   if (first >= bounds.size() || bounds[first] >= last_s) return;
   begin_s = bounds[first];
   double now_s = begin_s;
-  torso.push_back(torso_at(track.at(std::max(begin_s, track.begin_s()))));
+  torso.push_back(torso_at(smoother.at(std::max(begin_s, smoother.begin_s()))));
   const std::vector<std::pair<double, double>> undriven = undriven_s();
-  for (std::size_t k = first + 1; k < bounds.size() && bounds[k] <= last_s + kStep_s / 2; ++k) {
+  for (std::size_t k = first + 1; k < bounds.size() && bounds[k] <= last_s + kPredictionStep_s / 2; ++k) {
     // a gap is flown in pieces, so that the torso stays on its record
     const int pieces = std::max(1, static_cast<int>(std::lround((bounds[k] - now_s) / usual_s)));
     for (int i = pieces; i > 0; --i) {
-      const int n = static_cast<int>(std::lround((bounds[k] - now_s) / i / kStep_s));
+      const int n = static_cast<int>(std::lround((bounds[k] - now_s) / i / kPredictionStep_s));
       if (n == 0) continue;
       const double from_s = now_s;
-      now_s += n * kStep_s;
-      const double at_s = std::min(now_s, track.end_s());
+      now_s += n * kPredictionStep_s;
+      const double at_s = std::min(now_s, smoother.end_s());
       steps.push_back(n);
       end_s.push_back(now_s);
-      torso.push_back(torso_at(track.at(at_s)));
-      force_m_s2.push_back(track.mean_force_m_s2(from_s, now_s));
+      torso.push_back(torso_at(smoother.at(at_s)));
+      force_m_s2.push_back(smoother.mean_force_m_s2(from_s, now_s));
       const bool flies = torso.back().position_m[2] > least_z_m;
       const bool driven =
           std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
-      valid.push_back(flies && driven && track.covers(std::max(from_s, track.begin_s()), at_s) ? 1 : 0);
+      valid.push_back(flies && driven && smoother.covers(std::max(from_s, smoother.begin_s()), at_s) ? 1 : 0);
     }
   }
 }
@@ -116,8 +117,8 @@ std::vector<std::pair<double, double>> Recording::undriven_s() const {
 void Recording::read_voltages() {
   std::size_t total = 0;
   for (const int n : steps) total += static_cast<std::size_t>(n);
-  sim::step_voltages({log.command.t_s, log.command.left_voltage_V, log.command.right_voltage_V}, begin_s, kStep_s,
-                     total, left_V, right_V);
+  sim::step_voltages({log.command.t_s, log.command.left_voltage_V, log.command.right_voltage_V}, begin_s,
+                     kPredictionStep_s, total, left_V, right_V);
   if (!log.power) return;
   const flightlog::Column& battery_V = log.power->battery_V;
   const std::size_t n = std::min<std::size_t>(kFirstSamples, battery_V.size());

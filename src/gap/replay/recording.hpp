@@ -8,12 +8,12 @@
 
 #include "flappy/vehicle.hpp"
 #include "flightlog/flight_log.hpp"
-#include "flightlog/track.hpp"
-#include "gap/replay/carry_kernel.hpp"
+#include "flightlog/smoother.hpp"
+#include "gap/replay/reset_kernel.hpp"
 
 namespace flappy::gap {
 
-inline constexpr double kStep_s = 1e-4;
+inline constexpr double kPredictionStep_s = 1e-4;
 /// Beats until wings that were at rest have forgotten it: after three, thirty times the noise remains.
 inline constexpr double kSpinUpBeats = 6;
 /// Lower than this over its stand a vehicle may still be touching the ground, which no hypothesis knows.
@@ -34,7 +34,7 @@ struct Recording {
   /// robot's affair.
   double full = 1;
   flightlog::FlightLog log;
-  flightlog::Track track;
+  flightlog::Smoother smoother;
   sim::World world;
 
   // the grid: intervals of the IMU on whole physics steps
@@ -56,7 +56,7 @@ struct Recording {
   /// The same flight, from the same beat to the same beat, with another log of it: one whose sensors were corrected.
   Recording(const Recording& other, flightlog::FlightLog flight_log);
 
-  double interval_s(std::size_t k) const { return steps[k] * kStep_s; }
+  double interval_s(std::size_t k) const { return steps[k] * kPredictionStep_s; }
   std::size_t intervals() const { return steps.size(); }
   /// Whole beats since the start, and the phase, at any time.
   double beat_at(double t_s) const;

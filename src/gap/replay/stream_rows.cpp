@@ -74,7 +74,7 @@ std::vector<StreamRow> differences(const Recording& r, const std::vector<double>
     row.valid = true;
     row.path_m_s2 = (mean(j + kSpan, 0) - 2 * mean(j, 0) + mean(j - kSpan, 0)) / (span_s * span_s);
     // in W, for there what has drifted apart stays as it is while the body turns
-    row.turn_rad_s = r.track.at(r.regimes[j].t_s).attitude.conjugate() *
+    row.turn_rad_s = r.smoother.at(r.regimes[j].t_s).attitude.conjugate() *
                      Vector3d((mean(j + kSpan, 3) - mean(j - kSpan, 3)) / (2 * span_s));
     sum += row.turn_rad_s;
     n += 1;
@@ -89,11 +89,11 @@ std::vector<StreamRow> differences(const Recording& r, const std::vector<double>
 std::vector<StreamRow> stream_rows(const Recording& r) {
   const flightlog::MocapStream& m = r.log.mocap;
   const double late_s = r.log.header.mocap.latency_s;
-  const Vector3d bias = r.track.gyro_bias_rad_s((r.begin_s + r.last_s) / 2);
+  const Vector3d bias = r.smoother.gyro_bias_rad_s((r.begin_s + r.last_s) / 2);
   std::vector<Vector3d> turn;
   double from_s = r.begin_s;
   for (std::size_t k = 0; k < r.intervals(); ++k) {
-    turn.push_back(r.track.mean_rate_rad_s(from_s, r.end_s[k]) * r.interval_s(k) - bias * r.interval_s(k));
+    turn.push_back(r.smoother.mean_rate_rad_s(from_s, r.end_s[k]) * r.interval_s(k) - bias * r.interval_s(k));
     from_s = r.end_s[k];
   }
   const Reckoned x = reckon(r, r.force_m_s2, turn, r.world.gravity_m_s2);
@@ -107,7 +107,7 @@ std::vector<StreamRow> stream_rows(const Recording& r) {
     const Vector3d a = (x.velocity_m_s[k + 1] - x.velocity_m_s[k]) / (x.t_s[k + 1] - x.t_s[k]);
     const Quaterniond reckoned = x.attitude[k].slerp(share, x.attitude[k + 1]);
     const Quaterniond seen(m.qw[i], m.qx[i], m.qy[i], m.qz[i]);
-    const Vector3d path = Vector3d(m.x_m[i], m.y_m[i], m.z_m[i]) + r.track.at(t_s).attitude * arm -
+    const Vector3d path = Vector3d(m.x_m[i], m.y_m[i], m.z_m[i]) + r.smoother.at(t_s).attitude * arm -
                           (x.position_m[k] + dt * x.velocity_m_s[k] + dt * dt / 2 * a);
     const Vector3d off = flightlog::logarithm(seen * reckoned.conjugate());
     pose_s.push_back(t_s);

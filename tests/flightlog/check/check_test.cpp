@@ -8,7 +8,7 @@
 #include "flightlog/check/synthetic_log.hpp"
 #include "flightlog/rotation.hpp"
 
-namespace flappy::gap {
+namespace flappy::flightlog {
 namespace {
 
 using Eigen::Quaterniond, Eigen::Vector3d;
@@ -91,7 +91,7 @@ TEST(Check, FindsNothingInGoodLogs) {
 
 // Of a rate on a line from sample to sample, against steps a thousand times as fine; what is left is of the fourth order
 // in the turn of an interval, 0.06 rad, and of the finer steps.
-TEST(Motion, TurnsAsTheGyroSays) {
+TEST(SensorMotion, TurnsAsTheGyroSays) {
   FlightLog log = synthetic_log({.duration_s = 1});
   flightlog::ImuStream& s = log.imu;
   for (std::size_t i = 0; i < s.t_s.size(); ++i) {
@@ -99,7 +99,7 @@ TEST(Motion, TurnsAsTheGyroSays) {
     const double beat = 2 * std::numbers::pi * 34 * static_cast<double>(i) / 200;
     s.gyro_x_rad_s[i] = 12 * std::cos(beat), s.gyro_y_rad_s[i] = 12 * std::sin(beat), s.gyro_z_rad_s[i] = 0.5;
   }
-  const flightlog::Motion motion(log);
+  const flightlog::SensorMotion motion(log);
   const double begin_s = 0.1013, end_s = begin_s + 4.0 / 34, step_s = 5e-6;
   Quaterniond turn = Quaterniond::Identity();
   for (double t = begin_s; t < end_s; t += step_s) {
@@ -372,4 +372,4 @@ TEST(Check, NamesFaultsOfPowerAndWings) {
 }
 
 }  // namespace
-}  // namespace flappy::gap
+}  // namespace flappy::flightlog

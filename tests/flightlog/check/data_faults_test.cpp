@@ -10,7 +10,7 @@
 #include "flightlog/check/synthetic_log.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::gap {
+namespace flappy::flightlog {
 namespace {
 
 using flightlog::Column;
@@ -259,4 +259,4 @@ TEST(DataFaults, AShortFlightIsNone) {
 }
 
 }  // namespace
-}  // namespace flappy::gap
+}  // namespace flappy::flightlog

@@ -9,7 +9,7 @@
 
 #include "flightlog/flight_log.hpp"
 
-namespace flappy::gap {
+namespace flappy::flightlog {
 
 struct SyntheticMotion {
   double duration_s = 20, rotation = 1, translation = 1;  ///< sizes
@@ -173,4 +173,4 @@ class Synthesis {
 
 inline flightlog::FlightLog synthetic_log(const SyntheticMotion& motion = {}) { return Synthesis(motion).log(); }
 
-}  // namespace flappy::gap
+}  // namespace flappy::flightlog

@@ -27,19 +27,19 @@ sim::Randomisation uncertain() {
 }
 
 /// Eight seconds: take-off and hover, the last five under multisines.
-std::vector<CarriedFlight> flown(const std::string& vehicle, const std::vector<std::string>& overrides = {}) {
+std::vector<PredictedFlight> flown(const std::string& vehicle, const std::vector<std::string>& overrides = {}) {
   flight::Folder folder;
   rollout::FlyOptions options;
   options.log_folder = folder / "flight";
   std::vector<std::string> all = {"vehicle=../vehicles/" + vehicle + ".toml", "flight.duration_s=8"};
   all.insert(all.end(), overrides.begin(), overrides.end());
   rollout::fly(rollout::read_fly_config(kConfigs + "fly/identify_multisine.toml", all), options);
-  std::vector<CarriedFlight> flights;
+  std::vector<PredictedFlight> flights;
   flights.emplace_back(Recording(options.log_folder, flightlog::read_flight_log(options.log_folder), nominal()));
   return flights;
 }
 
-double rms(const CarriedFlight& f, const Rows& rows, int group) {
+double rms(const PredictedFlight& f, const Rows& rows, int group) {
   double sum = 0, n = 0;
   for (std::size_t j = 0; j < f.beats(); ++j)
     if (f.covers(j, group / kCoefficients)) {
@@ -73,7 +73,7 @@ TEST(BeatRows, ProjectAConstantAndItsHarmonics) {
 }
 
 TEST(Carried, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
-  const std::vector<CarriedFlight> flights = flown(
+  const std::vector<PredictedFlight> flights = flown(
       "hummingbird_nominal", {"log.power.battery_nominal_V=18", "log.power.rate_hz=500", "log.power.latency_s=0.001",
                               "log.power.voltage_noise_V=0.02", "log.power.current_noise_A=0.01"});
   const Candidate it{nominal(), 0};
@@ -94,7 +94,7 @@ TEST(Carried, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
 }
 
 TEST(Recording, FliesWhatWasDriven) {
-  const std::vector<CarriedFlight> flights = flown(
+  const std::vector<PredictedFlight> flights = flown(
       "hummingbird_nominal", {"log.power.battery_nominal_V=18", "log.power.rate_hz=500", "log.power.latency_s=0.001",
                               "log.power.voltage_noise_V=0.02", "log.power.current_noise_A=0.01"});
   const Recording& whole = flights[0].recording();
@@ -129,7 +129,7 @@ TEST(Recording, FliesWhatWasDriven) {
 
 // Of two effects that oppose each other each errs by 0.3 of what its sizes change; shapes are no more of it.
 TEST(Fit, EveryEquationErrsByItself) {
-  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
+  const std::vector<PredictedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
   const Evidence evidence(flights, read_model_discrepancy(), 2);
   const Fitter fitter(flights, evidence, 2);
   const sim::Randomisation prior = uncertain();
@@ -138,7 +138,7 @@ TEST(Fit, EveryEquationErrsByItself) {
   for (Index i = 0; i < h.size(); ++i) {
     const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
     if (i >= h.shared()) l.at[i] = u.effect == "ground_effect" ? 2 : -2;
-    l.columns.push_back(Smooth::Constant(kGroups, evidence.basis().size(), u.size ? 1 : 50));
+    l.columns.push_back(BasisCoefficients::Constant(kGroups, evidence.basis().size(), u.size ? 1 : 50));
   }
   ASSERT_EQ(h.size() - h.shared(), 3) << "two sizes and a length";
   EXPECT_NEAR(fitter.form_error(h, l).maxCoeff(), 0.3 * 2 * std::sqrt(2), 1e-12);
@@ -146,7 +146,7 @@ TEST(Fit, EveryEquationErrsByItself) {
 }
 
 TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
-  const std::vector<CarriedFlight> flights = flown("hummingbird_identified");
+  const std::vector<PredictedFlight> flights = flown("hummingbird_identified");
   const sim::Randomisation prior = uncertain();
   const Hypothesis plain(prior, {});
   Evidence evidence(flights, read_model_discrepancy(), 2);
@@ -198,9 +198,9 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
 }
 
 TEST(SensorEffects, AreTakenBack) {
-  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal");
+  const std::vector<PredictedFlight> flights = flown("hummingbird_nominal");
   const flightlog::FlightLog& log = flights[0].recording().log;
-  const auto mean_path = [](const CarriedFlight& f) {
+  const auto mean_path = [](const PredictedFlight& f) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     double n = 0;
     for (std::size_t j = 0; j < f.beats(); ++j)
@@ -213,7 +213,7 @@ TEST(SensorEffects, AreTakenBack) {
   };
   // a world that leans by e sees gravity lean: its path bends by -g e x z beyond what the accelerometer says
   const double e = 0.02, g = 9.81;
-  const CarriedFlight tilted = flights[0].with_log(without({{"mocap_tilt", {{"x_rad", -e}, {"y_rad", 0}}}}, log));
+  const PredictedFlight tilted = flights[0].with_log(without({{"mocap_tilt", {{"x_rad", -e}, {"y_rad", 0}}}}, log));
   const Eigen::Vector3d bend = mean_path(tilted) - mean_path(flights[0]);
   EXPECT_NEAR(bend.y(), g * e, 0.05 * g * e);
   EXPECT_NEAR(bend.x(), 0, 0.05 * g * e);
@@ -248,42 +248,43 @@ TEST(SensorEffects, AreTakenBack) {
 }
 
 TEST(Diagnose, StopsWithWhatItHas) {
-  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal");
+  const std::vector<PredictedFlight> flights = flown("hummingbird_nominal");
   DiagnoseOptions options;
   options.threads = 2;
   options.progress = [](double, const std::string&) { return false; };
   const Diagnosis d = diagnose(flights, uncertain(), options);
   EXPECT_FALSE(d.complete);
-  ASSERT_EQ(d.answers.size(), 3 + model::effects().size());
+  ASSERT_EQ(d.hypotheses.size(), 3 + model::effects().size());
   double sum = 0;
-  for (const Answer& a : d.answers) {
+  for (const ScoredHypothesis& a : d.hypotheses) {
     EXPECT_TRUE(a.left.empty());
     sum += a.probability;
   }
   EXPECT_NEAR(sum, 1, 1e-12);
-  EXPECT_EQ(d.answers[0].kind, Answer::Kind::none);
+  EXPECT_EQ(d.hypotheses[0].kind, ScoredHypothesis::Kind::none);
 }
 
 // Of one coefficient of the basis in one group: log p by hand, where it is a column, a floor, or may be larger than its floor.
 TEST(Evidence, IntegratesOutInClosedForm) {
-  const std::vector<CarriedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
+  const std::vector<PredictedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
   const Evidence evidence(flights, read_model_discrepancy(), 2);
   const Candidate it{nominal(), 0};
   Rows residual = flights[0].measured();
   const Rows predicted = flights[0].predict({&it})[0];
   for (std::size_t i = 0; i < residual.size(); ++i) residual[i] -= predicted[i];
-  const Statistics s = evidence.statistics({residual}), zero = evidence.statistics({Rows(residual.size(), 0)});
+  const SufficientStatistics s = evidence.statistics({residual}),
+                             zero = evidence.statistics({Rows(residual.size(), 0)});
   constexpr int kGroup = kForceX * kCoefficients + 1, kFunction = 2;
-  const Smooth none = Smooth::Zero(kGroups, evidence.basis().size());
-  Smooth unit = none;
+  const BasisCoefficients none = BasisCoefficients::Zero(kGroups, evidence.basis().size());
+  BasisCoefficients unit = none;
   unit(kGroup, kFunction) = 1;
-  Statistics of_unit = zero;
+  SufficientStatistics of_unit = zero;
   evidence.add(1, unit, of_unit);
   const double a = of_unit.sums[0][kGroup][kFunction], b = s.sums[0][kGroup][kFunction];
   const double sd = 2 / std::sqrt(a), m = 0.7;
-  const auto log_p = [&](const Smooth& eta_sd, bool column) {
-    const std::vector<const Smooth*> columns(column ? 1 : 0, &unit);
-    return Evidence::posterior(evidence.reduce(s, columns, {1}, eta_sd), std::vector<int>(column ? 1 : 0, 0),
+  const auto log_p = [&](const BasisCoefficients& discrepancy_sd, bool column) {
+    const std::vector<const BasisCoefficients*> columns(column ? 1 : 0, &unit);
+    return Evidence::posterior(evidence.reduce(s, columns, {1}, discrepancy_sd), std::vector<int>(column ? 1 : 0, 0),
                                Eigen::VectorXd::Constant(column ? 1 : 0, m))
         .log_evidence;
   };

@@ -21,11 +21,11 @@ sim::Randomisation uncertain() {
 }
 
 /// A set of effects at the coordinates of its sizes, everything known to `sd`.
-Answer answer(const sim::Randomisation& prior, const std::vector<std::string>& effects,
-              const std::vector<double>& sizes, double probability, double sd = 0.1) {
+ScoredHypothesis hypothesis(const sim::Randomisation& prior, const std::vector<std::string>& effects,
+                            const std::vector<double>& sizes, double probability, double sd = 0.1) {
   const Hypothesis h(prior, effects);
-  Answer a;
-  a.kind = effects.empty() ? Answer::Kind::parameters : Answer::Kind::effect;
+  ScoredHypothesis a;
+  a.kind = effects.empty() ? ScoredHypothesis::Kind::parameters : ScoredHypothesis::Kind::effect;
   a.effects = effects;
   a.probability = probability;
   a.fit.point.at = h.start();
@@ -37,10 +37,10 @@ Answer answer(const sim::Randomisation& prior, const std::vector<std::string>& e
   return a;
 }
 
-Diagnosis diagnosis(const sim::Randomisation& prior, std::vector<Answer> answers) {
+Diagnosis diagnosis(const sim::Randomisation& prior, std::vector<ScoredHypothesis> hypotheses) {
   Diagnosis d;
-  d.answers = std::move(answers);
-  d.parameters = answer(prior, {}, {}, 0).fit;
+  d.hypotheses = std::move(hypotheses);
+  d.parameters = hypothesis(prior, {}, {}, 0).fit;
   return d;
 }
 
@@ -57,7 +57,7 @@ TEST(NextExperiment, FliesWhereTheRivalsDiffer) {
   const auto choice = library({"ceiling_steps", "dash", "ground_steps", "wall_approach"});
   const auto best_for = [&](const char* effect, const char* manoeuvre) {
     const auto ranked = rank_experiments(
-        diagnosis(prior, {answer(prior, {effect}, {1}, 0.6), answer(prior, {}, {}, 0.4)}), prior, choice);
+        diagnosis(prior, {hypothesis(prior, {effect}, {1}, 0.6), hypothesis(prior, {}, {}, 0.4)}), prior, choice);
     ASSERT_EQ(ranked.size(), choice.size());
     EXPECT_EQ(ranked[0].manoeuvre, manoeuvre);
     EXPECT_GT(ranked[0].expected_nats, 2) << effect;
@@ -74,9 +74,9 @@ TEST(NextExperiment, NatsGrowWithTheSquareOfADifferenceAndShrinkWithWhatIsUncert
   const sim::Randomisation prior = uncertain();
   const auto ground = library({"ground_steps"});
   const auto of = [&](double size, double sd) {
-    return rank_experiments(
-               diagnosis(prior, {answer(prior, {"ground_effect"}, {size}, 0.5, sd), answer(prior, {}, {}, 0.5, sd)}),
-               prior, ground)[0]
+    return rank_experiments(diagnosis(prior, {hypothesis(prior, {"ground_effect"}, {size}, 0.5, sd),
+                                              hypothesis(prior, {}, {}, 0.5, sd)}),
+                            prior, ground)[0]
         .expected_nats;
   };
   const double small = of(0.02, 0.02), twice = of(0.04, 0.02);
@@ -94,12 +94,12 @@ TEST(NextExperiment, PairsCountByTheirProbabilities) {
   const sim::Randomisation prior = uncertain();
   const auto choice = library({"ceiling_steps", "ground_steps"});
   const auto rank = [&](double ground, double ceiling) {
-    Answer unknown;
-    unknown.kind = Answer::Kind::unknown;
+    ScoredHypothesis unknown;
+    unknown.kind = ScoredHypothesis::Kind::unknown;
     unknown.probability = 0.5;
     return rank_experiments(
-        diagnosis(prior, {unknown, answer(prior, {}, {}, 0.4), answer(prior, {"ground_effect"}, {1}, ground),
-                          answer(prior, {"ceiling_effect"}, {1}, ceiling)}),
+        diagnosis(prior, {unknown, hypothesis(prior, {}, {}, 0.4), hypothesis(prior, {"ground_effect"}, {1}, ground),
+                          hypothesis(prior, {"ceiling_effect"}, {1}, ceiling)}),
         prior, choice);
   };
   EXPECT_EQ(rank(0.09, 0.01)[0].manoeuvre, "ground_steps");
@@ -110,8 +110,9 @@ TEST(NextExperiment, PairsCountByTheirProbabilities) {
 TEST(NextExperiment, ProposesNothingWithoutRivalsOrWhereOneIsLost) {
   const sim::Randomisation prior = uncertain();
   auto choice = library({"ground_steps"});
-  EXPECT_TRUE(rank_experiments(diagnosis(prior, {answer(prior, {}, {}, 1)}), prior, choice).empty());
-  const Diagnosis d = diagnosis(prior, {answer(prior, {"ground_effect"}, {1}, 0.6), answer(prior, {}, {}, 0.4)});
+  EXPECT_TRUE(rank_experiments(diagnosis(prior, {hypothesis(prior, {}, {}, 1)}), prior, choice).empty());
+  const Diagnosis d =
+      diagnosis(prior, {hypothesis(prior, {"ground_effect"}, {1}, 0.6), hypothesis(prior, {}, {}, 0.4)});
   choice[0].config.fleet.task.path.back().coefficients[0][0] = 2;  // metres, at once
   EXPECT_TRUE(rank_experiments(d, prior, choice).empty());
 }

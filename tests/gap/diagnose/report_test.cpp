@@ -24,16 +24,16 @@ namespace {
 
 const std::string kConfigs = FLAPPY_SOURCE_DIR "/configs/";
 
-Answer answer(double probability, std::vector<std::string> effects) {
-  Answer a;
-  a.kind = Answer::Kind::effect;
+ScoredHypothesis hypothesis(double probability, std::vector<std::string> effects) {
+  ScoredHypothesis a;
+  a.kind = ScoredHypothesis::Kind::effect;
   a.effects = std::move(effects);
   a.probability = probability;
   return a;
 }
 
-Answer answer(double probability, Answer::Kind kind) {
-  Answer a;
+ScoredHypothesis hypothesis(double probability, ScoredHypothesis::Kind kind) {
+  ScoredHypothesis a;
   a.kind = kind;
   a.probability = probability;
   return a;
@@ -41,27 +41,31 @@ Answer answer(double probability, Answer::Kind kind) {
 
 // ---- verdict
 
-Conclusion conclude(const std::vector<Answer>& answers) { return gap::conclude(answers, read_verdict_rule()); }
+Conclusion conclude(const std::vector<ScoredHypothesis>& hypotheses) {
+  return gap::conclude(hypotheses, read_verdict_rule());
+}
 
 TEST(Verdict, IsNotSureOfEntries) {
-  const auto weighed = [](double log_evidence, Answer a) {
+  const auto weighed = [](double log_evidence, ScoredHypothesis a) {
     a.log_evidence = log_evidence;
     return a;
   };
-  std::vector<Answer> all = {weighed(-1000, answer(0, Answer::Kind::parameters)),
-                             weighed(-1000, answer(0, Answer::Kind::unknown)), weighed(-900, answer(0, {"body_drag"})),
-                             weighed(-800, answer(0, {"wind"}))};
+  std::vector<ScoredHypothesis> all = {weighed(-1000, hypothesis(0, ScoredHypothesis::Kind::parameters)),
+                                       weighed(-1000, hypothesis(0, ScoredHypothesis::Kind::unknown)),
+                                       weighed(-900, hypothesis(0, {"body_drag"})),
+                                       weighed(-800, hypothesis(0, {"wind"}))};
   set_probabilities(all, read_verdict_rule());
   // 0.06 of what entries hold goes to an unknown cause, 0.06 to both entries alike
   EXPECT_EQ(all[0].effects, std::vector<std::string>{"wind"});
   EXPECT_NEAR(all[0].probability, 0.88 + 0.03, 1e-12);
-  EXPECT_EQ(all[1].kind, Answer::Kind::unknown);
+  EXPECT_EQ(all[1].kind, ScoredHypothesis::Kind::unknown);
   EXPECT_NEAR(all[1].probability, 0.06, 1e-12);
   EXPECT_NEAR(all[2].probability, 0.03, 1e-12);
   EXPECT_NEAR(all[3].probability, 0, 1e-12);
-  // what other answers hold stays
-  all = {weighed(std::log(0.7), answer(0, Answer::Kind::parameters)), weighed(std::log(0.3), answer(0, {"wind"})),
-         weighed(-1000, answer(0, Answer::Kind::unknown))};
+  // what other hypotheses hold stays
+  all = {weighed(std::log(0.7), hypothesis(0, ScoredHypothesis::Kind::parameters)),
+         weighed(std::log(0.3), hypothesis(0, {"wind"})),
+         weighed(-1000, hypothesis(0, ScoredHypothesis::Kind::unknown))};
   set_probabilities(all, read_verdict_rule());
   EXPECT_NEAR(all[0].probability, 0.7, 1e-12);
   EXPECT_NEAR(all[1].probability, 0.3 * 0.94, 1e-12);
@@ -69,53 +73,57 @@ TEST(Verdict, IsNotSureOfEntries) {
 }
 
 TEST(Verdict, NamesTheLargestMass) {
-  const Conclusion c = conclude({answer(0.6, {"wind"}), answer(0.3, Answer::Kind::parameters),
-                                 answer(0.06, Answer::Kind::none), answer(0.04, Answer::Kind::unknown)});
+  const Conclusion c =
+      conclude({hypothesis(0.6, {"wind"}), hypothesis(0.3, ScoredHypothesis::Kind::parameters),
+                hypothesis(0.06, ScoredHypothesis::Kind::none), hypothesis(0.04, ScoredHypothesis::Kind::unknown)});
   EXPECT_EQ(c.kind, Conclusion::Kind::effect);
   EXPECT_EQ(c.effects, std::vector<std::string>{"wind"});
   EXPECT_EQ(c.probability, 0.6);
-  EXPECT_EQ(c.answer, 0u);
-  EXPECT_EQ(conclude({answer(0.4, {"wind"}), answer(0.6, Answer::Kind::none)}).kind, Conclusion::Kind::none);
-  EXPECT_EQ(conclude({answer(0.4, {"wind"}), answer(0.6, Answer::Kind::unknown)}).kind, Conclusion::Kind::unknown);
-  EXPECT_EQ(conclude({answer(0.4, {"wind"}), answer(0.6, Answer::Kind::parameters)}).answer, 1u);
+  EXPECT_EQ(c.hypothesis, 0u);
+  EXPECT_EQ(conclude({hypothesis(0.4, {"wind"}), hypothesis(0.6, ScoredHypothesis::Kind::none)}).kind,
+            Conclusion::Kind::none);
+  EXPECT_EQ(conclude({hypothesis(0.4, {"wind"}), hypothesis(0.6, ScoredHypothesis::Kind::unknown)}).kind,
+            Conclusion::Kind::unknown);
+  EXPECT_EQ(conclude({hypothesis(0.4, {"wind"}), hypothesis(0.6, ScoredHypothesis::Kind::parameters)}).hypothesis, 1u);
 }
 
 TEST(Verdict, PoolsRivals) {
   // together they outweigh the parameters, and neither is clear
-  const Conclusion c = conclude({answer(0.4, Answer::Kind::parameters), answer(0.3, {"rotational_lift"}),
-                                 answer(0.25, {"wake_capture"}), answer(0.05, Answer::Kind::none)});
+  const Conclusion c =
+      conclude({hypothesis(0.4, ScoredHypothesis::Kind::parameters), hypothesis(0.3, {"rotational_lift"}),
+                hypothesis(0.25, {"wake_capture"}), hypothesis(0.05, ScoredHypothesis::Kind::none)});
   EXPECT_EQ(c.kind, Conclusion::Kind::group);
   EXPECT_EQ(c.effects, (std::vector<std::string>{"rotational_lift", "wake_capture"}));
   EXPECT_DOUBLE_EQ(c.probability, 0.55);
-  EXPECT_EQ(c.answer, 1u);
+  EXPECT_EQ(c.hypothesis, 1u);
   // effects without a group are no rivals of each other
-  EXPECT_EQ(
-      conclude({answer(0.4, Answer::Kind::parameters), answer(0.3, {"body_drag"}), answer(0.3, {"clap_and_fling"})})
-          .kind,
-      Conclusion::Kind::parameters);
+  EXPECT_EQ(conclude({hypothesis(0.4, ScoredHypothesis::Kind::parameters), hypothesis(0.3, {"body_drag"}),
+                      hypothesis(0.3, {"clap_and_fling"})})
+                .kind,
+            Conclusion::Kind::parameters);
 }
 
 TEST(Verdict, NamesAMemberThatIsClear) {
   // half of everything
-  Conclusion c = conclude({answer(0.51, {"rotational_lift"}), answer(0.49, {"wake_capture"})});
+  Conclusion c = conclude({hypothesis(0.51, {"rotational_lift"}), hypothesis(0.49, {"wake_capture"})});
   EXPECT_EQ(c.kind, Conclusion::Kind::effect);
   EXPECT_EQ(c.probability, 0.51);
   // four fifths of its pool
-  c = conclude({answer(0.41, {"rotational_lift"}), answer(0.09, {"wake_capture"}), answer(0.3, {"body_drag"}),
-                answer(0.2, {"clap_and_fling"})});
+  c = conclude({hypothesis(0.41, {"rotational_lift"}), hypothesis(0.09, {"wake_capture"}),
+                hypothesis(0.3, {"body_drag"}), hypothesis(0.2, {"clap_and_fling"})});
   EXPECT_EQ(c.kind, Conclusion::Kind::effect);
   EXPECT_EQ(c.effects, std::vector<std::string>{"rotational_lift"});
   // what holds less than a twentieth of a pool is no member
-  c = conclude({answer(0.3, {"ground_effect"}), answer(0.28, {"battery_sag"}), answer(0.02, {"ceiling_effect"}),
-                answer(0.4, Answer::Kind::none)});
+  c = conclude({hypothesis(0.3, {"ground_effect"}), hypothesis(0.28, {"battery_sag"}),
+                hypothesis(0.02, {"ceiling_effect"}), hypothesis(0.4, ScoredHypothesis::Kind::none)});
   EXPECT_EQ(c.effects, (std::vector<std::string>{"ground_effect", "battery_sag"}));
 }
 
 TEST(Verdict, PoolsSetsByTheGroupsOfTheirEffects) {
   EXPECT_EQ(pool_name({"wind", "body_drag"}), pool_name({"body_drag", "tether"}));
   EXPECT_NE(pool_name({"wind"}), pool_name({"wind", "tether"}));
-  const Conclusion c =
-      conclude({answer(0.3, {"wind", "body_drag"}), answer(0.28, {"body_drag", "tether"}), answer(0.42, {"wind"})});
+  const Conclusion c = conclude(
+      {hypothesis(0.3, {"wind", "body_drag"}), hypothesis(0.28, {"body_drag", "tether"}), hypothesis(0.42, {"wind"})});
   EXPECT_EQ(c.kind, Conclusion::Kind::group);
   EXPECT_EQ(c.effects, (std::vector<std::string>{"wind", "body_drag", "tether"}));
 }
@@ -150,9 +158,9 @@ TEST(Verdict, WidensSizesAndShapes) {
   EXPECT_NEAR(fit.covariance()(shape, shape), 1.96 * 0.04, 1e-12);
   EXPECT_NEAR(fit.covariance()(size, shape), 1.96 * 0.01, 1e-12);
   EXPECT_NEAR(fit.covariance()(0, 0), 0.04, 1e-12) << "parameters stay";
-  Answer a = answer(1, {"ground_effect"});
+  ScoredHypothesis a = hypothesis(1, {"ground_effect"});
   a.fit = fit;
-  const Size gain = sizes_of(a, uncertain)[0];  // 90 % of the prior up to 0.45
+  const SizeEstimate gain = sizes_of(a, uncertain)[0];  // 90 % of the prior up to 0.45
   EXPECT_NEAR(gain.value, 2 * 0.45 / 1.645, 1e-12);
   EXPECT_NEAR(gain.high - gain.low, 2 * 0.45 * std::sqrt(0.1184), 1e-12);
 }

@@ -136,8 +136,8 @@ TEST(Significance, BandsAddUpToTheSumOfSquares) {
 
 /// Three flights of noise of sd 2 in every row, remembered as given, sorted by one quantity and driven by one input.
 struct Flown {
-  Surroundings around;
-  Signature residual;
+  RowContext around;
+  Residuals residual;
 };
 Flown flown(unsigned seed, double past) {
   constexpr std::size_t kBeats = 340;
@@ -166,8 +166,9 @@ Flown flown(unsigned seed, double past) {
   return f;
 }
 
-const Place& place(const std::vector<Place>& places, const std::string& test, int channel, const std::string& regime) {
-  for (const Place& p : places)
+const GapLocation& place(const std::vector<GapLocation>& places, const std::string& test, int channel,
+                         const std::string& regime) {
+  for (const GapLocation& p : places)
     if (p.test == test && p.channel == channel && p.regime.starts_with(regime)) return p;
   ADD_FAILURE() << test << " " << regime;
   return places.front();
@@ -178,7 +179,7 @@ TEST(Where, FindsNothingInNoise) {
   std::map<std::string, std::pair<double, double>> low;  // p below 0.05, of all
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const Flown f = flown(seed, 0.3);
-    for (const Place& p : locate(f.around, f.residual, "refit")) {
+    for (const GapLocation& p : locate(f.around, f.residual, "refit")) {
       found += p.discovered;
       low[p.test].first += p.p_value < 0.05;
       low[p.test].second += 1;
@@ -197,8 +198,8 @@ TEST(Where, FindsWhatDependsOnHeight) {
   for (std::size_t flight = 0; flight < 3; ++flight)
     for (std::size_t j = 0; j < 340; ++j)
       if (low(flight, j)) f.residual[flight][j * kRowsPerBeat + group_of(kForceZ, 0)] += 6;
-  const std::vector<Place> places = locate(f.around, f.residual, "refit");
-  const Place& below = place(places, "regime", kForceZ, "height below");
+  const std::vector<GapLocation> places = locate(f.around, f.residual, "refit");
+  const GapLocation& below = place(places, "regime", kForceZ, "height below");
   EXPECT_TRUE(below.discovered);
   EXPECT_LT(below.p_value, 1e-5);
   // noise in all nine coefficients: 4 (1 + 8/2); 36 of the offset beside
@@ -214,7 +215,7 @@ TEST(Where, FindsWhatDependsOnHeight) {
   EXPECT_TRUE(place(places, "whiteness", kForceZ, "means").discovered);
   EXPECT_FALSE(place(places, "whiteness", kForceY, "means").discovered);
   // the largest beside its noise comes first, of what says where
-  const std::vector<Place> largest = largest_discoveries(places, "refit", 2);
+  const std::vector<GapLocation> largest = largest_discoveries(places, "refit", 2);
   ASSERT_EQ(largest.size(), 2u);
   EXPECT_EQ(largest[0].channel, kForceZ);
   EXPECT_GE(largest[0].gap / largest[0].noise_floor, largest[1].gap / largest[1].noise_floor);
@@ -226,8 +227,8 @@ TEST(Where, FindsWhatFollowsAnInput) {
   for (std::size_t flight = 0; flight < 3; ++flight)
     for (std::size_t j = 0; j < 340; ++j)
       f.residual[flight][j * kRowsPerBeat + group_of(kTorqueY, 1)] += f.around.inputs[0].values[flight][j];
-  const std::vector<Place> places = locate(f.around, f.residual, "refit");
-  const Place& p = place(places, "input", kTorqueY, "input");
+  const std::vector<GapLocation> places = locate(f.around, f.residual, "refit");
+  const GapLocation& p = place(places, "input", kTorqueY, "input");
   EXPECT_TRUE(p.discovered);
   EXPECT_NEAR(p.gap, std::sqrt(0.5), 0.2) << "a cosine of amplitude 1 and input of rms 1";
   EXPECT_FALSE(place(places, "input", kTorqueX, "input").discovered);
@@ -237,7 +238,7 @@ TEST(Where, LeavesOutWhatIsNotCovered) {
   Flown f = flown(1, 0);
   for (auto& covered : f.around.covered)
     for (std::size_t j = 0; j < 340; ++j) covered[j * kChannels + kStrokeLeft] = 0;
-  for (const Place& p : locate(f.around, f.residual, "refit")) EXPECT_NE(p.channel, kStrokeLeft);
+  for (const GapLocation& p : locate(f.around, f.residual, "refit")) EXPECT_NE(p.channel, kStrokeLeft);
   f.residual[1].clear();
   EXPECT_FALSE(locate(f.around, f.residual, "refit").empty()) << "a vehicle that came apart in one flight";
 }
@@ -262,7 +263,7 @@ TEST(Closure, LossesOfNoiseAreTheFloor) {
   // half of 1.2e5 rows are of nine coefficients; the loss of one has sd 0.55, so the mean 0.003
   EXPECT_NEAR(*l.mean(), huber_floor(), 0.01);
   EXPECT_EQ(l.sum.size(), 3u * 43u) << "blocks do not cross flights";
-  Signature apart = f.residual;
+  Residuals apart = f.residual;
   apart[2].clear();
   EXPECT_FALSE(losses_of(f.around, apart).mean());
 }

@@ -55,10 +55,10 @@ class Plan {
   std::vector<Step> steps_;
 };
 
-class Pilot {
+class RobotController {
  public:
-  Pilot(const model::Driver& driver, std::uint64_t seed, std::uint64_t flight);
-  ~Pilot();
+  RobotController(const model::Driver& driver, std::uint64_t seed, std::uint64_t flight);
+  ~RobotController();
   /// Once each control period.
   Inputs steer(const Torso& torso, const Aim& aim, const Inputs& excitation);
   /// Of one motor at a fraction of the beat in [0, 1).

@@ -14,11 +14,11 @@ struct Crash {
   std::string how;
 };
 
-struct Drawn {
+struct SampledRobot {
   Case flown;               ///< with the vehicle and the seed of the draw
   std::uint64_t draw = 0;   ///< which of the seed's
   std::vector<Crash> lost;  ///< of the draws before
-  std::vector<Flight> flights;
+  std::vector<RobotFlight> flights;
 };
 
 /// The robot as its file declares it. InputError where the file has effects.
@@ -33,9 +33,9 @@ class NeverFlies : public io::InputError {
 inline constexpr std::uint64_t kTries = 20;  ///< robots drawn until one does not crash
 
 /// One draw of a seed's. `c`: what all draws share.
-Case drawn_case(Case c, const sim::Randomisation& randomisation, std::uint64_t seed, std::uint64_t draw);
+Case sampled_case(Case c, const sim::Randomisation& randomisation, std::uint64_t seed, std::uint64_t draw);
 
 /// `c`: what all draws share. The same bytes for the same seed. NeverFlies after 20 draws.
-Drawn fly_drawn(Case c, const sim::Randomisation& randomisation, std::uint64_t seed);
+SampledRobot fly_sampled(Case c, const sim::Randomisation& randomisation, std::uint64_t seed);
 
 }  // namespace flappy::blind

@@ -1,6 +1,6 @@
 // The smoothed motion of a flight against motions that are known: made up, with sensors made of them by their definition,
 // and simulated.
-#include "flightlog/track.hpp"
+#include "flightlog/smoother.hpp"
 
 #include <gtest/gtest.h>
 
@@ -126,11 +126,11 @@ flightlog::FlightHeader header(double imu_late_s) {
 struct Off {
   double position_m = 0, angle_rad = 0, velocity_m_s = 0, rate_rad_s = 0;
 };
-Off largest_off(const flightlog::Track& track, double from_s, double to_s) {
+Off largest_off(const flightlog::Smoother& smoother, double from_s, double to_s) {
   const Motions m;
   Off off;
   for (double t = from_s; t < to_s; t += 3.7e-4) {
-    const flightlog::TorsoMotion x = track.at(t);
+    const flightlog::TorsoMotion x = smoother.at(t);
     off.position_m = std::max(off.position_m, (x.position_m - m.position(t)).norm());
     off.angle_rad = std::max(off.angle_rad, rotation_vector(x.attitude.conjugate() * m.attitude(t)).norm());
     off.velocity_m_s = std::max(off.velocity_m_s, (x.velocity_m_s - m.velocity(t)).norm());
@@ -139,27 +139,27 @@ Off largest_off(const flightlog::Track& track, double from_s, double to_s) {
   return off;
 }
 
-TEST(Track, OfPerfectSensorsIsTheMotion) {
+TEST(Smoother, OfPerfectSensorsIsTheMotion) {
   // The largest rate of the shaking is 6.4 rad/s, its slope 1,370 rad/s^2, and in roll 1.7 rad/s at 68 Hz; a quadratic on
   // 2 ms is off by 3e-3 of the first and 2e-2 of the second, and a mean over a turning interval by T^2/12 w x w' = 3e-3.
   // Nothing else is off: a millisecond would be 1.4 rad/s, the arm 20 mm and 0.1 m/s.
   for (const double late_s : {0.0, 0.004}) {
     const flightlog::FlightLog log =
         Sensors(1).log(header(late_s), 4, {{0.02, -0.03, 0.01}, Vector3d::Zero()}, false, late_s);
-    const flightlog::Track track(log, "flight");
-    EXPECT_NEAR(track.begin_s(), 0.003, 1e-9);
-    const Off off = largest_off(track, 0.5, 3.5);
+    const flightlog::Smoother smoother(log, "flight");
+    EXPECT_NEAR(smoother.begin_s(), 0.003, 1e-9);
+    const Off off = largest_off(smoother, 0.5, 3.5);
     EXPECT_LT(off.position_m, 1e-5);
     EXPECT_LT(off.angle_rad, 3e-4);
     EXPECT_LT(off.velocity_m_s, 2e-3);
     EXPECT_LT(off.rate_rad_s, 0.05);
-    EXPECT_LT((track.gyro_bias_rad_s(2) - Vector3d(0.02, -0.03, 0.01)).norm(), 1e-3);
-    EXPECT_LT(track.angle_surprise(), 0.05);
-    EXPECT_LT(track.position_surprise(), 0.05);
+    EXPECT_LT((smoother.gyro_bias_rad_s(2) - Vector3d(0.02, -0.03, 0.01)).norm(), 1e-3);
+    EXPECT_LT(smoother.angle_normalised_innovation(), 0.05);
+    EXPECT_LT(smoother.position_normalised_innovation(), 0.05);
   }
 }
 
-TEST(Track, UndoesADeclaredLowPass) {
+TEST(Smoother, UndoesADeclaredLowPass) {
   ImuSensor imu;
   imu.rate_hz = 500;
   imu.low_pass_hz = 80;
@@ -169,20 +169,20 @@ TEST(Track, UndoesADeclaredLowPass) {
   h.imu.latency_s = slow.latency_s;
   const double share = low_pass_share(80, 0.002);
   const flightlog::FlightLog log = Sensors(1).log(h, 4, {}, false, 0, share);
-  const Off off = largest_off(flightlog::Track(log, "flight"), 0.5, 3.5);
+  const Off off = largest_off(flightlog::Smoother(log, "flight"), 0.5, 3.5);
   EXPECT_LT(off.rate_rad_s, 0.05);  // 7 rad/s at 34 Hz would lose 8 %
   EXPECT_LT(off.velocity_m_s, 2e-3);
   flightlog::FlightLog fast = log;
   fast.header.imu = header(0).imu;
-  EXPECT_GT(largest_off(flightlog::Track(fast, "flight"), 0.5, 3.5).rate_rad_s, 0.5);
+  EXPECT_GT(largest_off(flightlog::Smoother(fast, "flight"), 0.5, 3.5).rate_rad_s, 0.5);
 }
 
 /// Squares of errors over their covariance, summed for each of angle, position, velocity, gyro bias, accelerometer bias,
 /// and the nine of motion together.
 struct Squares {
   double parts[5] = {}, motion = 0, count = 0;
-  void add(const flightlog::Track& track, std::size_t i, const Eigen::Matrix<double, 15, 1>& error) {
-    const flightlog::Track::Covariance& p = track.covariance(i);
+  void add(const flightlog::Smoother& smoother, std::size_t i, const Eigen::Matrix<double, 15, 1>& error) {
+    const flightlog::Smoother::Covariance& p = smoother.covariance(i);
     for (Eigen::Index k = 0; k < 5; ++k)
       parts[k] += error.segment<3>(3 * k).dot(p.block<3, 3>(3 * k, 3 * k).llt().solve(error.segment<3>(3 * k)));
     motion += error.head<9>().dot(p.topLeftCorner<9, 9>().llt().solve(error.head<9>()));
@@ -190,13 +190,13 @@ struct Squares {
   }
 };
 
-TEST(Track, CovariancesAreHonest) {
+TEST(Smoother, CovariancesAreHonest) {
   // 16 flights of 6 s at 150 poses/s. What is smoothed remembers about 0.1 s, so of 3 dof there are 16 x 60 x 3 = 2,900
   // independent squares: 3 sd are 8 %. Biases are one draw each in a flight: 48 squares, 3 sd are 61 %. The arm of 11 cm, at
   // which the shaking is 140 m/s^2, makes the error of an angle, 0.7 mrad and at first 5, count in the torso's position.
   Sensors sensors(7);
   Squares squares;
-  double surprises[2] = {};
+  double innovations[2] = {};
   constexpr int kFlights = 16;
   for (int flight = 0; flight < kFlights; ++flight) {
     flightlog::FlightHeader h = header(0.001);
@@ -205,27 +205,27 @@ TEST(Track, CovariancesAreHonest) {
     Biases bias{sensors.three(), 0.2 * sensors.three()};
     for (int i = 0; i < 3; ++i) bias.gyro[i] *= h.imu.gyro_bias_sd_rad_s[static_cast<std::size_t>(i)];
     const flightlog::FlightLog log = sensors.log(h, 6, bias, true, 0.001);
-    const flightlog::Track track(log, "flight");
-    surprises[0] += track.angle_surprise() / kFlights;
-    surprises[1] += track.position_surprise() / kFlights;
+    const flightlog::Smoother smoother(log, "flight");
+    innovations[0] += smoother.angle_normalised_innovation() / kFlights;
+    innovations[1] += smoother.position_normalised_innovation() / kFlights;
     const Motions m;
-    for (std::size_t i = 0; i < track.pose_s().size(); ++i) {
-      const double t = track.pose_s()[i];
-      const flightlog::TorsoMotion x = track.at(t);
+    for (std::size_t i = 0; i < smoother.pose_s().size(); ++i) {
+      const double t = smoother.pose_s()[i];
+      const flightlog::TorsoMotion x = smoother.at(t);
       Eigen::Matrix<double, 15, 1> error;
       error << rotation_vector(x.attitude.conjugate() * m.attitude(t)),
           m.position(t) + m.attitude(t) * arm - x.position_m - x.attitude * arm,
           m.velocity(t, arm) - x.velocity_m_s - x.attitude * x.body_rate_rad_s.cross(arm),
-          bias.gyro - track.gyro_bias_rad_s(t), bias.accel - track.accel_bias_m_s2(t);
-      squares.add(track, i, error);
+          bias.gyro - smoother.gyro_bias_rad_s(t), bias.accel - smoother.accel_bias_m_s2(t);
+      squares.add(smoother, i, error);
     }
   }
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(squares.parts[k] / (3 * squares.count), 1, 0.1) << k;
   EXPECT_NEAR(squares.motion / (9 * squares.count), 1, 0.1);
   for (int k = 3; k < 5; ++k) EXPECT_NEAR(squares.parts[k] / (3 * squares.count), 1, 0.61) << k;
   // of 3 x 900 innovations in each of 16 flights: 3 sd are 2 %
-  EXPECT_NEAR(surprises[0], 1, 0.03);
-  EXPECT_NEAR(surprises[1], 1, 0.03);
+  EXPECT_NEAR(innovations[0], 1, 0.03);
+  EXPECT_NEAR(innovations[1], 1, 0.03);
 }
 
 template <class Stream>
@@ -245,9 +245,9 @@ void drop(Stream& s, double from_s, double to_s) {
   keep(s.t_s);
 }
 
-TEST(Track, GoesOnOverGaps) {
+TEST(Smoother, GoesOnOverGaps) {
   flightlog::FlightLog log = Sensors(5).log(header(0), 4, {}, true, 0);
-  const flightlog::Track whole(log, "flight");
+  const flightlog::Smoother whole(log, "flight");
   EXPECT_TRUE(whole.covers(0.5, 3.5));
   EXPECT_FALSE(whole.covers(-0.1, 1));
   EXPECT_FALSE(whole.covers(3, 4.1));
@@ -256,50 +256,52 @@ TEST(Track, GoesOnOverGaps) {
   for (auto* c :
        {&log.mocap.x_m, &log.mocap.y_m, &log.mocap.z_m, &log.mocap.qw, &log.mocap.qx, &log.mocap.qy, &log.mocap.qz})
     for (std::size_t i = 400; i < 405; ++i) (*c)[i] = (*c)[399];  // a tracker that repeats itself: 2.72 to 2.76 s
-  const flightlog::Track track(log, "flight");
-  EXPECT_FALSE(track.covers(0.9, 1.005));
-  EXPECT_TRUE(track.covers(0.9, 0.995));
-  EXPECT_TRUE(track.covers(1.03, 1.9));
-  EXPECT_FALSE(track.covers(2.02, 2.03));
-  EXPECT_FALSE(track.covers(2.73, 2.74));
-  EXPECT_TRUE(track.covers(2.1, 2.7));
-  EXPECT_EQ(track.pose_s().size() + 5 + 8, whole.pose_s().size());
+  const flightlog::Smoother smoother(log, "flight");
+  EXPECT_FALSE(smoother.covers(0.9, 1.005));
+  EXPECT_TRUE(smoother.covers(0.9, 0.995));
+  EXPECT_TRUE(smoother.covers(1.03, 1.9));
+  EXPECT_FALSE(smoother.covers(2.02, 2.03));
+  EXPECT_FALSE(smoother.covers(2.73, 2.74));
+  EXPECT_TRUE(smoother.covers(2.1, 2.7));
+  EXPECT_EQ(smoother.pose_s().size() + 5 + 8, whole.pose_s().size());
   const Motions m;
-  const auto off = [&](const flightlog::Track& x, double t) { return (x.at(t).velocity_m_s - m.velocity(t)).norm(); };
-  EXPECT_LT(off(track, 0.9), 0.01);
-  EXPECT_LT(off(track, 1.1), 0.01);
-  EXPECT_LT(off(track, 2.05), 0.02);  // the IMU alone
-  EXPECT_LT(off(track, 2.74), 0.02);
+  const auto off = [&](const flightlog::Smoother& x, double t) {
+    return (x.at(t).velocity_m_s - m.velocity(t)).norm();
+  };
+  EXPECT_LT(off(smoother, 0.9), 0.01);
+  EXPECT_LT(off(smoother, 1.1), 0.01);
+  EXPECT_LT(off(smoother, 2.05), 0.02);  // the IMU alone
+  EXPECT_LT(off(smoother, 2.74), 0.02);
   // an unseen beat: within what the covariance says there, which is far wider
   std::size_t i = 0;
-  while (track.pose_s()[i] < 1.01) ++i;
-  EXPECT_GT(track.covariance(i)(6, 6), 20 * track.covariance(i - 20)(6, 6));
-  EXPECT_LT(off(track, track.pose_s()[i]), 4 * std::sqrt(track.covariance(i).diagonal().segment<3>(6).sum()));
+  while (smoother.pose_s()[i] < 1.01) ++i;
+  EXPECT_GT(smoother.covariance(i)(6, 6), 20 * smoother.covariance(i - 20)(6, 6));
+  EXPECT_LT(off(smoother, smoother.pose_s()[i]), 4 * std::sqrt(smoother.covariance(i).diagonal().segment<3>(6).sum()));
 }
 
-TEST(Track, RefusesStreamsThatShareNoTime) {
+TEST(Smoother, RefusesStreamsThatShareNoTime) {
   flightlog::FlightLog log = Sensors(1).log(header(0), 2, {}, true, 0);
   for (double& t : log.imu.t_s) t += 1.99;
-  EXPECT_EQ(message([&] { flightlog::Track track(log, "here/it"); }),
+  EXPECT_EQ(message([&] { flightlog::Smoother smoother(log, "here/it"); }),
             "here/it: motion capture and IMU, less their latencies, share 1 poses; accepted: streams that overlap");
   for (double& t : log.imu.t_s) t += 1;
-  EXPECT_NE(message([&] { flightlog::Track track(log, "here/it"); }).find("share 0 poses"), std::string::npos);
+  EXPECT_NE(message([&] { flightlog::Smoother smoother(log, "here/it"); }).find("share 0 poses"), std::string::npos);
   flightlog::FlightLog good = Sensors(1).log(header(0), 2, {}, true, 0);
-  const flightlog::Track track(good, "flight");
-  EXPECT_THROW(track.at(-0.1), std::out_of_range);
-  EXPECT_THROW(track.at(2.1), std::out_of_range);
+  const flightlog::Smoother smoother(good, "flight");
+  EXPECT_THROW(smoother.at(-0.1), std::out_of_range);
+  EXPECT_THROW(smoother.at(2.1), std::out_of_range);
 }
 
-TEST(Track, IsSurprisedByStreamsOfDifferentMotions) {
+TEST(Smoother, SeesStreamsOfDifferentMotionsByTheirInnovations) {
   flightlog::FlightLog log = Sensors(1).log(header(0), 3, {}, true, 0);
   for (double& w : log.imu.gyro_z_rad_s) w *= -1;
-  EXPECT_GT(flightlog::Track(log, "flight").angle_surprise(), 25);
+  EXPECT_GT(flightlog::Smoother(log, "flight").angle_normalised_innovation(), 25);
   log = Sensors(1).log(header(0), 3, {}, true, 0);
   for (double& a : log.imu.accel_z_m_s2) a /= 9.81;
-  EXPECT_GT(flightlog::Track(log, "flight").bias_surprise(), 25);  // 8.8 m/s^2
+  EXPECT_GT(flightlog::Smoother(log, "flight").bias_normalised_innovation(), 25);  // 8.8 m/s^2
 }
 
-TEST(Track, OfSimulatedFlightsHasHonestCovariances) {
+TEST(Smoother, OfSimulatedFlightsHasHonestCovariances) {
   // Four flights of 6 s of the identified vehicle, whose wings shake it by 10 rad/s and 30 m/s^2 and jerk it where they meet
   // their stops. Torso and IMU at one place. As above, of 4 x 60 x 3 squares 3 sd are 16 %.
   const Folder folder;
@@ -313,25 +315,25 @@ TEST(Track, OfSimulatedFlightsHasHonestCovariances) {
   double bias_off = 0;
   for (const std::string name : {"0000", "0001", "0002", "0003"}) {
     const fs::path flight = options.log_folder / name;
-    const flightlog::Track track(flightlog::read_flight_log(flight), flight);
+    const flightlog::Smoother smoother(flightlog::read_flight_log(flight), flight);
     const io::CsvTable truth = io::read_csv(flight / "truth.csv");
     const auto at = [&](std::size_t row, const char* a, const char* b, const char* c) {
       return Vector3d(truth.column(a)[row], truth.column(b)[row], truth.column(c)[row]);
     };
-    for (std::size_t i = 0, row = 0; i < track.pose_s().size(); ++i) {
-      const double t = track.pose_s()[i];
+    for (std::size_t i = 0, row = 0; i < smoother.pose_s().size(); ++i) {
+      const double t = smoother.pose_s()[i];
       while (row < truth.column("t_s").size() && truth.column("t_s")[row] < t - 1e-9) ++row;
       if (row == truth.column("t_s").size()) break;
       if (std::abs(truth.column("t_s")[row] - t) > 1e-9 || t < 1) continue;  // mocap between control ticks
-      const flightlog::TorsoMotion x = track.at(t);
+      const flightlog::TorsoMotion x = smoother.at(t);
       const Quaterniond q(truth.column("qw")[row], truth.column("qx")[row], truth.column("qy")[row],
                           truth.column("qz")[row]);
       const Vector3d gyro = at(row, "gyro_bias_x_rad_s", "gyro_bias_y_rad_s", "gyro_bias_z_rad_s");
       Eigen::Matrix<double, 15, 1> error;
       error << rotation_vector(x.attitude.conjugate() * q), at(row, "x_m", "y_m", "z_m") - x.position_m,
           at(row, "velocity_x_m_s", "velocity_y_m_s", "velocity_z_m_s") - x.velocity_m_s,
-          gyro - track.gyro_bias_rad_s(t), -track.accel_bias_m_s2(t);
-      squares.add(track, i, error);
+          gyro - smoother.gyro_bias_rad_s(t), -smoother.accel_bias_m_s2(t);
+      squares.add(smoother, i, error);
       bias_off = std::max(bias_off, error.segment<3>(9).norm());
       const Vector3d rate = at(row, "rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s") - x.body_rate_rad_s;
       for (int k = 0; k < 3; ++k) rate_off.push_back(std::abs(rate[k]));

@@ -1,4 +1,4 @@
-#include "flightlog/track.hpp"
+#include "flightlog/smoother.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -61,7 +61,7 @@ std::size_t index_before(const std::vector<double>& t_s, double at_s) {
 }  // namespace
 
 /// Spectral densities and variances.
-struct Track::Noise {
+struct Smoother::Noise {
   double angle_rad2_s, velocity_m2_s3;
   double pose_angle_rad2, pose_position_m2;
   Vector3d gyro_bias_rad2_s2;
@@ -82,19 +82,19 @@ struct Track::Noise {
 
 /// What the IMU says of a piece of one of its intervals. Velocity is gained in B as it is in the middle of the whole
 /// interval: a mean knows no other frame.
-struct Track::Reading {
+struct Smoother::Reading {
   double duration_s, to_middle_s;
   Vector3d turn_rad, turn_to_middle_rad, gained_m_s, moved_m;
   bool gap;
 };
 
-struct Track::Pose {
+struct Smoother::Pose {
   double t_s;
   Vector3d position_m;
   Quaterniond attitude;
 };
 
-Track::Track(const FlightLog& log, const std::filesystem::path& folder)
+Smoother::Smoother(const FlightLog& log, const std::filesystem::path& folder)
     : gravity_m_s2_(log.header.gravity_m_s2),
       longest_unseen_s_(kLongestUnseenFrames / log.header.mocap.rate_hz),
       arm_m_(log.header.imu.position_m.data()) {
@@ -108,7 +108,7 @@ Track::Track(const FlightLog& log, const std::filesystem::path& folder)
   smooth(filter(poses, noise), noise);
 }
 
-void Track::read_imu(const FlightLog& log) {
+void Smoother::read_imu(const FlightLog& log) {
   const ImuHeader& h = log.header.imu;
   const ImuStream& s = log.imu;
   const std::size_t n = s.t_s.size();
@@ -141,7 +141,7 @@ void Track::read_imu(const FlightLog& log) {
   accel_ = MeanSpline(bounds_s_, std::move(accel));
 }
 
-auto Track::read_poses(const FlightLog& log) const -> std::vector<Pose> {
+auto Smoother::read_poses(const FlightLog& log) const -> std::vector<Pose> {
   const MocapStream& m = log.mocap;
   std::vector<Pose> poses;
   for (std::size_t i = 0; i < m.t_s.size(); ++i) {
@@ -157,7 +157,7 @@ auto Track::read_poses(const FlightLog& log) const -> std::vector<Pose> {
   return poses;
 }
 
-void Track::lay_nodes(const std::vector<Pose>& poses) {
+void Smoother::lay_nodes(const std::vector<Pose>& poses) {
   std::size_t next_pose = 0;
   for (std::size_t k = index_before(bounds_s_, poses.front().t_s); next_pose < poses.size(); ++k) {
     if (next_pose > 0 && bounds_s_[k] > nodes_.back().t_s + kSame_s) nodes_.push_back({bounds_s_[k], k, {}});
@@ -170,7 +170,7 @@ void Track::lay_nodes(const std::vector<Pose>& poses) {
   }
 }
 
-auto Track::reading(std::size_t interval, double from_s, double to_s) const -> Reading {
+auto Smoother::reading(std::size_t interval, double from_s, double to_s) const -> Reading {
   const double length = bounds_s_[interval + 1] - bounds_s_[interval];
   const double u = (from_s - bounds_s_[interval]) / length, v = (to_s - bounds_s_[interval]) / length;
   return {to_s - from_s,
@@ -182,11 +182,11 @@ auto Track::reading(std::size_t interval, double from_s, double to_s) const -> R
           gap_[interval] != 0};
 }
 
-Quaterniond Track::to_middle(const State& x, const Reading& r) {
+Quaterniond Smoother::to_middle(const State& x, const Reading& r) {
   return x.attitude * exponential(r.turn_to_middle_rad - r.to_middle_s * x.gyro_bias);
 }
 
-auto Track::moved(const State& x, const Reading& r) const -> State {
+auto Smoother::moved(const State& x, const Reading& r) const -> State {
   const Vector3d turn = r.turn_rad - r.duration_s * x.gyro_bias;
   const double dt = r.duration_s;
   const Quaterniond middle = to_middle(x, r);
@@ -199,7 +199,7 @@ auto Track::moved(const State& x, const Reading& r) const -> State {
   return y;
 }
 
-auto Track::transition(const State& x, const Reading& r) const -> Covariance {
+auto Smoother::transition(const State& x, const Reading& r) const -> Covariance {
   const double dt = r.duration_s;
   const Vector3d turn = r.turn_rad - dt * x.gyro_bias;
   const Matrix3d half = to_middle(x, r).toRotationMatrix();
@@ -215,7 +215,7 @@ auto Track::transition(const State& x, const Reading& r) const -> Covariance {
   return f;
 }
 
-void Track::add_noise(Covariance& p, const Reading& r, const Noise& noise) const {
+void Smoother::add_noise(Covariance& p, const Reading& r, const Noise& noise) const {
   const double dt = r.duration_s;
   const double angle = noise.angle_rad2_s + (r.gap ? kUnseenRate_rad_s * kUnseenRate_rad_s * kUnseenFor_s : 0);
   const double velocity =
@@ -231,7 +231,7 @@ void Track::add_noise(Covariance& p, const Reading& r, const Noise& noise) const
   }
 }
 
-void Track::displace(State& x, const Eigen::Matrix<double, 15, 1>& error) {
+void Smoother::displace(State& x, const Eigen::Matrix<double, 15, 1>& error) {
   x.attitude = (x.attitude * exponential(error.segment<3>(0))).normalized();
   x.position_m += error.segment<3>(3);
   x.velocity_m_s += error.segment<3>(6);
@@ -239,7 +239,7 @@ void Track::displace(State& x, const Eigen::Matrix<double, 15, 1>& error) {
   x.accel_bias += error.segment<3>(12);
 }
 
-void Track::correct(State& x, Covariance& p, const Pose& z, const Noise& noise) {
+void Smoother::correct(State& x, Covariance& p, const Pose& z, const Noise& noise) {
   const Matrix3d R = x.attitude.toRotationMatrix();
   Eigen::Matrix<double, 6, 15> h = Eigen::Matrix<double, 6, 15>::Zero();
   h.block<3, 3>(0, 0).setIdentity();
@@ -251,15 +251,15 @@ void Track::correct(State& x, Covariance& p, const Pose& z, const Noise& noise) 
   const Eigen::Matrix<double, 15, 6> ph = p * h.transpose();
   Eigen::Matrix<double, 6, 6> s = h * ph;
   s.diagonal() += variance;
-  surprise_[0] += off.head<3>().dot(s.topLeftCorner<3, 3>().llt().solve(off.head<3>())) / 3;
-  surprise_[1] += off.tail<3>().dot(s.bottomRightCorner<3, 3>().llt().solve(off.tail<3>())) / 3;
+  normalised_innovation_[0] += off.head<3>().dot(s.topLeftCorner<3, 3>().llt().solve(off.head<3>())) / 3;
+  normalised_innovation_[1] += off.tail<3>().dot(s.bottomRightCorner<3, 3>().llt().solve(off.tail<3>())) / 3;
   const Eigen::Matrix<double, 15, 6> gain = s.llt().solve(ph.transpose()).transpose();
   displace(x, gain * off);
   p -= gain * ph.transpose();
   p = (0.5 * (p + p.transpose())).eval();
 }
 
-auto Track::filter(const std::vector<Pose>& poses, const Noise& noise) -> std::vector<Covariance> {
+auto Smoother::filter(const std::vector<Pose>& poses, const Noise& noise) -> std::vector<Covariance> {
   Covariance p = Covariance::Zero();
   p.diagonal() << Vector3d::Constant(noise.pose_angle_rad2), Vector3d::Constant(noise.pose_position_m2),
       Vector3d::Constant(kVelocitySd_m_s * kVelocitySd_m_s), noise.gyro_bias_rad2_s2,
@@ -288,11 +288,11 @@ auto Track::filter(const std::vector<Pose>& poses, const Noise& noise) -> std::v
     nodes_[i].state = x;
     list.push_back(p);
   }
-  for (int k = 0; k < 2; ++k) surprise_[k] /= std::max(corrections, 1.0);
+  for (int k = 0; k < 2; ++k) normalised_innovation_[k] /= std::max(corrections, 1.0);
   return list;
 }
 
-void Track::smooth(std::vector<Covariance> covariance, const Noise& noise) {
+void Smoother::smooth(std::vector<Covariance> covariance, const Noise& noise) {
   std::vector<Covariance>& p = covariance;
   for (std::size_t i = nodes_.size() - 1; i-- > 0;) {
     const Reading r = reading(nodes_[i].interval, nodes_[i].t_s, nodes_[i + 1].t_s);
@@ -311,24 +311,24 @@ void Track::smooth(std::vector<Covariance> covariance, const Noise& noise) {
     p[i] += gain * (p[i + 1] - ahead) * gain.transpose();
   }
   const State& first = nodes_.front().state;
-  surprise_[2] = std::max((first.gyro_bias.array().square() / noise.gyro_bias_rad2_s2.array()).mean(),
-                          first.accel_bias.squaredNorm() / (3 * kAccelBiasSd_m_s2 * kAccelBiasSd_m_s2));
+  normalised_innovation_[2] = std::max((first.gyro_bias.array().square() / noise.gyro_bias_rad2_s2.array()).mean(),
+                                       first.accel_bias.squaredNorm() / (3 * kAccelBiasSd_m_s2 * kAccelBiasSd_m_s2));
   for (const std::size_t node : pose_node_) covariance_.push_back(p[node]);
 }
 
-std::size_t Track::node_before(double t_s) const {
+std::size_t Smoother::node_before(double t_s) const {
   if (!(t_s >= begin_s() - kSame_s && t_s <= end_s() + kSame_s))
     throw std::out_of_range("no motion at " + std::to_string(t_s) + " s");
   const auto after = std::ranges::upper_bound(nodes_, t_s, {}, &Node::t_s);
   return after == nodes_.begin() ? 0 : static_cast<std::size_t>(after - nodes_.begin()) - 1;
 }
 
-double Track::imu_bound_s(double t_s) const {
+double Smoother::imu_bound_s(double t_s) const {
   const std::size_t k = index_before(bounds_s_, t_s);
   return k + 1 < bounds_s_.size() && bounds_s_[k + 1] - t_s < t_s - bounds_s_[k] ? bounds_s_[k + 1] : bounds_s_[k];
 }
 
-Vector3d Track::mean(const MeanSpline& signal, double from_s, double to_s) const {
+Vector3d Smoother::mean(const MeanSpline& signal, double from_s, double to_s) const {
   Vector3d sum = Vector3d::Zero();
   for (std::size_t k = index_before(bounds_s_, from_s); k + 1 < bounds_s_.size() && bounds_s_[k] < to_s; ++k) {
     const double length = bounds_s_[k + 1] - bounds_s_[k];
@@ -338,7 +338,7 @@ Vector3d Track::mean(const MeanSpline& signal, double from_s, double to_s) const
   return sum / (to_s - from_s);
 }
 
-TorsoMotion Track::at(double t_s) const {
+TorsoMotion Smoother::at(double t_s) const {
   const Node& node = nodes_[node_before(t_s)];
   const State x = moved(node.state, reading(node.interval, node.t_s, t_s));
   const double from_s = bounds_s_[node.interval], to_s = bounds_s_[node.interval + 1];
@@ -346,7 +346,7 @@ TorsoMotion Track::at(double t_s) const {
   return {x.position_m - x.attitude * arm_m_, x.attitude, x.velocity_m_s - x.attitude * rate.cross(arm_m_), rate};
 }
 
-bool Track::covers(double from_s, double to_s) const {
+bool Smoother::covers(double from_s, double to_s) const {
   if (from_s < begin_s() || to_s > end_s()) return false;
   for (std::size_t k = index_before(bounds_s_, from_s); k < gap_.size() && bounds_s_[k] < to_s; ++k)
     if (gap_[k]) return false;

@@ -1,4 +1,4 @@
-#include "blind/pilot.hpp"
+#include "blind/robot_controller.hpp"
 
 #include "blind/view.hpp"
 
@@ -105,28 +105,28 @@ Aim Plan::at(double t_s) const {
 Inputs Plan::excitation(double t_s) const {
   Inputs u;
   if (t_s < 0) return u;
-  for (const Sine& s : sines_) input(u, s.input) += s.amplitude * turn_of(2 * kPi * (s.Hz * t_s + s.phase_turns)).cos;
+  for (const Sine& s : sines_) input(u, s.input) += s.amplitude * sin_cos(2 * kPi * (s.Hz * t_s + s.phase_turns)).cos;
   for (const Step& s : steps_)
     if (t_s >= s.begin_s && t_s < s.end_s) input(u, s.input) += s.height;
   return u;
 }
 
-struct Pilot::Memory {
+struct RobotController::Memory {
   flight::PidConstants<double> constants = gains();
   flight::Pid<double> pid{};
   model::Driver driver;
   View view;
 };
 
-Pilot::Pilot(const model::Driver& driver, std::uint64_t seed, std::uint64_t flight)
+RobotController::RobotController(const model::Driver& driver, std::uint64_t seed, std::uint64_t flight)
     : memory_(new Memory{.driver = driver, .view = View(seed, flight)}) {}
-Pilot::~Pilot() = default;
+RobotController::~RobotController() = default;
 
-Inputs Pilot::steer(const Torso& torso, const Aim& aim, const Inputs& excitation) {
+Inputs RobotController::steer(const Torso& torso, const Aim& aim, const Inputs& excitation) {
   Memory& m = *memory_;
   const flight::Estimate<double> seen = m.view.see(torso);
   const auto vec3 = [](const Vector3d& v) { return model::Vec3<double>{v.x(), v.y(), v.z()}; };
-  const Turn heading = turn_of(aim.heading_rad);
+  const SinCos heading = sin_cos(aim.heading_rad);
   flight::Setpoint<double> wanted{};
   wanted.position_m = vec3(aim.position_m);
   wanted.velocity_m_s = vec3(aim.velocity_m_s);
@@ -145,7 +145,7 @@ Inputs clipped(const Inputs& u, const model::Driver& d) {
           within(u.bias_V, d.bias_limit_V), within(u.split_cycle, d.split_cycle_limit)};
 }
 
-double Pilot::voltage(const Inputs& inputs, std::size_t side, double beat, double limit_V) {
+double RobotController::voltage(const Inputs& inputs, std::size_t side, double beat, double limit_V) {
   const model::WingBeat<double> u{inputs.amplitude_V, inputs.difference_V, inputs.bias_V, inputs.split_cycle};
   const double fraction = beat < 0.5 ? beat : beat - 1;
   return side == 0 ? model::wing_beat_voltage<+1>(u, fraction, limit_V)

@@ -1,4 +1,4 @@
-#include "gap/replay/carry.hpp"
+#include "gap/replay/reset_prediction.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include "sim/storage.hpp"
 
 namespace flappy::gap {
-FLAPPY_KERNELS(CarryBlock, carry_block_kernel);
+FLAPPY_KERNELS(ResetBlock, reset_block_kernel);
 
 namespace {
 
@@ -53,7 +53,7 @@ const char* channel_name(int channel) {
   return kNames[channel];
 }
 
-CarriedFlight::CarriedFlight(Recording recording) : recording_(std::move(recording)) {
+PredictedFlight::PredictedFlight(Recording recording) : recording_(std::move(recording)) {
   const Recording& r = recording_;
   const auto first = static_cast<std::size_t>(std::ceil(kSpinUpBeats));
   imu_ = BeatProjection(r.beat, r.valid, r.beats, first);
@@ -90,7 +90,7 @@ CarriedFlight::CarriedFlight(Recording recording) : recording_(std::move(recordi
 
 /// The samples of power.csv on the grid. A sample and a new voltage may share an instant, and the sample is of the new one:
 /// so it is taken from the first step that begins then or later, and the next.
-void CarriedFlight::lay_power(std::size_t first_beat) {
+void PredictedFlight::lay_power(std::size_t first_beat) {
   const Recording& r = recording_;
   if (!r.log.power) return;
   std::vector<double> beat;
@@ -98,7 +98,7 @@ void CarriedFlight::lay_power(std::size_t first_beat) {
   std::size_t step = 0, k = 0;  // the interval, and where it begins
   for (std::size_t i = 0; i < r.log.power->t_s.size(); ++i) {
     const double t_s = r.log.power->t_s[i] - r.log.header.power->latency_s;
-    const double begins = (t_s - r.begin_s) / kStep_s, at = std::ceil(begins - kSameStep);
+    const double begins = (t_s - r.begin_s) / kPredictionStep_s, at = std::ceil(begins - kSameStep);
     if (at < 0) continue;
     while (k < r.intervals() && at + 1 >= static_cast<double>(step) + r.steps[k])
       step += static_cast<std::size_t>(r.steps[k++]);
@@ -134,7 +134,7 @@ void put_streams(const std::vector<StreamRow>& streams, Rows& rows) {
 
 }  // namespace
 
-void CarriedFlight::compare_streams() {
+void PredictedFlight::compare_streams() {
   const std::vector<StreamRow> streams = stream_rows(recording_);
   put_streams(streams, measured_);
   for (std::size_t j = 0; j < streams.size(); ++j) compared_.push_back(streams[j].valid && imu_.covers(j) ? 1 : 0);
@@ -147,7 +147,7 @@ void CarriedFlight::compare_streams() {
 }
 
 /// Of samples [interval][channel].
-Rows CarriedFlight::rows_of(const std::vector<double>& samples) const {
+Rows PredictedFlight::rows_of(const std::vector<double>& samples) const {
   Rows together(recording_.beats * kCoefficients * kSignals, 0), rows(recording_.beats * kRowsPerBeat, 0);
   imu_.project(samples.data(), kSignals, together.data());
   put_channels(together, recording_.beats, kSignals, 1, 0, 0, rows);
@@ -155,13 +155,13 @@ Rows CarriedFlight::rows_of(const std::vector<double>& samples) const {
 }
 
 /// Of samples [sample][battery, left, right].
-void CarriedFlight::put_power(const std::vector<double>& samples, Rows& rows) const {
+void PredictedFlight::put_power(const std::vector<double>& samples, Rows& rows) const {
   Rows together(recording_.beats * kCoefficients * kMetered, 0);
   power_.project(samples.data(), kMetered, together.data());
   put_channels(together, recording_.beats, kMetered, 1, 0, kBattery, rows);
 }
 
-Rows CarriedFlight::declared_noise(std::uint64_t seed) const {
+Rows PredictedFlight::declared_noise(std::uint64_t seed) const {
   const flightlog::FlightHeader& h = recording_.log.header;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
@@ -190,17 +190,17 @@ Rows CarriedFlight::declared_noise(std::uint64_t seed) const {
   return rows;
 }
 
-bool CarriedFlight::covers(std::size_t beat, int channel) const {
+bool PredictedFlight::covers(std::size_t beat, int channel) const {
   if (channel >= kPathX) return compared_[beat] != 0;
   if (channel >= kBattery) return imu_.covers(beat) && beat < power_.beats() && power_.covers(beat);
   if (channel >= kStrokeLeft) return has_wings_ && imu_.covers(beat) && wings_.covers(beat);
   return imu_.covers(beat);
 }
 
-std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& candidates) const {
+std::vector<Rows> PredictedFlight::predict(const std::vector<const Candidate*>& candidates) const {
   const Recording& r = recording_;
-  const CarryBlock carry = *carry_block_kernels[sim::place_of("")];
-  sim::Batch<double> batch(kVehicles, candidates.front()->vehicle, {kStep_s, 1, r.world, {}});
+  const ResetBlock reset = *carry_block_kernels[sim::place_of("")];
+  sim::Batch<double> batch(kVehicles, candidates.front()->vehicle, {kPredictionStep_s, 1, r.world, {}});
   if (r.log.power) batch.storage().keep_effects(0);  // the meter needs their rows
   std::vector<ShiftedVoltage> shifted;
   for (std::size_t i = 0; i < kVehicles; ++i) {
@@ -209,15 +209,15 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
     vehicle.air_density_kg_m3 *= r.density_ratio;
     batch.set_vehicle(i, vehicle);
     batch.reset(i, {});
-    shifted.emplace_back(c.lag_s / kStep_s);
+    shifted.emplace_back(c.lag_s / kPredictionStep_s);
   }
   auto& storage = batch.storage();
   sim::Block<double>& block = storage.blocks[0];
   sim::StepPlan plan = storage.plan();
   plan.steps_per_update = 1;
-  CarriedBlock kept;
+  ResetBlockState kept;
   const double* imu_m = r.log.header.imu.position_m.data();
-  carry(block, nullptr, r.torso[0], 1, imu_m, r.world.gravity_m_s2, kept);
+  reset(block, nullptr, r.torso[0], 1, imu_m, r.world.gravity_m_s2, kept);
 
   const int longest = *std::ranges::max_element(r.steps);
   std::vector<double> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
@@ -239,7 +239,7 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
     in_force.voltages_V = voltages_V.data();
     if (r.log.power) in_force.meter = meter.data() + kMeter;
     storage.kernel(block, in_force, plan, 0, r.steps[k], nullptr);
-    carry(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
+    reset(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
     double* to = &samples[k * kSignals * kVehicles];
     const double per_interval = 1 / r.interval_s(k);
     for (std::size_t lane = 0; lane < kVehicles; ++lane) {
@@ -276,7 +276,7 @@ std::vector<Rows> CarriedFlight::predict(const std::vector<const Candidate*>& ca
   return result;
 }
 
-std::vector<std::vector<Rows>> predict_all(const std::vector<CarriedFlight>& flights,
+std::vector<std::vector<Rows>> predict_all(const std::vector<PredictedFlight>& flights,
                                            const std::vector<Candidate>& candidates, int threads) {
   const std::size_t blocks = (candidates.size() + kVehicles - 1) / kVehicles;
   std::vector<std::vector<Rows>> result(candidates.size(), std::vector<Rows>(flights.size()));

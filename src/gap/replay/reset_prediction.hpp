@@ -1,7 +1,7 @@
-// What the sensors of many vehicles would have shown, had they flown a recorded flight: the voltages are the recorded
-// ones, and the torso is carried along the recorded motion, put back onto it at every interval of the IMU; wings and
-// motors are the vehicle's own. So every interval tests the forces and torques of that moment alone, and a whole flight
-// costs its own length once. A vehicle's numbers depend on no other's.
+// Predictions with resets, as in multiple shooting (Bock, Plitt 1984): what the sensors of many vehicles would have shown, had
+// they flown a recorded flight. The voltages are the recorded ones, and the torso is reset to the recorded motion at every
+// interval of the IMU; wings and motors are the vehicle's own. So every interval tests the forces and torques of that moment
+// alone, and a whole flight costs its own length once. A vehicle's numbers depend on no other's.
 #pragma once
 
 #include <string>
@@ -49,10 +49,10 @@ struct Candidate {
   double lag_s = 0;
 };
 
-/// A recording with what its own sensors showed, as rows.
-class CarriedFlight {
+/// A recording that vehicles predict, with what its own sensors showed, as rows.
+class PredictedFlight {
  public:
-  explicit CarriedFlight(Recording recording);
+  explicit PredictedFlight(Recording recording);
 
   const Recording& recording() const { return recording_; }
   std::size_t beats() const { return recording_.beats; }
@@ -69,8 +69,8 @@ class CarriedFlight {
   /// Rows of the sensors' declared noise alone: one of its many courses, the same for a seed.
   Rows declared_noise(std::uint64_t seed) const;
   /// The same beats as another log of the flight shows them.
-  CarriedFlight with_log(flightlog::FlightLog log) const {
-    return CarriedFlight(Recording(recording_, std::move(log)));
+  PredictedFlight with_log(flightlog::FlightLog log) const {
+    return PredictedFlight(Recording(recording_, std::move(log)));
   }
 
  private:
@@ -91,7 +91,7 @@ class CarriedFlight {
 };
 
 /// All flights under all candidates on all processors: [candidate][flight].
-std::vector<std::vector<Rows>> predict_all(const std::vector<CarriedFlight>& flights,
+std::vector<std::vector<Rows>> predict_all(const std::vector<PredictedFlight>& flights,
                                            const std::vector<Candidate>& candidates, int threads);
 
 }  // namespace flappy::gap

@@ -1,4 +1,4 @@
-#include "gap/replay/carry_kernel.hpp"
+#include "gap/replay/reset_kernel.hpp"
 
 #include "flight/sensors.hpp"
 #include "sim/rows.hpp"
@@ -24,7 +24,7 @@ FLAPPY_INLINE void store(const Vec3<V>& v, double (*rows)[sim::kLanes<double>], 
 }
 
 void carry_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
-                 const double imu_position_m[3], double gravity_m_s2, CarriedBlock& kept) {
+                 const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept) {
   const V per_interval(1 / interval_s);
   const Vec3<V> imu{V(imu_position_m[0]), V(imu_position_m[1]), V(imu_position_m[2])};
   for (int first = 0; first < sim::kLanes<double>; first += kWidth<double>) {
@@ -61,8 +61,8 @@ void carry_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& 
 
 }  // namespace
 
-extern const CarryBlock carry_block_kernel;
-const CarryBlock carry_block_kernel = carry_block;
+extern const ResetBlock reset_block_kernel;
+const ResetBlock reset_block_kernel = carry_block;
 
 }  // namespace FLAPPY_ISA
 }  // namespace flappy::gap

@@ -33,12 +33,12 @@ struct TorsoMotion {
   Eigen::Vector3d body_rate_rad_s = Eigen::Vector3d::Zero();
 };
 
-class Track {
+class Smoother {
  public:
   using Covariance = Eigen::Matrix<double, 15, 15>;
 
   /// io::InputError, naming `folder`, where motion capture and IMU, less their latencies, share fewer than two poses.
-  Track(const FlightLog& log, const std::filesystem::path& folder);
+  Smoother(const FlightLog& log, const std::filesystem::path& folder);
 
   /// Between the first and the last pose that the IMU covers.
   double begin_s() const { return nodes_.front().t_s; }
@@ -66,12 +66,12 @@ class Track {
 
   /// Whether the IMU has no gap there, and motion capture none longer than four of its intervals.
   bool covers(double from_s, double to_s) const;
-  /// Mean square of the forward filter's innovations over what the declared noise predicts, angle and position: 1
-  /// where the declaration is right, large where the two streams do not describe one motion.
-  double angle_surprise() const { return surprise_[0]; }
-  double position_surprise() const { return surprise_[1]; }
+  /// Mean normalised innovation squared of the forward filter, angle and position: mean of nu^T S^-1 nu / dim(nu), which is 1
+  /// where the declared noise is right, and large where the two streams do not describe one motion.
+  double angle_normalised_innovation() const { return normalised_innovation_[0]; }
+  double position_normalised_innovation() const { return normalised_innovation_[1]; }
   /// The same of the biases found, gyro or accelerometer, whichever is larger.
-  double bias_surprise() const { return surprise_[2]; }
+  double bias_normalised_innovation() const { return normalised_innovation_[2]; }
 
  private:
   struct State {
@@ -113,7 +113,7 @@ class Track {
   std::vector<double> pose_s_;
   std::vector<std::size_t> pose_node_;
   std::vector<Covariance> covariance_;  // at poses
-  double surprise_[3] = {0, 0, 0};
+  double normalised_innovation_[3] = {0, 0, 0};
 };
 
 /// What drove the motors: the commands, scaled by the battery's voltage where power.csv has it (between its samples on

@@ -13,22 +13,22 @@ struct TorsoAt {
 };
 
 /// What a vehicle's sensors would have shown over an interval, as rows of lanes.
-enum CarriedRow : int {
+enum ResetRow : int {
   kTurnRate = 0,  ///< mean over the interval, recorded less flown, rad/s, B: 3 rows
   kForce = 3,     ///< mean specific force at the IMU, m/s^2, B as half-way: 3 rows
   kStroke = 6,    ///< at the end, left and right
-  kCarriedRows = 8
+  kResetRows = 8
 };
 
 /// What a block keeps from one interval to the next.
-struct CarriedBlock {
+struct ResetBlockState {
   alignas(64) double imu_velocity_m_s[3][sim::kLanes<double>];  ///< in W, where the interval began
-  alignas(64) double rows[kCarriedRows][sim::kLanes<double>];
+  alignas(64) double rows[kResetRows][sim::kLanes<double>];
 };
 
 /// Reads what the interval from `from` to `to` gave and puts every torso back onto the record at `to`, wings kept; with
 /// `from` null it only puts. The body rate becomes what makes the flown turn the recorded one.
-using CarryBlock = void (*)(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
-                            const double imu_position_m[3], double gravity_m_s2, CarriedBlock& kept);
+using ResetBlock = void (*)(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
+                            const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept);
 
 }  // namespace flappy::gap

@@ -1,4 +1,4 @@
-#include "blind/drawn.hpp"
+#include "blind/sampled_robot.hpp"
 
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
@@ -8,7 +8,7 @@ namespace flappy::blind {
 
 Case declared_case(const std::filesystem::path& vehicle_file) {
   Case c;
-  c.vehicle = model::read_vehicle_for_steps(vehicle_file, kStep_s);
+  c.vehicle = model::read_vehicle_for_steps(vehicle_file, kRobotStep_s);
   if (!c.vehicle.effects.empty())
     io::Config::load(vehicle_file)
         .root()
@@ -19,24 +19,24 @@ Case declared_case(const std::filesystem::path& vehicle_file) {
   return c;
 }
 
-Case drawn_case(Case c, const sim::Randomisation& randomisation, std::uint64_t seed, std::uint64_t draw) {
+Case sampled_case(Case c, const sim::Randomisation& randomisation, std::uint64_t seed, std::uint64_t draw) {
   c.seed = seed * kTries + draw;
   c.vehicle = randomisation.sample({c.seed, 0, 0, sim::Stream::vehicle});
   return c;
 }
 
-Drawn fly_drawn(Case c, const sim::Randomisation& randomisation, std::uint64_t seed) {
-  Drawn drawn;
-  for (; drawn.draw < kTries; ++drawn.draw) {
-    c = drawn_case(std::move(c), randomisation, seed, drawn.draw);
-    drawn.flights.clear();
-    while (drawn.flights.size() < kFlights && (drawn.flights.empty() || !drawn.flights.back().crashed))
-      drawn.flights.push_back(fly(c, drawn.flights.size()));
-    if (!drawn.flights.back().crashed) {
-      drawn.flown = std::move(c);
+SampledRobot fly_sampled(Case c, const sim::Randomisation& randomisation, std::uint64_t seed) {
+  SampledRobot sampled;
+  for (; sampled.draw < kTries; ++sampled.draw) {
+    c = sampled_case(std::move(c), randomisation, seed, sampled.draw);
+    sampled.flights.clear();
+    while (sampled.flights.size() < kFlights && (sampled.flights.empty() || !sampled.flights.back().crashed))
+      sampled.flights.push_back(fly(c, sampled.flights.size()));
+    if (!sampled.flights.back().crashed) {
+      sampled.flown = std::move(c);
       return drawn;
     }
-    drawn.lost.push_back({drawn.flights.size(), drawn.flights.back().how});
+    sampled.lost.push_back({sampled.flights.size(), sampled.flights.back().how});
   }
   throw NeverFlies("--seed " + std::to_string(seed) + ": " + std::to_string(kTries) +
                    " robots in a row crashed; accepted: effects of smaller size, less randomisation");

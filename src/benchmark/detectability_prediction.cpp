@@ -1,9 +1,9 @@
-#include "benchmark/detectability_carry.hpp"
+#include "benchmark/detectability_prediction.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "blind/pilot.hpp"
+#include "blind/robot_controller.hpp"
 #include "flightlog/rotation.hpp"
 #include "io/parallel.hpp"
 
@@ -13,7 +13,7 @@ namespace {
 using Eigen::Quaterniond, Eigen::Vector3d;
 
 constexpr int kSubsteps = 5;  // of the robot, in one of the record
-static_assert(kSubsteps * blind::kStep_s == gap::kStep_s);
+static_assert(kSubsteps * blind::kRobotStep_s == gap::kPredictionStep_s);
 /// Torques and forces.
 constexpr std::size_t kSignals = gap::kStrokeLeft;
 /// Beats at the start of the record that stand for those before it.
@@ -43,12 +43,12 @@ bool remembers(const blind::Sizes& sizes) {
 
 class Carrier {
  public:
-  Carrier(const gap::Recording& recording, const Rider& rider, std::uint64_t flight)
+  Carrier(const gap::Recording& recording, const Perturbation& perturbation, std::uint64_t flight)
       : r_(recording),
-        late_(rider.late_steps),
-        robot_(rider.vehicle, room_of(recording.world), rider.sizes, rider.seed, flight),
+        late_(perturbation.late_steps),
+        robot_(perturbation.vehicle, room_of(recording.world), perturbation.sizes, perturbation.seed, flight),
         imu_m_(recording.log.header.imu.position_m.data()) {
-    if (remembers(rider.sizes)) live_until_start();
+    if (remembers(perturbation.sizes)) live_until_start();
   }
 
   /// [interval][signal]; empty where it comes apart.
@@ -96,9 +96,9 @@ class Carrier {
   void live_until_start() {
     robot_.hold_torso(true);
     put(torso_of(r_.torso[0]));
-    const auto steps = static_cast<std::ptrdiff_t>(std::lround((blind::kTrim_s + r_.begin_s) / gap::kStep_s));
+    const auto steps = static_cast<std::ptrdiff_t>(std::lround((blind::kTrim_s + r_.begin_s) / gap::kPredictionStep_s));
     const auto period =
-        static_cast<std::ptrdiff_t>(std::lround(kBeatsBefore / r_.log.header.flapping_Hz / gap::kStep_s));
+        static_cast<std::ptrdiff_t>(std::lround(kBeatsBefore / r_.log.header.flapping_Hz / gap::kPredictionStep_s));
     for (std::ptrdiff_t i = -steps; i < 0; ++i) advance((i % period + period) % period);
     robot_.hold_torso(false);
   }
@@ -111,8 +111,8 @@ class Carrier {
 
 }  // namespace
 
-gap::Rows carry(const gap::Recording& r, const Rider& rider, std::uint64_t flight) {
-  const std::vector<double> samples = Carrier(r, rider, flight).fly();
+gap::Rows predict_perturbed(const gap::Recording& r, const Perturbation& perturbation, std::uint64_t flight) {
+  const std::vector<double> samples = Carrier(r, perturbation, flight).fly();
   if (samples.empty()) return {};
   const gap::BeatProjection projection(r.beat, r.valid, r.beats,
                                        static_cast<std::size_t>(std::ceil(gap::kSpinUpBeats)));
@@ -127,14 +127,14 @@ gap::Rows carry(const gap::Recording& r, const Rider& rider, std::uint64_t fligh
   return rows;
 }
 
-std::vector<gap::Signature> carry_all(const std::vector<gap::CarriedFlight>& flights, const std::vector<Rider>& riders,
-                                      int threads) {
-  std::vector<gap::Signature> result(riders.size(), gap::Signature(flights.size()));
-  io::parallel_for(riders.size() * flights.size(), threads, [&](std::size_t job) {
-    const std::size_t rider = job / flights.size(), flight = job % flights.size();
-    result[rider][flight] = carry(flights[flight].recording(), riders[rider], flight);
+std::vector<gap::Residuals> predict_perturbed_flights(const std::vector<gap::PredictedFlight>& flights,
+                                                      const std::vector<Perturbation>& perturbations, int threads) {
+  std::vector<gap::Residuals> result(perturbations.size(), gap::Residuals(flights.size()));
+  io::parallel_for(perturbations.size() * flights.size(), threads, [&](std::size_t job) {
+    const std::size_t perturbation = job / flights.size(), flight = job % flights.size();
+    result[perturbation][flight] = predict_perturbed(flights[flight].recording(), perturbations[perturbation], flight);
   });
-  for (gap::Signature& s : result)
+  for (gap::Residuals& s : result)
     if (std::ranges::any_of(s, [](const gap::Rows& rows) { return rows.empty(); })) s.clear();
   return result;
 }
