@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "rollout/settle.hpp"
+#include "rollout/rollout.hpp"
 
 namespace flappy::learn {
 namespace {
@@ -41,19 +41,14 @@ Collector::Collector(const TrainConfig& config)
   for (std::size_t i = 0; i < fleet_.size(); ++i) start(i);
 }
 
-/// The next episode of a flapper: from a snapshot drawn for it, or with a vehicle of its own.
+/// The next episode of a flapper: from a snapshot sampled for it, or with a vehicle of its own.
 void Collector::start(std::size_t i) {
   Pending& p = pending_[i];
   ++p.episode;
-  const auto flapper = static_cast<std::uint32_t>(i);
-  if (!pool_.empty()) {
-    const double place = sim::uniform_pair({config_.seed, flapper, p.episode, sim::Stream::snapshot}, 0).first;
-    fleet_.start(i, p.episode, pool_[static_cast<std::size_t>(place * static_cast<double>(pool_.size()))]);
-  } else {
-    if (fly_.randomisation)
-      fleet_.set_vehicle(i, fly_.randomisation->sample({config_.seed, flapper, p.episode, sim::Stream::vehicle}));
-    fleet_.start(i, p.episode);
-  }
+  const sim::RandomKey key{config_.seed, static_cast<std::uint32_t>(i), p.episode, sim::Stream::snapshot};
+  const auto place = sim::uniform_pair(key, 0).first * static_cast<double>(pool_.size());
+  rollout::Rollout<float>::start(fleet_, fly_, i, p.episode,
+                                 pool_.empty() ? nullptr : &pool_[static_cast<std::size_t>(place)]);
   p.count = 0;
   p.waits = 0;
   p.gain = 0;

@@ -2,12 +2,8 @@
 // same configuration and numbers, however many threads and in parts of whatever size.
 #pragma once
 
-#include <functional>
-#include <memory>
-
-#include "policy/policy.hpp"
-#include "rollout/fly_config.hpp"
 #include "rollout/outcome.hpp"
+#include "rollout/rollout.hpp"
 
 namespace flappy::rollout {
 
@@ -21,9 +17,9 @@ struct EvaluationOptions {
   std::size_t part = 1024;  ///< flights at a time: bounds memory
 };
 
-/// Who flies; nobody set: the controller alone, the goal its set point, without a policy's action and without the two
-/// rules that end flights early (faced_by_s, arrived_by_s).
-struct Pilot {
+/// Who acts on top of the controller. Neither of them: the controller alone, the goal its set point, without hand-back and
+/// without the two rules that end flights early (faced_by_s, arrived_by_s).
+struct Agent {
   std::shared_ptr<const policy::Actor> actor;
   const policy::Policy* policy = nullptr;
 };
@@ -39,27 +35,30 @@ struct Evaluation {
   double wall_s = 0, steps = 0;  ///< of physics, hover before the start included where it was flown
 };
 
+/// Snapshots of each part's flights, once they have hovered; empty until then, and where flights start otherwise.
+template <class T>
+using Hovers = std::vector<std::vector<flight::Snapshot<T>>>;
+
 class Evaluator {
  public:
   /// Seed, threads and precision are those of `config`, its `actor` is not used. io::InputError where its task says no
   /// success or takes longer than duration_s.
-  Evaluator(rollout::FlyConfig config, const EvaluationOptions& options);
-  ~Evaluator();
-  Evaluator(Evaluator&&) noexcept;
-  Evaluator& operator=(Evaluator&&) noexcept;
+  Evaluator(FlyConfig config, const EvaluationOptions& options);
 
   /// Each vehicle starts from its own settled hover, flown once for all calls. `keep_going` is asked with the share that is
-  /// done; false ends the evaluation. std::invalid_argument for a pilot that does not fit the task.
-  Evaluation fly(const Pilot& pilot, Detail detail, const std::function<bool(double done)>& keep_going = {});
+  /// done; false ends the evaluation. std::invalid_argument for an agent that does not fit the task.
+  Evaluation fly(const Agent& agent, Detail detail, const std::function<bool(double done)>& keep_going = {});
 
-  const rollout::FlyConfig& config() const;
+  const FlyConfig& config() const { return config_; }
 
  private:
-  struct Flights;
-  std::unique_ptr<Flights> flights_;
+  FlyConfig config_;
+  EvaluationOptions options_;
+  Hovers<float> float_hovers_;  // one of the two is used
+  Hovers<double> double_hovers_;
 };
 
 /// The same flights on the vehicle as it is, all from the middle of the task's start.
-rollout::FlyConfig nominal(rollout::FlyConfig config);
+FlyConfig nominal(FlyConfig config);
 
 }  // namespace flappy::rollout

@@ -228,8 +228,8 @@ class Reader {
 
 }  // namespace
 
-model::Vehicle FlyConfig::vehicle_of(std::uint32_t flapper) const {
-  return randomisation ? randomisation->sample({.seed = fleet.seed, .flapper = flapper}) : vehicle;
+model::Vehicle FlyConfig::vehicle_of(std::uint32_t flapper, std::uint32_t episode) const {
+  return randomisation ? randomisation->sample({fleet.seed, flapper, episode}) : vehicle;
 }
 
 FlyConfig read_fly_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {

@@ -48,8 +48,8 @@ struct FlyConfig {
   /// Actors and scripts stay where they are.
   std::map<std::string, std::string> resolved;
 
-  /// The vehicle of a flapper: another one each where they are randomised.
-  model::Vehicle vehicle_of(std::uint32_t flapper) const;
+  /// The vehicle of a flapper: another one each, in each of its episodes, where they are randomised.
+  model::Vehicle vehicle_of(std::uint32_t flapper, std::uint32_t episode = 0) const;
 };
 
 /// io::InputError for whatever is missing, unknown, out of range or does not fit together.

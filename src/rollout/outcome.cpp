@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "rollout/flight_score.hpp"
 #include "io/statistics.hpp"
 #include "model/math.hpp"
 #include "rollout/flight_score.hpp"

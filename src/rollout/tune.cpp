@@ -11,6 +11,7 @@
 #include <pagmo/problem.hpp>
 
 #include "rollout/flight_score.hpp"
+#include "rollout/rollout.hpp"
 
 namespace flappy::rollout {
 namespace {
@@ -78,22 +79,20 @@ struct Problem {
 };
 
 double cost_of_trial(const TuneConfig& config, const Trial& trial, const flight::Controller& controller) {
-  flight::FleetOptions o = trial.fly.fleet;
-  o.task.forbid_actions();
-  o.controller = controller;
-  o.seed = config.seed;
-  flight::Fleet<float> fleet(trial.count, trial.fly.vehicle, o);
-  for (std::size_t i = 0; i < trial.count; ++i)
-    if (trial.fly.randomisation)
-      fleet.set_vehicle(i, trial.fly.randomisation->sample({.seed = o.seed, .flapper = static_cast<std::uint32_t>(i)}));
+  FlyConfig fly = trial.fly;
+  fly.fleet.controller = controller;
+  fly.fleet.seed = config.seed;
+  fly.duration_s = config.duration_s;
+  Rollout<float> flights(std::move(fly), trial.count);
+  const flight::Fleet<float>& fleet = flights.fleet();
+  const auto ticks = static_cast<double>(flights.ticks(flights.config()));
   std::vector<Score> scores(trial.count);
-  const int ticks = static_cast<int>(std::lround(config.duration_s / fleet.period_s()));
-  for (int k = 1; k <= ticks; ++k) {
-    fleet.step();
-    if (k % kLook != 0) continue;
+  while (!flights.over()) {
+    flights.step();
+    if (flights.tick() % kLook != 0) continue;
     for (std::size_t i = 0; i < trial.count; ++i)
-      look(scores[i], fleet.truth(i), fleet.target(i), static_cast<double>(k) / ticks,
-           k * fleet.period_s() >= config.settle_s);
+      look(scores[i], fleet.truth(i), fleet.target(i), static_cast<double>(flights.tick()) / ticks,
+           flights.t_s() >= config.settle_s);
   }
   double sum = 0;
   for (const Score& s : scores) sum += cost_of(s);

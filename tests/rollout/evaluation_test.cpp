@@ -96,39 +96,39 @@ std::uint64_t hash(const rollout::Evaluation& e) { return summarise(e.flights).h
 
 TEST(Evaluator, GivesTheSameBytesForAnyThreadsAndParts) {
   FlyConfig config = escape();
-  const rollout::Pilot pilot{random_actor(config.fleet.task), nullptr};
+  const rollout::Agent agent{random_actor(config.fleet.task), nullptr};
   std::vector<std::uint64_t> hashes;
   // 200 flights, so that three threads have a share each
   for (const auto& [threads, part] :
        std::vector<std::pair<int, std::size_t>>{{1, 1000}, {2, 1000}, {3, 1000}, {2, 133}}) {
     config.fleet.batch.threads = threads;
     rollout::Evaluator evaluator(config, {.count = 200, .part = part});
-    hashes.push_back(hash(evaluator.fly(pilot, rollout::Detail::full)));
-    if (part == 133) hashes.push_back(hash(evaluator.fly(pilot, rollout::Detail::full)));  // again, from the same hover
+    hashes.push_back(hash(evaluator.fly(agent, rollout::Detail::full)));
+    if (part == 133) hashes.push_back(hash(evaluator.fly(agent, rollout::Detail::full)));  // again, from the same hover
   }
   for (const std::uint64_t h : hashes) EXPECT_EQ(h, hashes[0]);
   config.fleet.seed = 2;
-  EXPECT_NE(hash(rollout::Evaluator(config, {.count = 200}).fly(pilot, rollout::Detail::full)), hashes[0]);
+  EXPECT_NE(hash(rollout::Evaluator(config, {.count = 200}).fly(agent, rollout::Detail::full)), hashes[0]);
 }
 
 TEST(Evaluator, FliesAFlapperByItsNumber) {
   const FlyConfig config = escape({"precision=double"});
-  const rollout::Pilot pilot{random_actor(config.fleet.task), nullptr};
-  const auto all = rollout::Evaluator(config, {.count = 9}).fly(pilot, rollout::Detail::success).flights;
+  const rollout::Agent agent{random_actor(config.fleet.task), nullptr};
+  const auto all = rollout::Evaluator(config, {.count = 9}).fly(agent, rollout::Detail::success).flights;
   const auto some = rollout::Evaluator(config, {.count = 3, .first_flapper = rollout::kTestFlappers + 5})
-                        .fly(pilot, rollout::Detail::success)
+                        .fly(agent, rollout::Detail::success)
                         .flights;
   for (std::size_t i = 0; i < some.size(); ++i) EXPECT_EQ(some[i].hash, all[5 + i].hash);
   const auto others = rollout::Evaluator(config, {.count = 9, .first_flapper = rollout::kValidationFlappers})
-                          .fly(pilot, rollout::Detail::success);
+                          .fly(agent, rollout::Detail::success);
   for (std::size_t i = 0; i < all.size(); ++i) EXPECT_NE(others.flights[i].hash, all[i].hash);
 }
 
 TEST(Evaluator, JudgesTheSameInBothDetails) {
   for (const bool starts_there : {false, true}) {
     rollout::Evaluator evaluator(starts_there ? stay() : escape(), {.count = 24});
-    const rollout::Pilot pilot{random_actor(evaluator.config().fleet.task), nullptr};
-    for (const rollout::Pilot& p : {pilot, rollout::Pilot{}}) {
+    const rollout::Agent agent{random_actor(evaluator.config().fleet.task), nullptr};
+    for (const rollout::Agent& p : {agent, rollout::Agent{}}) {
       const auto little = evaluator.fly(p, rollout::Detail::success).flights,
                  much = evaluator.fly(p, rollout::Detail::full).flights;
       ASSERT_EQ(little.size(), 24u);
@@ -171,8 +171,8 @@ TEST(Evaluator, FliesThePolicyFromOutsideAsTheActor) {
   // what -1 and 1 stand for, to the bit
   const auto extreme = actor_for(config.fleet.task, 0, {30, -30, 30, -30});
   const Outside same(*extreme, config.fleet.task);
-  const auto flown = [&](const rollout::Pilot& pilot) {
-    rollout::Evaluation e = evaluator.fly(pilot, rollout::Detail::full);
+  const auto flown = [&](const rollout::Agent& agent) {
+    rollout::Evaluation e = evaluator.fly(agent, rollout::Detail::full);
     for (rollout::Outcome& o : e.flights)
       o.hash = 0;  // the fleet adds up what an actor of its own earns with an action
     return hash(e);
@@ -180,7 +180,7 @@ TEST(Evaluator, FliesThePolicyFromOutsideAsTheActor) {
   EXPECT_EQ(flown({extreme, nullptr}), flown({nullptr, &same}));
 }
 
-TEST(Evaluator, RefusesPilotsOfAnotherTask) {
+TEST(Evaluator, RefusesAgentsOfAnotherTask) {
   const FlyConfig config = escape();
   const FlyConfig other = escape({"task.observation=[\"position_error\"]"});
   const auto actor = random_actor(other.fleet.task);
@@ -203,14 +203,14 @@ TEST(Evaluator, LeavesTheControllerAlone) {
   EXPECT_NE(alone({"task.end.distance_m=0.1"}), plain);  // that rule stays
   // a policy does fly by those rules
   const FlyConfig config = escape({"task.end.faced_by_s=0.05"});
-  const rollout::Pilot still{actor_for(config.fleet.task, 0, {0, 0, 0, 0}), nullptr};
+  const rollout::Agent still{actor_for(config.fleet.task, 0, {0, 0, 0, 0}), nullptr};
   for (const rollout::Outcome& o : rollout::Evaluator(config, {.count = 3}).fly(still, rollout::Detail::full).flights)
     EXPECT_EQ(o.failure, rollout::Failure::too_late);
 }
 
 TEST(Evaluator, CountsCrashes) {
   const FlyConfig config = escape({"world.ground_z_m=-0.2"});
-  const rollout::Pilot falls{actor_for(config.fleet.task, 0, {-30, 0, 0, 0}), nullptr};
+  const rollout::Agent falls{actor_for(config.fleet.task, 0, {-30, 0, 0, 0}), nullptr};
   for (const rollout::Detail detail : {rollout::Detail::success, rollout::Detail::full})
     for (const rollout::Outcome& o : rollout::Evaluator(config, {.count = 5}).fly(falls, detail).flights) {
       EXPECT_FALSE(o.success());
@@ -271,16 +271,16 @@ TEST(Evaluator, FliesTheNominalVehicleFromTheMiddle) {
 
 TEST(Evaluator, StartsWhereTasksDoNotStartSettled) {
   FlyConfig config = escape({"task.start.kind=flying"});
-  const rollout::Pilot pilot{random_actor(config.fleet.task), nullptr};
+  const rollout::Agent agent{random_actor(config.fleet.task), nullptr};
   const rollout::Evaluation once =
-      rollout::Evaluator(config, {.count = 70, .part = 64}).fly(pilot, rollout::Detail::full);
+      rollout::Evaluator(config, {.count = 70, .part = 64}).fly(agent, rollout::Detail::full);
   config.fleet.batch.threads = 2;
   rollout::Evaluator evaluator(config, {.count = 70});
-  EXPECT_EQ(hash(evaluator.fly(pilot, rollout::Detail::full)), hash(once));
-  EXPECT_NE(hash(rollout::Evaluator(escape(), {.count = 70}).fly(pilot, rollout::Detail::full)), hash(once));
+  EXPECT_EQ(hash(evaluator.fly(agent, rollout::Detail::full)), hash(once));
+  EXPECT_NE(hash(rollout::Evaluator(escape(), {.count = 70}).fly(agent, rollout::Detail::full)), hash(once));
   EXPECT_EQ(once.steps, 70 * 7000);
   config.randomisation.reset();
-  const rollout::Evaluation alike = rollout::Evaluator(config, {.count = 70}).fly(pilot, rollout::Detail::full);
+  const rollout::Evaluation alike = rollout::Evaluator(config, {.count = 70}).fly(agent, rollout::Detail::full);
   for (std::size_t i = 0; i < 70; ++i) EXPECT_NE(alike.flights[i].hash, once.flights[i].hash);
 }
 

@@ -83,7 +83,7 @@ class Evaluation {
         evaluator_(config, options_),
         nominal_(rollout::nominal(config), nominal_options()) {}
 
-  Column fly_policy(const rollout::Pilot& pilot) { return fly("policy", evaluator_, nominal_, pilot); }
+  Column fly_policy(const rollout::Agent& agent) { return fly("policy", evaluator_, nominal_, agent); }
 
   /// The vehicles of the policy, hovering under this controller and flown by it alone.
   Column fly_alone(const char* name, const Controller& controller) {
@@ -102,18 +102,18 @@ class Evaluation {
   }
 
   Column fly(const char* name, rollout::Evaluator& evaluator, rollout::Evaluator& nominal,
-             const rollout::Pilot& pilot) const {
+             const rollout::Agent& agent) const {
     io::ProgressLine progress(std::string(name) + " flown");
     Column column{.name = name, .asked = options_.count};
     const auto keep_going = [&](double done) {
       progress.show(done);
       return !io::interrupted();
     };
-    const rollout::Evaluation few = nominal.fly(pilot, rollout::Detail::full, keep_going);
+    const rollout::Evaluation few = nominal.fly(agent, rollout::Detail::full, keep_going);
     column.nominal = rollout::summarise(few.flights);
     column.stopped = few.stopped;
     if (few.stopped) return column;
-    const rollout::Evaluation all = evaluator.fly(pilot, rollout::Detail::full, keep_going);
+    const rollout::Evaluation all = evaluator.fly(agent, rollout::Detail::full, keep_going);
     column.flights = rollout::summarise(all.flights);
     column.stopped = all.stopped;
     column.wall_s = few.wall_s + all.wall_s;

@@ -5,8 +5,7 @@
 #include <cstddef>
 
 #include "flight/flight_block.hpp"
-#include "rollout/recorder.hpp"
-#include "rollout/settle.hpp"
+#include "rollout/rollout.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -17,50 +16,31 @@ using Lane = model::Lanes<float, 1>;
 
 std::int32_t whole_us(double s) { return static_cast<std::int32_t>(std::lround(s * 1e6)); }
 
-flight::FleetOptions on_board(const rollout::FlyConfig& config) {
-  flight::FleetOptions o = config.fleet;
-  o.batch.threads = 1;
-  o.task.constants.hand_back.on_estimate = 1;
-  double& latency_s = o.sensors.imu.latency_s;
-  latency_s = std::ceil(latency_s * o.control_hz - 1e-6) / o.control_hz;
-  return o;
+/// The vehicle as it is and nothing but the controller's output, as on board.
+rollout::FlyConfig on_board(rollout::FlyConfig config) {
+  config.randomisation.reset();
+  config.excitation = {};
+  config.fleet.task.constants.hand_back.on_estimate = 1;
+  double& latency_s = config.fleet.sensors.imu.latency_s;
+  latency_s = std::ceil(latency_s * config.fleet.control_hz - 1e-6) / config.fleet.control_hz;
+  return config;
 }
 
-/// One flight, from its start on.
-class Flight {
- public:
-  explicit Flight(const rollout::FlyConfig& config) : options_(on_board(config)), fleet_(1, config.vehicle, options_) {
-    if (options_.task.start.settled)
-      fleet_.start(0, 0, rollout::settle<float>(options_, 1, rollout::kHover_s, [&](std::uint32_t) {
-                     return config.vehicle;
-                   })[0]);
-    fleet_.set_actor(config.actor);
-    fleet_.record(true);
-  }
-  Fleet<float>& fleet() { return fleet_; }
-  const flight::FleetOptions& options() const { return options_; }
-
-  /// Rows of a flight's block.
-  std::vector<float> rows(std::size_t offset, std::size_t count) {
-    const auto all = fleet_.snapshot(0).flight;
-    const auto begin = all.begin() + static_cast<std::ptrdiff_t>(offset / sizeof(float[flight::kLanes<float>]));
-    return {begin, begin + static_cast<std::ptrdiff_t>(count)};
-  }
-
- private:
-  flight::FleetOptions options_;
-  Fleet<float> fleet_;
-};
+/// Rows of a flight's block.
+std::vector<float> rows(const Fleet<float>& fleet, std::size_t offset, std::size_t count) {
+  const auto all = fleet.snapshot(0).flight;
+  const auto begin = all.begin() + static_cast<std::ptrdiff_t>(offset / sizeof(float[flight::kLanes<float>]));
+  return {begin, begin + static_cast<std::ptrdiff_t>(count)};
+}
 
 /// When it is handed back, in control periods; half of the flight where it never is.
 int hand_back_period(const rollout::FlyConfig& config) {
-  Flight flight(config);
-  const int last = std::max(2, static_cast<int>(std::lround(config.duration_s / flight.fleet().period_s())));
-  for (int period = 1; period <= last; ++period) {
-    flight.fleet().step();
-    if (flight.fleet().handed_back(0)) return period;
+  rollout::Rollout<float> flight(config, 1);
+  while (!flight.over()) {
+    flight.step();
+    if (flight.fleet().handed_back(0)) return static_cast<int>(flight.tick());
   }
-  return last / 2;
+  return std::max(2, static_cast<int>(flight.tick())) / 2;
 }
 
 void copy(const auto& from, float* to) {
@@ -98,11 +78,13 @@ std::vector<ControllerTrace::Increment> arrived(const std::vector<ControllerTrac
 
 }  // namespace
 
-ControllerTrace record_controller(const rollout::FlyConfig& config, int periods, int begin) {
+ControllerTrace record_controller(const rollout::FlyConfig& given, int periods, int begin) {
+  const rollout::FlyConfig config = on_board(given);
   if (begin < 0) begin = std::max(1, hand_back_period(config) - periods / 2);
-  Flight flight(config);
+  rollout::Rollout<float> flight(config, 1);
   Fleet<float>& fleet = flight.fleet();
-  const flight::FleetOptions& o = flight.options();
+  fleet.record(true);
+  const flight::FleetOptions& o = fleet.options();
   flight::Schedule schedule(o.sensors, o.batch.step_s,
                             static_cast<int>(std::lround(fleet.period_s() / o.batch.step_s)));
   const std::int32_t period_us = whole_us(fleet.period_s()), zero_us = begin * period_us;
@@ -114,10 +96,10 @@ ControllerTrace record_controller(const rollout::FlyConfig& config, int periods,
   std::vector<ControllerTrace::Frame> frames;
   for (int period = 0; period < begin + periods; ++period) {
     if (period == begin) {
-      t.estimator = flight.rows(offsetof(FlightBlock<float>, estimator), flight::kEstimatorRows);
-      t.estimate = flight.rows(offsetof(FlightBlock<float>, estimate), flight::kEstimateRows);
+      t.estimator = rows(fleet, offsetof(FlightBlock<float>, estimator), flight::kEstimatorRows);
+      t.estimate = rows(fleet, offsetof(FlightBlock<float>, estimate), flight::kEstimateRows);
       flight::with_controller(o.controller.kind, [&]<class C>(C) {
-        t.feedback = flight.rows(offsetof(FlightBlock<float>, controller), model::kRows<C::template Memory>);
+        t.feedback = rows(fleet, offsetof(FlightBlock<float>, controller), model::kRows<C::template Memory>);
       });
       t.tick = fleet.tick(0);
       t.phase = fleet.snapshot(0).phase;
@@ -133,7 +115,7 @@ ControllerTrace record_controller(const rollout::FlyConfig& config, int periods,
       }
     }
     if (period == begin && t.ring.empty()) t.ring.push_back({{}, {}, t.horizon_us, t.horizon_us});  // of no time
-    fleet.step();
+    flight.step();
     schedule.next();
     for (const auto& s : fleet.imu_samples(0)) {
       const std::int32_t arrived_us = whole_us(s.arrival_s);
@@ -152,7 +134,7 @@ ControllerTrace record_controller(const rollout::FlyConfig& config, int periods,
     ControllerTrace::Period& p = t.periods.emplace_back();
     copy(fleet.adds(0), p.added);
     copy(std::initializer_list<double>{u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle}, p.input);
-    std::ranges::copy(flight.rows(offsetof(FlightBlock<float>, estimate), flight::kEstimateRows), p.estimate);
+    std::ranges::copy(rows(fleet, offsetof(FlightBlock<float>, estimate), flight::kEstimateRows), p.estimate);
     p.handed_back = fleet.handed_back(0);
     for (const rollout::DriverUpdate& update : rollout::driver_updates(fleet, 0)) {
       if (t.updates.empty()) t.first_update_us = whole_us(static_cast<double>(update.step) * o.batch.step_s) - zero_us;

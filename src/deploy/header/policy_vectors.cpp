@@ -1,14 +1,12 @@
 #include "deploy/header/policy_vectors.hpp"
 
 #include <algorithm>
-#include <cmath>
 
-#include "rollout/settle.hpp"
+#include "rollout/rollout.hpp"
 
 namespace flappy::deploy {
 namespace {
 
-using flight::Fleet;
 using flight::kActions;
 using Lane = model::Lanes<float, 1>;
 
@@ -63,36 +61,27 @@ std::vector<float> evaluate(const policy::PolicyNetwork& n, const std::vector<fl
   return action;
 }
 
-policy::PolicyVectors roll_out(const rollout::FlyConfig& config, std::size_t first, std::size_t flights) {
-  flight::FleetOptions o = config.fleet;
-  o.first_flapper = kRolloutFlappers + static_cast<std::uint32_t>(first);
-  const auto vehicle = [&](std::uint32_t flapper) { return config.vehicle_of(flapper); };
-  Fleet<float> fleet(flights, config.vehicle, o);
-  std::vector<flight::Snapshot<float>> hover;
-  if (o.task.start.settled) hover = rollout::settle<float>(o, flights, rollout::kHover_s, vehicle);
-  for (std::size_t i = 0; i < flights; ++i) {
-    if (hover.empty()) {
-      fleet.set_vehicle(i, vehicle(o.first_flapper + static_cast<std::uint32_t>(i)));
-      fleet.start(i, 0);
-    } else {
-      fleet.start(i, 0, hover[i]);
-    }
-  }
-  fleet.set_actor(config.actor);
-  const auto inputs = o.task.observation().size();
-  std::vector<policy::PolicyVectors> each(flights);
-  const long ticks = std::lround(config.duration_s / fleet.period_s());
-  for (long tick = 0; tick < ticks; ++tick) {
+policy::PolicyVectors roll_out(const rollout::FlyConfig& given, std::size_t first, std::size_t count) {
+  rollout::FlyConfig config = given;
+  config.fleet.first_flapper = kRolloutFlappers + static_cast<std::uint32_t>(first);
+  config.excitation = {};
+  rollout::Rollout<float> flights(std::move(config), count);
+  const flight::Fleet<float>& fleet = flights.fleet();
+  const flight::Task& task = fleet.options().task;
+  const auto inputs = task.observation().size();
+  std::vector<policy::PolicyVectors> each(count);
+  while (!flights.over()) {
+    const bool acts = flights.tick() % task.action_repeat == 0;
     std::vector<std::size_t> acting;
-    for (std::size_t i = 0; i < flights && tick % o.task.action_repeat == 0; ++i)
+    for (std::size_t i = 0; i < count && acts; ++i)
       if (fleet.ended(i) == 0 && !fleet.handed_back(i)) acting.push_back(i);
-    if (acting.empty() && tick % o.task.action_repeat == 0) break;
+    if (acting.empty() && acts) break;
     for (const std::size_t i : acting) {
       std::vector<float>& seen = each[i].observation;
       seen.resize(seen.size() + inputs);
       fleet.observation(i, &seen[seen.size() - inputs]);
     }
-    fleet.step();
+    flights.step();
     for (const std::size_t i : acting)
       for (const float x : fleet.adds(i)) each[i].action.push_back(x);
   }

@@ -15,9 +15,9 @@ std::vector<float> evaluate(const policy::PolicyNetwork& network, const std::vec
 /// Vehicles that no training and no evaluation has flown: of the random streams' last quarter.
 inline constexpr std::uint32_t kRolloutFlappers = std::uint32_t{3} << 30;
 
-/// Observations and actions of `flights` randomised vehicles, flown by the actor in single precision until hand-back or end,
+/// Observations and actions of `count` randomised vehicles, flown by the actor in single precision until hand-back or end,
 /// in the order of flights; those from `first` on.
-policy::PolicyVectors roll_out(const rollout::FlyConfig& config, std::size_t first, std::size_t flights);
+policy::PolicyVectors roll_out(const rollout::FlyConfig& config, std::size_t first, std::size_t count);
 
 /// At most `count` rows, evenly chosen.
 policy::PolicyVectors some_of(const policy::PolicyVectors& all, std::size_t count);

@@ -13,8 +13,7 @@
 #include "deploy/header/controller_library.hpp"
 #include "deploy/proof/board.hpp"
 #include "flight/flight_block.hpp"
-#include "rollout/recorder.hpp"
-#include "rollout/settle.hpp"
+#include "rollout/rollout.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -92,21 +91,9 @@ struct Seen {
 
 /// Flies `count` vehicles and their controllers in every library, or in one, for `periods`.
 Seen fly_beside(const FlyConfig& config, std::size_t count, int periods, bool few = false) {
-  flight::FleetOptions o = config.fleet;
-  o.batch.threads = 2;
-  const auto vehicle = [&](std::uint32_t flapper) { return config.vehicle_of(flapper); };
-  Fleet<float> fleet(count, config.vehicle, o);
-  std::vector<flight::Snapshot<float>> hover;
-  if (o.task.start.settled) hover = rollout::settle<float>(o, count, rollout::kHover_s, vehicle);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (hover.empty()) {
-      fleet.set_vehicle(i, vehicle(static_cast<std::uint32_t>(i) + o.first_flapper));
-      fleet.start(i, 0);
-    } else {
-      fleet.start(i, 0, hover[i]);
-    }
-  }
-  fleet.set_actor(config.actor);
+  rollout::Rollout<float> flights(config, count);
+  Fleet<float>& fleet = flights.fleet();
+  const flight::FleetOptions& o = fleet.options();
   fleet.record(true);
 
   const auto all = libraries(controller_header(config, kRun, record_controller(config)), few);
@@ -135,7 +122,7 @@ Seen fly_beside(const FlyConfig& config, std::size_t count, int periods, bool fe
   Seen seen;
   for (int period = 0; period < periods; ++period) {
     for (std::size_t i = 0; i < count; ++i) fleet.observation(i, observation[period][i].data());
-    fleet.step();
+    flights.step();
     const std::int64_t end_us = whole_us(fleet.period_s()) * (period + 1);
     for (std::size_t i = 0; i < count; ++i) {
       for (const auto& s : fleet.imu_samples(i)) {
