@@ -31,21 +31,21 @@ class Part {
        Detail detail)
       : flights_(std::move(config), count, policy, &hover), fleet_(flights_.fleet()), outcomes_(count), drawn_J_(count) {
     for (std::size_t i = 0; i < count && detail == Detail::full; ++i)
-      followers_.emplace_back(fleet_.options().task, fleet_.truth(i), fleet_.target(i));
+      monitors_.emplace_back(fleet_.options().task, fleet_.truth(i), fleet_.target(i));
   }
 
   bool over() const { return flights_.over(); }
 
   void step() {
     flights_.step();
-    if (followers_.empty()) return;
+    if (monitors_.empty()) return;
     const double t_s = flights_.t_s();
     const flight::Target goal = fleet_.target(0);  // of all, as they started together
     flights_.each([&](std::size_t i) {
       note(i);
       const double drawn_J = fleet_.batch().energy_J(i), more_J = drawn_J - std::exchange(drawn_J_[i], drawn_J);
-      if (followers_[i].manoeuvring(t_s)) followers_[i].spend(more_J, fleet_.period_s(), fleet_.handed_back(i));
-      followers_[i].see(fleet_.truth(i), goal, t_s, outcomes_[i]);
+      if (monitors_[i].manoeuvring(t_s)) monitors_[i].spend(more_J, fleet_.period_s(), fleet_.handed_back(i));
+      monitors_[i].see(fleet_.truth(i), goal, t_s, outcomes_[i]);
     });
   }
 
@@ -53,7 +53,7 @@ class Part {
     for (std::size_t i = 0; i < outcomes_.size(); ++i) {
       note(i);
       outcomes_[i].hash = fleet_.batch().hash(i, i + 1);
-      if (!followers_.empty()) followers_[i].finish(outcomes_[i]);
+      if (!monitors_.empty()) monitors_[i].finish(outcomes_[i]);
     }
     result.flights.insert(result.flights.end(), outcomes_.begin(), outcomes_.end());
     result.steps += flights_.physics_steps();
@@ -73,7 +73,7 @@ class Part {
   Rollout<T> flights_;
   Fleet<T>& fleet_;
   std::vector<Outcome> outcomes_;
-  std::vector<Follower> followers_;
+  std::vector<OutcomeMonitor> monitors_;
   std::vector<double> drawn_J_;  // by the motors, until the last tick
 };
 

@@ -47,17 +47,17 @@ std::size_t largest(std::span<const double> list) {
   return static_cast<std::size_t>(std::ranges::max_element(list) - list.begin());
 }
 
-Spread spread(const std::vector<double>& list) {
+Quantiles quantiles(const std::vector<double>& list) {
   if (list.empty()) return {};
   return {io::quantile(list, 0.1), io::median(list), io::quantile(list, 0.9)};
 }
 
 }  // namespace
 
-const char* name_of(Failure failure) {
-  static constexpr const char* kNames[kFailures] = {"none",          "not_finite", "crashed",
-                                                    "out_of_bounds", "too_late",   "never_captured",
-                                                    "lost_position", "lost_tilt",  "lost_heading"};
+const char* name_of(TaskFailure failure) {
+  static constexpr const char* kNames[kTaskFailures] = {"none",          "not_finite", "crashed",
+                                                        "out_of_bounds", "too_late",   "never_captured",
+                                                        "lost_position", "lost_tilt",  "lost_heading"};
   return kNames[static_cast<std::size_t>(failure)];
 }
 
@@ -70,13 +70,13 @@ bool Outcome::success() const {
   return captured_s > 0 && lost_s == 0 && status == 0 && (ended & ~std::uint32_t{flight::kTimeOut}) == 0;
 }
 
-Follower::Follower(const flight::Task& task, const Motion& start, const Target& goal)
+OutcomeMonitor::OutcomeMonitor(const flight::Task& task, const Motion& start, const Target& goal)
     : success_(task.constants.success) {
   const double far = length(goal.position_m, start.position_m);
   for (int i = 0; i < 3; ++i) way_[i] = far > 0 ? (goal.position_m[i] - start.position_m[i]) / far : 0;
 }
 
-void Follower::see(const Motion& truth, const Target& goal, double t_s, const Outcome& so_far) {
+void OutcomeMonitor::see(const Motion& truth, const Target& goal, double t_s, const Outcome& so_far) {
   const Seen s = seen(truth, goal);
   const flight::Success<double>& k = success_;
   position_error_m_ = s.distance_m;
@@ -100,30 +100,30 @@ void Follower::see(const Motion& truth, const Target& goal, double t_s, const Ou
     overshoot_m_ = std::max(overshoot_m_, beyond);
   }
 
-  if (failure_ != Failure::none) return;
+  if (failure_ != TaskFailure::none) return;
   constexpr std::uint32_t kLate = flight::kHeadingLate | flight::kArrivalLate;
-  if ((so_far.status & sim::kFrozen) != 0) failure_ = Failure::not_finite;
-  else if (so_far.status != 0) failure_ = Failure::crashed;
-  else if ((so_far.ended & flight::kOutOfBounds) != 0) failure_ = Failure::out_of_bounds;
-  else if ((so_far.ended & kLate) != 0) failure_ = Failure::too_late;
-  else if (!captured && !in_time) failure_ = Failure::never_captured;
+  if ((so_far.status & sim::kFrozen) != 0) failure_ = TaskFailure::not_finite;
+  else if (so_far.status != 0) failure_ = TaskFailure::crashed;
+  else if ((so_far.ended & flight::kOutOfBounds) != 0) failure_ = TaskFailure::out_of_bounds;
+  else if ((so_far.ended & kLate) != 0) failure_ = TaskFailure::too_late;
+  else if (!captured && !in_time) failure_ = TaskFailure::never_captured;
   else if (so_far.lost_s > 0) {
     const double shares[] = {s.distance_m / k.keep_distance_m, angle_share(s.upright, k.keep_tilt_cos),
                              angle_share(s.heading_cos(), k.keep_heading_cos)};
-    failure_ = static_cast<Failure>(static_cast<std::size_t>(Failure::lost_position) + largest(shares));
+    failure_ = static_cast<TaskFailure>(static_cast<std::size_t>(TaskFailure::lost_position) + largest(shares));
   }
 }
 
-bool Follower::manoeuvring(double t_s) const { return !handed_back_ && t_s < success_.by_s + kTick; }
+bool OutcomeMonitor::manoeuvring(double t_s) const { return !handed_back_ && t_s < success_.by_s + kTick; }
 
-void Follower::spend(double energy_J, double period_s, bool handed_back) {
+void OutcomeMonitor::spend(double energy_J, double period_s, bool handed_back) {
   energy_J_ += energy_J;
   manoeuvre_s_ += period_s;
   handed_back_ = handed_back;
 }
 
-void Follower::finish(Outcome& outcome) const {
-  outcome.failure = failure_ == Failure::none && outcome.captured_s == 0 ? Failure::never_captured : failure_;
+void OutcomeMonitor::finish(Outcome& outcome) const {
+  outcome.failure = failure_ == TaskFailure::none && outcome.captured_s == 0 ? TaskFailure::never_captured : failure_;
   outcome.missing = missing_;
   outcome.strict_s = strict_s_;
   outcome.overshoot_m = overshoot_m_;
@@ -170,13 +170,13 @@ Summary summarise(std::span<const Outcome> flights) {
   s.success = rate_of(successes, s.flights);
   s.captured = rate_of(capture.size(), s.flights);
   s.strict = rate_of(strict, s.flights);
-  s.capture_s = spread(capture);
-  s.strict_s = spread(strict_s);
-  s.overshoot_m = spread(overshoot);
-  s.position_error_m = spread(position);
-  s.heading_error_rad = spread(heading);
-  s.energy_J = spread(energy);
-  s.power_W = spread(power);
+  s.capture_s = quantiles(capture);
+  s.strict_s = quantiles(strict_s);
+  s.overshoot_m = quantiles(overshoot);
+  s.position_error_m = quantiles(position);
+  s.heading_error_rad = quantiles(heading);
+  s.energy_J = quantiles(energy);
+  s.power_W = quantiles(power);
   return s;
 }
 

@@ -13,7 +13,7 @@
 namespace flappy::rollout {
 
 /// Why a flight failed: what first put success out of reach.
-enum class Failure {
+enum class TaskFailure {
   none,
   not_finite,
   crashed,        ///< touched ground, wall or ceiling
@@ -24,8 +24,8 @@ enum class Failure {
   lost_tilt,
   lost_heading
 };
-inline constexpr std::size_t kFailures = 9;
-const char* name_of(Failure failure);
+inline constexpr std::size_t kTaskFailures = 9;
+const char* name_of(TaskFailure failure);
 
 /// What a capture asks for, all at once.
 enum class Demand { distance, speed, body_rate, tilt, heading };
@@ -41,8 +41,8 @@ struct Outcome {
   std::uint32_t status = 0, ended = 0;  ///< bits of sim::Status and of flight::Ended
   bool success() const;
 
-  // The rest of followed flights only.
-  Failure failure = Failure::none;
+  // The rest of monitored flights only.
+  TaskFailure failure = TaskFailure::none;
   Demand missing = Demand::distance;  ///< what was missing most at the closest moment of a flight that never captured
   double strict_s = 0;                ///< when the strict goal was first reached; 0: never
   double overshoot_m = 0;             ///< of a flight that captured
@@ -52,11 +52,11 @@ struct Outcome {
   std::uint64_t hash = 0;  ///< of how the vehicle moves, at the end
 };
 
-/// Follows one flight, tick by tick.
-class Follower {
+/// Sees one flight, tick by tick, and says what became of it.
+class OutcomeMonitor {
  public:
   /// At the start of the flight.
-  Follower(const flight::Task& task, const flight::Motion& start, const flight::Target& goal);
+  OutcomeMonitor(const flight::Task& task, const flight::Motion& start, const flight::Target& goal);
 
   /// A tick as the fleet shows it; `so_far`: captured_s, lost_s, status and ended by then.
   void see(const flight::Motion& truth, const flight::Target& goal, double t_s, const Outcome& so_far);
@@ -69,7 +69,7 @@ class Follower {
   flight::Success<double> success_;
   double way_[3];  // unit vector from start to goal
   double least_ = 1e300;
-  Failure failure_ = Failure::none;
+  TaskFailure failure_ = TaskFailure::none;
   Demand missing_ = Demand::distance;
   bool handed_back_ = false;
   double strict_s_ = 0, overshoot_m_ = 0, position_error_m_ = 0, facing_ = 1, aside_ = 0;
@@ -83,20 +83,20 @@ struct Rate {
 Rate rate_of(std::size_t successes, std::size_t flights);
 
 /// 10 %, median and 90 %; nothing where there is no flight, infinite where it is one that never got there.
-struct Spread {
+struct Quantiles {
   std::optional<double> p10, median, p90;
 };
 
 struct Summary {
   std::size_t flights = 0;
   Rate success, captured, strict;
-  Spread capture_s;                                               ///< of flights that captured
-  Spread strict_s;                                                ///< of all; infinite for those that never reached it
-  Spread overshoot_m;                                             ///< of flights that captured
-  Spread position_error_m, heading_error_rad, energy_J, power_W;  ///< of all
-  std::array<std::size_t, kFailures> failures{};                  ///< by Failure; none: the successes
-  std::array<std::size_t, kDemands> missing{};                    ///< by Demand, of those that never captured
-  std::uint64_t hash = 0;                                         ///< of all outcomes in order
+  Quantiles capture_s;    ///< of flights that captured
+  Quantiles strict_s;     ///< of all; infinite for those that never reached it
+  Quantiles overshoot_m;  ///< of flights that captured
+  Quantiles position_error_m, heading_error_rad, energy_J, power_W;  ///< of all
+  std::array<std::size_t, kTaskFailures> failures{};                 ///< by TaskFailure; none: the successes
+  std::array<std::size_t, kDemands> missing{};                       ///< by Demand, of those that never captured
+  std::uint64_t hash = 0;                                            ///< of all outcomes in order
 };
 Summary summarise(std::span<const Outcome> flights);
 

@@ -61,7 +61,7 @@ void Rollout<T>::step() {
     const sim::Input input = config_.excitation.at(t_s());
     for (std::size_t i = 0; i < fleet_.size(); ++i) fleet_.set_added(i, input);
   }
-  if (policy_ != nullptr && tick_ % config_.fleet.task.hold == 0) act();
+  if (policy_ != nullptr && tick_ % config_.fleet.task.action_repeat == 0) act();
   fleet_.step();
   ++tick_;
   if (!recorders_.empty()) each([&](std::size_t i) { recorders_[i].record(); });

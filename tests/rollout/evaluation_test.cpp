@@ -137,7 +137,8 @@ TEST(Evaluator, JudgesTheSameInBothDetails) {
         EXPECT_EQ(little[i].hash, much[i].hash);
         EXPECT_EQ(little[i].captured_s, much[i].captured_s);
         EXPECT_EQ(little[i].success(), much[i].success());
-        EXPECT_EQ(much[i].success(), much[i].failure == rollout::Failure::none) << rollout::name_of(much[i].failure);
+        EXPECT_EQ(much[i].success(), much[i].failure == rollout::TaskFailure::none)
+            << rollout::name_of(much[i].failure);
         successes += much[i].success();
       }
       // who starts at the goal has it in the first tick and keeps it unless disturbed
@@ -205,7 +206,7 @@ TEST(Evaluator, LeavesTheControllerAlone) {
   const FlyConfig config = escape({"task.end.faced_by_s=0.05"});
   const rollout::Agent still{actor_for(config.fleet.task, 0, {0, 0, 0, 0}), nullptr};
   for (const rollout::Outcome& o : rollout::Evaluator(config, {.count = 3}).fly(still, rollout::Detail::full).flights)
-    EXPECT_EQ(o.failure, rollout::Failure::too_late);
+    EXPECT_EQ(o.failure, rollout::TaskFailure::too_late);
 }
 
 TEST(Evaluator, CountsCrashes) {
@@ -215,7 +216,7 @@ TEST(Evaluator, CountsCrashes) {
     for (const rollout::Outcome& o : rollout::Evaluator(config, {.count = 5}).fly(falls, detail).flights) {
       EXPECT_FALSE(o.success());
       EXPECT_NE(o.status & sim::kTouchedGround, 0u);
-      if (detail == rollout::Detail::full) EXPECT_EQ(o.failure, rollout::Failure::crashed);
+      if (detail == rollout::Detail::full) EXPECT_EQ(o.failure, rollout::TaskFailure::crashed);
     }
 }
 

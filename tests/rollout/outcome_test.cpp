@@ -45,11 +45,11 @@ struct Tick {
   rollout::Outcome so_far = {};
 };
 
-rollout::Outcome followed(const std::vector<Tick>& ticks) {
-  rollout::Follower follower(task(), at(-1), kGoal);
+rollout::Outcome monitored(const std::vector<Tick>& ticks) {
+  rollout::OutcomeMonitor monitor(task(), at(-1), kGoal);
   rollout::Outcome o;
-  for (const Tick& t : ticks) follower.see(t.motion, kGoal, t.t_s, o = t.so_far);
-  follower.finish(o);
+  for (const Tick& t : ticks) monitor.see(t.motion, kGoal, t.t_s, o = t.so_far);
+  monitor.finish(o);
   return o;
 }
 
@@ -65,8 +65,8 @@ rollout::Outcome lost(double t_s) {
   return o;
 }
 
-TEST(Follower, NotesTheStrictGoal) {
-  const auto reached = [](const Motion& m) { return followed({{0.5, at(-1)}, {0.7, m}, {0.8, at(0)}}).strict_s; };
+TEST(OutcomeMonitor, NotesTheStrictGoal) {
+  const auto reached = [](const Motion& m) { return monitored({{0.5, at(-1)}, {0.7, m}, {0.8, at(0)}}).strict_s; };
   EXPECT_EQ(reached(at(0.029)), 0.7);
   EXPECT_EQ(reached(at(-0.031)), 0.8);
   EXPECT_EQ(reached(at(0, 0, 0, 0.29)), 0.7);
@@ -77,51 +77,51 @@ TEST(Follower, NotesTheStrictGoal) {
   EXPECT_EQ(reached(at(0, 0, 20.1 * kDegree)), 0.8);
   EXPECT_EQ(reached(at(0, -19.9 * kDegree)), 0.7);
   EXPECT_EQ(reached(at(0, -20.1 * kDegree)), 0.8);
-  EXPECT_EQ(followed({{0.1, at(1)}}).strict_s, 0);
+  EXPECT_EQ(monitored({{0.1, at(1)}}).strict_s, 0);
 }
 
-TEST(Follower, MeasuresOvershootBetweenCaptureAndKeeping) {
+TEST(OutcomeMonitor, MeasuresOvershootBetweenCaptureAndKeeping) {
   const std::vector<Tick> flight = {{0.1, at(0.5)},  // passed by, not captured yet
                                     {0.3, at(-0.05), kCaptured},
                                     {0.5, at(0.04), kCaptured},
                                     {0.6, at(0.07), kCaptured},
                                     {0.602, at(0.09), kCaptured}};
-  EXPECT_NEAR(followed(flight).overshoot_m, 0.07, 1e-12);
+  EXPECT_NEAR(monitored(flight).overshoot_m, 0.07, 1e-12);
   Motion aside = at(0);
   aside.position_m[1] = 0.3;  // not along its way
-  EXPECT_EQ(followed({{0.3, at(-0.01), kCaptured}, {0.4, aside, kCaptured}}).overshoot_m, 0);
+  EXPECT_EQ(monitored({{0.3, at(-0.01), kCaptured}, {0.4, aside, kCaptured}}).overshoot_m, 0);
 }
 
-TEST(Follower, ShowsErrorsAtTheEnd) {
-  const rollout::Outcome o = followed({{2.9, at(1)}, {3, at(-0.02, -170 * kDegree, 30 * kDegree)}});
+TEST(OutcomeMonitor, ShowsErrorsAtTheEnd) {
+  const rollout::Outcome o = monitored({{2.9, at(1)}, {3, at(-0.02, -170 * kDegree, 30 * kDegree)}});
   EXPECT_NEAR(o.position_error_m, 0.02, 1e-12);
   EXPECT_NEAR(o.heading_error_rad, 170 * kDegree, 1e-12);
 }
 
-TEST(Follower, NamesWhatPutSuccessOutOfReach) {
+TEST(OutcomeMonitor, NamesWhatPutSuccessOutOfReach) {
   const Tick late{0.352, at(1)};
-  const auto failure = [](const std::vector<Tick>& ticks) { return followed(ticks).failure; };
-  EXPECT_EQ(failure({{0.35, at(0), kCaptured}, {3, at(0), kCaptured}}), rollout::Failure::none);
-  EXPECT_EQ(failure({{0.35, at(1)}, late}), rollout::Failure::never_captured);
-  EXPECT_EQ(failure({{0.35, at(1)}}), rollout::Failure::never_captured);  // and then no more ticks
-  EXPECT_EQ(failure({{0.2, at(1), with(sim::kTouchedGround)}, late}), rollout::Failure::crashed);
-  EXPECT_EQ(failure({late, {0.5, at(1), with(sim::kTouchedGround)}}), rollout::Failure::never_captured);
-  EXPECT_EQ(failure({{0.4, at(0), with(sim::kTouchedWall)}}), rollout::Failure::crashed);
-  EXPECT_EQ(failure({{0.4, at(0), with(sim::kFrozen, flight::kNotFinite)}}), rollout::Failure::not_finite);
-  EXPECT_EQ(failure({{0.4, at(0), with(0, flight::kOutOfBounds)}}), rollout::Failure::out_of_bounds);
-  EXPECT_EQ(failure({{0.4, at(0), with(0, flight::kHeadingLate)}}), rollout::Failure::too_late);
-  EXPECT_EQ(failure({{0.4, at(0), with(0, flight::kArrivalLate)}}), rollout::Failure::too_late);
-  EXPECT_EQ(failure({{3, at(0), with(0, flight::kTimeOut)}}), rollout::Failure::none);
-  EXPECT_EQ(failure({{0.7, at(0.11), lost(0.7)}, {0.8, at(0, 3), lost(0.7)}}), rollout::Failure::lost_position);
-  EXPECT_EQ(failure({{0.7, at(0.05, 0.2, 50 * kDegree), lost(0.7)}}), rollout::Failure::lost_tilt);
-  EXPECT_EQ(failure({{0.7, at(0.05, 50 * kDegree, 0.2), lost(0.7)}}), rollout::Failure::lost_heading);
+  const auto failure = [](const std::vector<Tick>& ticks) { return monitored(ticks).failure; };
+  EXPECT_EQ(failure({{0.35, at(0), kCaptured}, {3, at(0), kCaptured}}), rollout::TaskFailure::none);
+  EXPECT_EQ(failure({{0.35, at(1)}, late}), rollout::TaskFailure::never_captured);
+  EXPECT_EQ(failure({{0.35, at(1)}}), rollout::TaskFailure::never_captured);  // and then no more ticks
+  EXPECT_EQ(failure({{0.2, at(1), with(sim::kTouchedGround)}, late}), rollout::TaskFailure::crashed);
+  EXPECT_EQ(failure({late, {0.5, at(1), with(sim::kTouchedGround)}}), rollout::TaskFailure::never_captured);
+  EXPECT_EQ(failure({{0.4, at(0), with(sim::kTouchedWall)}}), rollout::TaskFailure::crashed);
+  EXPECT_EQ(failure({{0.4, at(0), with(sim::kFrozen, flight::kNotFinite)}}), rollout::TaskFailure::not_finite);
+  EXPECT_EQ(failure({{0.4, at(0), with(0, flight::kOutOfBounds)}}), rollout::TaskFailure::out_of_bounds);
+  EXPECT_EQ(failure({{0.4, at(0), with(0, flight::kHeadingLate)}}), rollout::TaskFailure::too_late);
+  EXPECT_EQ(failure({{0.4, at(0), with(0, flight::kArrivalLate)}}), rollout::TaskFailure::too_late);
+  EXPECT_EQ(failure({{3, at(0), with(0, flight::kTimeOut)}}), rollout::TaskFailure::none);
+  EXPECT_EQ(failure({{0.7, at(0.11), lost(0.7)}, {0.8, at(0, 3), lost(0.7)}}), rollout::TaskFailure::lost_position);
+  EXPECT_EQ(failure({{0.7, at(0.05, 0.2, 50 * kDegree), lost(0.7)}}), rollout::TaskFailure::lost_tilt);
+  EXPECT_EQ(failure({{0.7, at(0.05, 50 * kDegree, 0.2), lost(0.7)}}), rollout::TaskFailure::lost_heading);
 }
 
-TEST(Follower, NamesWhatWasMissingAtTheClosestMoment) {
+TEST(OutcomeMonitor, NamesWhatWasMissingAtTheClosestMoment) {
   const auto missing = [](const Motion& closest) {
     const Motion far = at(5, 2, 2, 9, 90);
     // what comes after 0.35 s does not count
-    return followed({{0.1, far}, {0.2, closest}, {0.3, far}, {0.4, at(0.07)}}).missing;
+    return monitored({{0.1, far}, {0.2, closest}, {0.3, far}, {0.4, at(0.07)}}).missing;
   };
   EXPECT_EQ(missing(at(0.12, 1, 0.8, 1.5, 20)), rollout::Demand::distance);
   EXPECT_EQ(missing(at(0.07, 1, 0.8, 2, 20)), rollout::Demand::speed);
@@ -130,15 +130,15 @@ TEST(Follower, NamesWhatWasMissingAtTheClosestMoment) {
   EXPECT_EQ(missing(at(0.07, 2, 0.8, 1.1, 20)), rollout::Demand::heading);
 }
 
-TEST(Follower, SpendsUntilHandBackOrUntilCaptureIsTooLate) {
+TEST(OutcomeMonitor, SpendsUntilHandBackOrUntilCaptureIsTooLate) {
   for (const bool hands_back : {false, true}) {
-    rollout::Follower follower(task(), at(-1), kGoal);
+    rollout::OutcomeMonitor monitor(task(), at(-1), kGoal);
     for (int tick = 1; tick <= 300; ++tick) {
       const double t_s = 0.002 * tick;
-      if (follower.manoeuvring(t_s)) follower.spend(0.006, 0.002, hands_back && tick == 50);
+      if (monitor.manoeuvring(t_s)) monitor.spend(0.006, 0.002, hands_back && tick == 50);
     }
     rollout::Outcome o;
-    follower.finish(o);
+    monitor.finish(o);
     EXPECT_NEAR(o.manoeuvre_s, hands_back ? 0.1 : 0.35, 1e-9);
     EXPECT_NEAR(o.energy_J, 3 * o.manoeuvre_s, 1e-9);
   }
@@ -161,14 +161,16 @@ TEST(Summary, CountsEachFlightOnce) {
   std::vector<rollout::Outcome> flights(10);
   for (std::size_t i = 0; i < 10; ++i) {
     rollout::Outcome& o = flights[i];
-    o.failure = i < 6 ? rollout::Failure::none : i < 9 ? rollout::Failure::never_captured : rollout::Failure::lost_tilt;
-    if (o.failure != rollout::Failure::never_captured) o.captured_s = 0.2 + 0.01 * static_cast<double>(i);
-    if (o.failure == rollout::Failure::lost_tilt) o.lost_s = 1;
+    o.failure = i < 6   ? rollout::TaskFailure::none
+                : i < 9 ? rollout::TaskFailure::never_captured
+                        : rollout::TaskFailure::lost_tilt;
+    if (o.failure != rollout::TaskFailure::never_captured) o.captured_s = 0.2 + 0.01 * static_cast<double>(i);
+    if (o.failure == rollout::TaskFailure::lost_tilt) o.lost_s = 1;
     o.missing = rollout::Demand::heading;
     if (i < 4) o.strict_s = 0.3;
     o.overshoot_m = o.captured_s > 0 ? 0.01 : 7;
     o.energy_J = 2, o.manoeuvre_s = 0.25;
-    EXPECT_EQ(o.success(), o.failure == rollout::Failure::none);
+    EXPECT_EQ(o.success(), o.failure == rollout::TaskFailure::none);
   }
   const rollout::Summary s = summarise(flights);
   EXPECT_EQ(s.flights, 10u);
@@ -181,8 +183,8 @@ TEST(Summary, CountsEachFlightOnce) {
   EXPECT_TRUE(std::isinf(*s.strict_s.median));  // fewer than half got there
   EXPECT_EQ(*s.overshoot_m.p90, 0.01);          // not of those that never captured
   EXPECT_EQ(*s.power_W.median, 8);
-  EXPECT_EQ(s.failures[static_cast<std::size_t>(rollout::Failure::never_captured)], 3u);
-  EXPECT_EQ(s.failures[static_cast<std::size_t>(rollout::Failure::lost_tilt)], 1u);
+  EXPECT_EQ(s.failures[static_cast<std::size_t>(rollout::TaskFailure::never_captured)], 3u);
+  EXPECT_EQ(s.failures[static_cast<std::size_t>(rollout::TaskFailure::lost_tilt)], 1u);
   EXPECT_EQ(s.failures[0], 6u);
   EXPECT_EQ(s.missing[static_cast<std::size_t>(rollout::Demand::heading)], 3u);
   std::swap(flights[0], flights[1]);

@@ -18,8 +18,8 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 using flight::Controller;
 using rollout::FlyConfig;
+using rollout::Quantiles;
 using rollout::Rate;
-using rollout::Spread;
 using rollout::Summary;
 using Number = std::optional<double>;
 
@@ -149,14 +149,14 @@ void print_rate(const std::string& name, const std::vector<Column>& columns, Rat
   print_row("  to", columns, 2, [&](const Column& c) { return if_flown(c.flights, 100 * (c.flights.*rate).high); });
 }
 
-void print_spread(const std::string& name, const std::vector<Column>& columns, int digits, Spread Summary::*spread,
-                  double factor = 1) {
-  const auto row = [&](const std::string& label, Number Spread::*part) {
-    print_row(label, columns, digits, [&](const Column& c) { return times(c.flights.*spread.*part, factor); });
+void print_quantiles(const std::string& name, const std::vector<Column>& columns, int digits, Quantiles Summary::*of,
+                     double factor = 1) {
+  const auto row = [&](const std::string& label, Number Quantiles::*part) {
+    print_row(label, columns, digits, [&](const Column& c) { return times(c.flights.*of.*part, factor); });
   };
-  row(name + ", median", &Spread::median);
-  row("  10 %", &Spread::p10);
-  row("  90 %", &Spread::p90);
+  row(name + ", median", &Quantiles::median);
+  row("  10 %", &Quantiles::p10);
+  row("  90 %", &Quantiles::p90);
 }
 
 void print_failures(const std::vector<Column>& columns) {
@@ -171,10 +171,10 @@ void print_failures(const std::vector<Column>& columns) {
       if (c == '_') c = ' ';
     return name;
   };
-  for (std::size_t k = 1; k < rollout::kFailures; ++k) {
-    const auto failure = static_cast<rollout::Failure>(k);
+  for (std::size_t k = 1; k < rollout::kTaskFailures; ++k) {
+    const auto failure = static_cast<rollout::TaskFailure>(k);
     count("failed: " + shown(name_of(failure)), [&](const Column& c) { return c.flights.failures[k]; });
-    for (std::size_t d = 0; d < rollout::kDemands && failure == rollout::Failure::never_captured; ++d)
+    for (std::size_t d = 0; d < rollout::kDemands && failure == rollout::TaskFailure::never_captured; ++d)
       count("  missing most: " + shown(name_of(static_cast<rollout::Demand>(d))),
             [&](const Column& c) { return c.flights.missing[d]; });
   }
@@ -197,12 +197,12 @@ void print(const Request& request, const FlyConfig& config, const std::vector<Co
   std::printf("\n");
   print_rate("success, %", columns, &Summary::success);
   print_rate("captured the goal, %", columns, &Summary::captured);
-  print_spread("time to capture, s", columns, 3, &Summary::capture_s);
-  print_spread("overshoot, mm", columns, 1, &Summary::overshoot_m, 1000);
-  print_spread("final position error, mm", columns, 1, &Summary::position_error_m, 1000);
-  print_spread("final heading error, deg", columns, 1, &Summary::heading_error_rad, kDegrees);
-  print_spread("energy of the manoeuvre, J", columns, 3, &Summary::energy_J);
-  print_spread("mean power, W", columns, 2, &Summary::power_W);
+  print_quantiles("time to capture, s", columns, 3, &Summary::capture_s);
+  print_quantiles("overshoot, mm", columns, 1, &Summary::overshoot_m, 1000);
+  print_quantiles("final position error, mm", columns, 1, &Summary::position_error_m, 1000);
+  print_quantiles("final heading error, deg", columns, 1, &Summary::heading_error_rad, kDegrees);
+  print_quantiles("energy of the manoeuvre, J", columns, 3, &Summary::energy_J);
+  print_quantiles("mean power, W", columns, 2, &Summary::power_W);
   print_failures(columns);
   std::printf("  nominal vehicle, %zu flights from the middle of the start\n", kNominalFlights);
   print_row("strict goal reached, %", columns, 0,
@@ -218,7 +218,8 @@ void print(const Request& request, const FlyConfig& config, const std::vector<Co
 
 Json or_null(Number x) { return finite(x) ? Json(*x) : Json(nullptr); }
 
-void put_spread(Json& json, const std::string& name, const std::string& unit, const Spread& s, double factor = 1) {
+void put_quantiles(Json& json, const std::string& name, const std::string& unit, const Quantiles& s,
+                   double factor = 1) {
   json[name + "_median_" + unit] = or_null(times(s.median, factor));
   json[name + "_p10_" + unit] = or_null(times(s.p10, factor));
   json[name + "_p90_" + unit] = or_null(times(s.p90, factor));
@@ -234,25 +235,25 @@ Json json_of(const Column& c) {
                {"success_low", figure(s.success.low)},
                {"success_high", figure(s.success.high)},
                {"captured_rate", figure(s.captured.value)}};
-  put_spread(json, "time_to_capture", "s", s.capture_s);
+  put_quantiles(json, "time_to_capture", "s", s.capture_s);
   json["strict_rate"] = figure(s.strict.value);
-  put_spread(json, "time_to_strict", "s", s.strict_s);
-  put_spread(json, "overshoot", "mm", s.overshoot_m, 1000);
+  put_quantiles(json, "time_to_strict", "s", s.strict_s);
+  put_quantiles(json, "overshoot", "mm", s.overshoot_m, 1000);
   // medians, under the name that says what they are of
   json["final_position_error_mm"] = or_null(times(s.position_error_m.median, 1000));
   json["final_position_error_p90_mm"] = or_null(times(s.position_error_m.p90, 1000));
   json["final_heading_error_deg"] = or_null(times(s.heading_error_rad.median, kDegrees));
   json["final_heading_error_p90_deg"] = or_null(times(s.heading_error_rad.p90, kDegrees));
-  put_spread(json, "energy", "J", s.energy_J);
-  put_spread(json, "mean_power", "W", s.power_W);
-  for (std::size_t k = 1; k < rollout::kFailures; ++k)
-    json["failures"][name_of(static_cast<rollout::Failure>(k))] = s.failures[k];
+  put_quantiles(json, "energy", "J", s.energy_J);
+  put_quantiles(json, "mean_power", "W", s.power_W);
+  for (std::size_t k = 1; k < rollout::kTaskFailures; ++k)
+    json["failures"][name_of(static_cast<rollout::TaskFailure>(k))] = s.failures[k];
   for (std::size_t d = 0; d < rollout::kDemands; ++d)
     json["never_captured_missing"][name_of(static_cast<rollout::Demand>(d))] = s.missing[d];
   json["nominal"] = {{"episodes", c.nominal.flights},
                      {"success_rate", or_null(if_flown(c.nominal, c.nominal.success.value))},
                      {"strict_rate", or_null(if_flown(c.nominal, c.nominal.strict.value))}};
-  put_spread(json["nominal"], "time_to_strict", "s", c.nominal.strict_s);
+  put_quantiles(json["nominal"], "time_to_strict", "s", c.nominal.strict_s);
   json["hash"] = hexadecimal(s.hash);
   return json;
 }
