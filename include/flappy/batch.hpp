@@ -89,10 +89,9 @@ class Batch {
   /// Parameters and state of one flapper.
   static std::size_t bytes_per_flapper();
 
-  struct Storage;  ///< src/sim/storage.hpp: for the project's own rooms
-  Storage& storage() { return *storage_; }
-
  private:
+  struct Storage;
+  friend struct StorageAccess;
   std::unique_ptr<Storage> storage_;
 };
 

@@ -169,7 +169,7 @@ void Fleet<T>::begin(int periods) {
   Storage& s = *storage_;
   s.periods.resize(static_cast<std::size_t>(periods));
   s.plans.clear();
-  s.physics = s.batch.storage().plan();
+  s.physics = sim::storage_of(s.batch).plan();
   for (Period& period : s.periods) {
     period = s.schedule.next();
     FlightPlan<T> plan = s.plan;
@@ -199,7 +199,7 @@ void Fleet<T>::begin(int periods) {
 template <class T>
 void Fleet<T>::fly_block(std::size_t b) {
   Storage& s = *storage_;
-  auto& body = s.batch.storage();
+  auto& body = sim::storage_of(s.batch);
   for (const FlightPlan<T>& plan : s.plans) {
     const bool last = &plan == &s.plans.back();
     Tap<T> tap;
@@ -213,13 +213,13 @@ void Fleet<T>::fly_block(std::size_t b) {
 template <class T>
 void Fleet<T>::end() {
   Storage& s = *storage_;
-  s.batch.storage().steps += static_cast<std::int64_t>(s.plans.size()) * s.period_steps;
+  sim::storage_of(s.batch).steps += static_cast<std::int64_t>(s.plans.size()) * s.period_steps;
 }
 
 template <class T>
 void Fleet<T>::step() {
   begin(1);
-  io::parallel_for(blocks(), storage_->batch.storage().threads, [&](std::size_t b) { fly_block(b); });
+  io::parallel_for(blocks(), sim::storage_of(storage_->batch).threads, [&](std::size_t b) { fly_block(b); });
   end();
 }
 
@@ -261,7 +261,7 @@ Target Fleet<T>::target(std::size_t i) const {
 
 template <class T>
 sim::Input Fleet<T>::input(std::size_t i) const {
-  const auto [block, lane] = storage_->batch.storage().at(i);
+  const auto [block, lane] = sim::storage_of(storage_->batch).at(i);
   const auto u = get<sim::Drive<double>>(block.drive, lane).input;
   return {u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle};
 }
@@ -382,7 +382,7 @@ auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
                     x.valid > 0});
   };
   const auto delays = std::uint64_t{1} << model::effect_index(model::MocapDelay::kInfo.id);
-  if (i >= size() || !(storage_->batch.storage().effects_of_lane(i) & delays)) {
+  if (i >= size() || !(sim::storage_of(storage_->batch).effects_of_lane(i) & delays)) {
     s.template for_samples<MocapSample>(i, s.mocap_tap, s.mocap_tap_size, &Slice::mocap, add);
   } else if (!s.mocap_tap.empty()) {
     const T* queue = &s.queue[i / kLanes<T> * s.queue_size];
@@ -398,7 +398,7 @@ auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
 template <class T>
 std::vector<std::span<std::byte>> Fleet<T>::memory() {
   Storage& s = *storage_;
-  auto& body = s.batch.storage();
+  auto& body = sim::storage_of(s.batch);
   std::vector<std::span<std::byte>> all{
       std::as_writable_bytes(std::span(body.blocks)), std::as_writable_bytes(std::span(s.blocks)),
       std::as_writable_bytes(std::span(s.ring)), std::as_writable_bytes(std::span(s.queue))};
@@ -413,7 +413,7 @@ std::vector<std::span<std::byte>> Fleet<T>::memory() {
 
 template <class T>
 std::int64_t Fleet<T>::periods() const {
-  return storage_->batch.storage().steps / storage_->period_steps;
+  return sim::storage_of(storage_->batch).steps / storage_->period_steps;
 }
 
 template <class T>
@@ -421,7 +421,7 @@ void Fleet<T>::restored(std::int64_t periods) {
   Storage& s = *storage_;
   s.schedule = Schedule(s.options.sensors, s.options.batch.step_s, s.period_steps);
   for (std::int64_t k = 0; k < periods; ++k) s.schedule.next();
-  s.batch.storage().steps = periods * s.period_steps;
+  sim::storage_of(s.batch).steps = periods * s.period_steps;
 }
 
 template <class T>

@@ -57,7 +57,7 @@ struct Fleet<T>::Storage {
         schedule(o.sensors, o.batch.step_s, steps),
         fly(loop),
         period_steps(steps) {
-    const std::size_t n = batch.storage().blocks.size();
+    const std::size_t n = sim::storage_of(batch).blocks.size();
     blocks.resize(n);
     ring_size = static_cast<std::size_t>(schedule.ring_slots()) * kIncrementRows * kLanes<T>;
     queue_size = static_cast<std::size_t>(schedule.queue_slots()) * kMocapRows * kLanes<T>;
@@ -75,7 +75,7 @@ struct Fleet<T>::Storage {
 
   void fill_plan() {
     const FlightConstants k = flight_constants(options);
-    plan.step = batch.storage().kernel;
+    plan.step = sim::storage_of(batch).kernel;
     plan.seed = options.seed;
     plan.first_flapper = options.first_flapper;
     plan.losses = k.mocap.loss_begins > 0;
@@ -113,7 +113,7 @@ struct Fleet<T>::Storage {
     int lane;
   };
   Place at(std::size_t i) {
-    const auto place = batch.storage().at(i);
+    const auto place = sim::storage_of(batch).at(i);
     return {blocks[i / kLanes<T>], place.lane};
   }
 
@@ -214,7 +214,7 @@ void Fleet<T>::Storage::observe_as(std::size_t i, const Estimate<double>& x, T* 
       i, [&]<class C>(C, auto& memory) { learnt = C::trim(plan.controller.template of<C>(), rounded<L>(memory)); });
   std::uint32_t segment = f.segment[lane];
   const auto ref = setpoint_at<L>(plan.path, &f.tick[lane], &segment);
-  const T fraction = model::beat_fraction<T>(batch.storage().at(i).block.phase[lane]);
+  const T fraction = model::beat_fraction<T>(sim::storage_of(batch).at(i).block.phase[lane]);
   const T time = static_cast<T>(f.tick[lane]) * plan.task.tick_s;
   L seen[kMaxObservation];
   const int rows = observe(options.task.parts, rounded<L>(x), ref, rounded<L>(get<Episode<double>>(f.episode, lane)),
@@ -239,7 +239,7 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const sim::F
 
 template <class T>
 Snapshot<T> Fleet<T>::Storage::snapshot(std::size_t i, const Target& target) {
-  auto& body = batch.storage();
+  auto& body = sim::storage_of(batch);
   const auto [block, lane] = body.at(i);
   const FlightBlock<T>& f = at(i).block;
   Snapshot<T> s{{}, {}, 0, {}, {}, block.phase[lane], block.phase_per_update[lane], target};
@@ -251,11 +251,11 @@ Snapshot<T> Fleet<T>::Storage::snapshot(std::size_t i, const Target& target) {
 
 template <class T>
 void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapshot<T>& s) {
-  const auto [block, lane] = batch.storage().at(i);
+  const auto [block, lane] = sim::storage_of(batch).at(i);
   FlightBlock<T>& f = at(i).block;
   for (int r = 0; r < kBodyRows; ++r) rows_of<T>(block)[r][lane] = s.body[static_cast<std::size_t>(r)];
   for (int r = 0; r < kFlightRows<T>; ++r) rows_of<T>(f)[r][lane] = s.flight[static_cast<std::size_t>(r)];
-  batch.storage().put_effects(i, s.effects, s.effect_rows, s.effect_states);
+  sim::storage_of(batch).put_effects(i, s.effects, s.effect_rows, s.effect_states);
   block.phase[lane] = s.phase;
   block.phase_per_update[lane] = s.phase_per_update;
   block.status[lane] = 0;

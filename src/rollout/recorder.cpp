@@ -47,7 +47,7 @@ class TickSampler {
 template <class T>
 std::vector<DriverUpdate> driver_updates(flight::Fleet<T>& fleet, std::size_t i) {
   using L = model::Lanes<T, 1>;  // rounds and fuses as the kernels do
-  auto& body = fleet.batch().storage();
+  auto& body = sim::storage_of(fleet.batch());
   const auto [block, lane] = body.at(i);
   const auto drive = sim::get<sim::Drive<double>>(block.drive, lane);
   const auto parameters = sim::get<model::Parameters<double>>(block.parameters, lane);
@@ -141,17 +141,17 @@ struct Recorder<T>::Storage {
     if (h.power) log.power.emplace(), power = TickSampler(h.power->rate_hz);
     if (h.wings) log.wings.emplace(), wings = TickSampler(h.wings->rate_hz);
     if (h.power) {  // a meter needs the rows of effects, whatever is in force
-      f.batch().storage().keep_effects(0);
-      f.batch().storage().put_effect_rows(i, vehicle);
+      sim::storage_of(f.batch()).keep_effects(0);
+      sim::storage_of(f.batch()).put_effect_rows(i, vehicle);
     }
     look();
-    add_truth(time_s(f.batch().storage().steps));
+    add_truth(time_s(sim::storage_of(f.batch()).steps));
   }
 
   void look() {
     state = fleet.batch().state(flapper);
     if (!log.power) return;
-    auto& body = fleet.batch().storage();
+    auto& body = sim::storage_of(fleet.batch());
     const std::size_t block = flapper / sim::kLanes<T>;
     const T* states = body.effects_of(block).states;
     metered.block = body.blocks[block];
@@ -219,7 +219,7 @@ struct Recorder<T>::Storage {
     const flightlog::PowerHeader& h = *log.header.power;
     if (!power.due(t_s)) return;
     const std::uint32_t n = power.first_index();
-    auto& body = fleet.batch().storage();
+    auto& body = sim::storage_of(fleet.batch());
     constexpr std::size_t kLanes = sim::kLanes<T>;
     const std::size_t lane = flapper % kLanes;
     T voltages_V[2 * kLanes] = {}, meter[sim::kMeterRows * kLanes];
@@ -255,7 +255,7 @@ struct Recorder<T>::Storage {
   }
 
   void record() {
-    const std::int64_t end = fleet.batch().storage().steps;
+    const std::int64_t end = sim::storage_of(fleet.batch()).steps;
     const std::int64_t begin = end - std::lround(fleet.period_s() * step_hz);
     bool sampled = false;
     const auto sample_tick = [&] {

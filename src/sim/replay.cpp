@@ -83,7 +83,7 @@ class ReplayBlock {
   ReplayBlock(const model::Vehicle& vehicle, const ReplayOptions& o)
       : options_(o),
         batch_(kWindows, vehicle, {o.step_s, 1, o.world, o.instruction_set}),
-        plan_(batch_.storage().plan()) {
+        plan_(storage_of(batch_).plan()) {
     plan_.steps_per_update = 1;
   }
 
@@ -152,13 +152,13 @@ class ReplayBlock {
           correct_strokes(seen, carried * options_.step_s, options_.stroke_share, x);
         }
       }
-      batch_.storage().put_state(i, x, start);  // what effects remember goes on
+      storage_of(batch_).put_state(i, x, start);  // what effects remember goes on
     }
   }
 
   void step(int steps) {
     if (steps == 0) return;
-    auto& s = batch_.storage();
+    auto& s = storage_of(batch_);
     BlockEffects<double> in_force = s.effects_of(0);
     in_force.voltages_V = next_V_;
     s.kernel(s.blocks[0], in_force, plan_, 0, steps, nullptr);

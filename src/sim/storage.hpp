@@ -102,4 +102,16 @@ struct Batch<T>::Storage {
   void put_state(std::size_t i, const FlapperState& state, Start start);
 };
 
+/// What a Batch, whose header is installed, shows to the project's own rooms alone.
+struct StorageAccess {
+  template <class T>
+  static auto& of(Batch<T>& batch) {
+    return *batch.storage_;
+  }
+};
+template <class T>
+auto& storage_of(Batch<T>& batch) {
+  return StorageAccess::of(batch);
+}
+
 }  // namespace flappy::sim

@@ -165,9 +165,9 @@ void expect_voltages_to_the_bit(const std::string& control_hz) {
       ASSERT_FALSE(updates.empty());
       if (i == 0) {
         for (const rollout::DriverUpdate& u : updates) EXPECT_EQ(u.step, std::exchange(next, next + 10));
-        EXPECT_LT(updates.back().step, fleet.batch().storage().steps);
+        EXPECT_LT(updates.back().step, sim::storage_of(fleet.batch()).steps);
       }
-      const auto [block, lane] = fleet.batch().storage().at(i);
+      const auto [block, lane] = sim::storage_of(fleet.batch()).at(i);
       const auto held = sim::get<sim::Drive<double>>(block.drive, lane).voltages;
       ASSERT_EQ(std::bit_cast<std::uint64_t>(updates.back().left_V), std::bit_cast<std::uint64_t>(held.left_V)) << tick;
       ASSERT_EQ(std::bit_cast<std::uint64_t>(updates.back().right_V), std::bit_cast<std::uint64_t>(held.right_V))

@@ -189,7 +189,7 @@ TEST(Effects, KeepTheirMemoryFromCallToCallAndForgetItAtAReset) {
   begin(again);
   again.step(777);
   begin(again);
-  again.storage().steps = 0;
+  storage_of(again).steps = 0;
   again.step(2000);
   EXPECT_EQ(once.hash(), again.hash());
 }
@@ -204,7 +204,7 @@ TEST(Effects, OfAFrozenFlapperForgetWithIt) {
   b.set_input(0, kHard);
   b.step(20);
   EXPECT_EQ(b.status(0) & kFrozen, static_cast<std::uint32_t>(kFrozen));
-  b.storage().for_states(0, ~std::uint64_t{0}, [](float number) { EXPECT_EQ(number, 0); });
+  storage_of(b).for_states(0, ~std::uint64_t{0}, [](float number) { EXPECT_EQ(number, 0); });
 }
 
 TEST(Effects, AreNotToBeMadeUp) {
@@ -230,7 +230,7 @@ TEST(Effects, RememberThroughAReplaysSpinUp) {
   for (int i = 0; i < 2000; ++i) {
     flown.push_back(b.state(0));
     b.step(1);
-    const auto [block, lane] = b.storage().at(0);
+    const auto [block, lane] = storage_of(b).at(0);
     const auto drive = get<Drive<double>>(block.drive, lane);
     voltages.t_s.push_back(i * 1e-4);
     voltages.left_V.push_back(drive.voltages.left_V);
@@ -265,7 +265,7 @@ Drawn drawn(const model::Vehicle& v, double step_s, const MotorVoltage& motor_V)
     const FlapperState before = b.state(0);
     b.step(1);
     const FlapperState after = b.state(0);
-    const auto [block, lane] = b.storage().at(0);
+    const auto [block, lane] = storage_of(b).at(0);
     const Voltages<double> given = get<Drive<double>>(block.drive, lane).voltages;
     for (const std::size_t side : {0, 1}) {
       driver_V[side].push_back(side == 0 ? given.left_V : given.right_V);

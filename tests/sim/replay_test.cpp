@@ -35,7 +35,7 @@ Recorded fly(const model::Vehicle& vehicle, int milliseconds, double difference_
     batch.set_input(0, {11.5 + std::sin(0.05 * ms), difference_V - 0.3 + 0.2 * std::sin(0.11 * ms), -0.1, 0.01});
     r.states.push_back(batch.state(0));
     batch.step(10);
-    const auto v = get<Drive<double>>(batch.storage().blocks[0].drive, 0).voltages;
+    const auto v = get<Drive<double>>(storage_of(batch).blocks[0].drive, 0).voltages;
     r.voltages.t_s.push_back(ms * 1e-3);
     r.voltages.left_V.push_back(v.left_V);
     r.voltages.right_V.push_back(v.right_V);

@@ -201,7 +201,7 @@ std::vector<Rows> PredictedFlight::predict(const std::vector<const Candidate*>& 
   const Recording& r = recording_;
   const ResetBlock reset = *carry_block_kernels[sim::place_of("")];
   sim::Batch<double> batch(kVehicles, candidates.front()->vehicle, {kPredictionStep_s, 1, r.world, {}});
-  if (r.log.power) batch.storage().keep_effects(0);  // the meter needs their rows
+  if (r.log.power) sim::storage_of(batch).keep_effects(0);  // the meter needs their rows
   std::vector<ShiftedVoltage> shifted;
   for (std::size_t i = 0; i < kVehicles; ++i) {
     const Candidate& c = *candidates[std::min(i, candidates.size() - 1)];
@@ -211,7 +211,7 @@ std::vector<Rows> PredictedFlight::predict(const std::vector<const Candidate*>& 
     batch.reset(i, {});
     shifted.emplace_back(c.lag_s / kPredictionStep_s);
   }
-  auto& storage = batch.storage();
+  auto& storage = sim::storage_of(batch);
   sim::Block<double>& block = storage.blocks[0];
   sim::StepPlan plan = storage.plan();
   plan.steps_per_update = 1;
