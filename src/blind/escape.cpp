@@ -90,7 +90,7 @@ class Escaper {
     const bool done = flight::arrived(k.hand_back, flight::score_of(by, goal_), by.body_rate_rad_s, t_s) != 0;
     flight::note_success(k.success, score, truth.body_rate_rad_s, t_s, episode_);
     if (done) episode_.handed_back = 1;
-    flight::look_for_ends(k.limits, score, t_s, [&](bool over, std::uint32_t bit) { ended_ |= over ? bit : 0; });
+    flight::check_termination(k.limits, score, t_s, [&](bool over, std::uint32_t bit) { ended_ |= over ? bit : 0; });
   }
 
   const EscapeRules& rules_;

@@ -62,7 +62,7 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
     episode.action[i] = where(acts, action[i], episode.action[i]);
     episode.adds[i] = where(acts, scaled_action(plan.task, i, action[i]), episode.adds[i]);
   }
-  episode.gain = where(acts, L<T>(0), episode.gain);
+  episode.action_reward = where(acts, L<T>(0), episode.action_reward);
   store_rows(episode, s.flight.episode, first);
 }
 
@@ -234,9 +234,9 @@ FLAPPY_INLINE void estimate(const FlightSpace<T>& s, const FlightPlan<T>& plan, 
   store_rows(estimator, f.estimator, first);
 }
 
-/// Scores the period, looks whether the episode is over, and shows the policy what it may know.
+/// Rewards the period, checks whether the episode ends, and shows the policy what it may know.
 template <class T>
-FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
+FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;
   const auto truth = load_rows<Truth<L<T>>>(f.truth, first);
   auto episode = load_rows<Episode<L<T>>>(f.episode, first);
@@ -251,11 +251,11 @@ FLAPPY_INLINE void judge(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
                                 : arrived(plan.task.hand_back, score, truth.body_rate_rad_s, now);
   note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode);
   episode.reward = reward_of(plan.task.reward, score, truth, now, L<T>(plan.task.tick_s), done, episode);
-  episode.gain += episode.reward;
+  episode.action_reward += episode.reward;
   episode.handed_back = where(done, L<T>(1), episode.handed_back);
   for (int i = 0; i < kActions; ++i) episode.previous[i] = episode.action[i];
 
-  look_for_ends(plan.task.limits, score, now, [&](typename L<T>::Mask mask, std::uint32_t bit) {
+  check_termination(plan.task.limits, score, now, [&](typename L<T>::Mask mask, std::uint32_t bit) {
     if (!rarely(mask)) return;
     for (int i = 0; i < kWidth<T>; ++i)
       if (mask.raw[i]) f.ended[first + i] |= bit;
@@ -315,7 +315,7 @@ void fly_block(const FlightSpace<T>& s, const FlightPlan<T>& plan) {
   }
   for_lanes<T>([&](int first) { estimate(s, plan, first); });
   watch.lap(kEstimate);
-  for_lanes<T>([&](int first) { judge(s, plan, first); });
+  for_lanes<T>([&](int first) { reward_and_terminate(s, plan, first); });
   watch.lap(kReward);
 }
 

@@ -16,7 +16,7 @@ struct Episode {
   T added[kActions];     // besides
   T handed_back;         // 0 or 1
   T reward;              // of the last control period
-  T gain;                // sum of rewards since the policy last acted
+  T action_reward;       // sum of rewards since the policy last acted
   T noise[kActions];     // on its actions, of deviation 1
   T captured_s;          // when the goal was captured first; 0: not yet
   T lost_s;              // when it was not kept first; 0: never
@@ -150,7 +150,8 @@ FLAPPY_INLINE void note_success(const Success<Element<T>>& k, const Score<T>& s,
 
 /// Calls mark(mask, bit) for each end.
 template <class T, class Mark>
-FLAPPY_INLINE void look_for_ends(const Limits<Element<T>>& k, const Score<T>& s, const T& time_s, const Mark& mark) {
+FLAPPY_INLINE void check_termination(const Limits<Element<T>>& k, const Score<T>& s, const T& time_s,
+                                     const Mark& mark) {
   const Vec3<T>& p = s.position_m;
   const T far(k.distance_m);
   mark((p.x < T(k.x_low_m)) | (p.x > T(k.x_high_m)) | (abs(p.y) > T(k.y_m)) | (abs(p.z) > T(k.z_m)) |

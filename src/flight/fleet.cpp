@@ -329,9 +329,9 @@ std::array<T, kActions> Fleet<T>::adds(std::size_t i) const {
   return adds;
 }
 template <class T>
-T Fleet<T>::gain(std::size_t i) const {
+T Fleet<T>::action_reward(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
-  return f.episode[offsetof(Episode<T>, gain) / sizeof(T)][lane];
+  return f.episode[offsetof(Episode<T>, action_reward) / sizeof(T)][lane];
 }
 template <class T>
 std::pair<double, double> Fleet<T>::innovation(std::size_t i) const {

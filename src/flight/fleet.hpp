@@ -114,7 +114,7 @@ class Fleet {
   void true_observation(std::size_t i, T* row) const;
   std::array<T, kActions> action(std::size_t i) const;  ///< of the policy, its noise included
   std::array<T, kActions> adds(std::size_t i) const;    ///< what that adds: V, V, V, split cycle
-  T gain(std::size_t i) const;                          ///< rewards since the policy last acted
+  T action_reward(std::size_t i) const;                 ///< rewards since the policy last acted
   /// Squared innovations of the last pose over their variance: angle and position, three degrees of freedom each.
   std::pair<double, double> innovation(std::size_t i) const;
   std::array<double, 3> gyro_bias_rad_s(std::size_t i) const;  ///< true

@@ -31,7 +31,7 @@ Collector::Collector(const TrainConfig& config)
       pending_(config.flappers),
       observations_(config.flappers * kept_ * inputs_),
       actions_(config.flappers * kept_ * flight::kActions),
-      gains_(config.flappers * kept_),
+      rewards_(config.flappers * kept_),
       staged_(fleet_.blocks()),
       seconds_(fleet_.blocks()) {
   if (fly_.fleet.task.start.settled)
@@ -51,7 +51,7 @@ void Collector::start(std::size_t i) {
                                  pool_.empty() ? nullptr : &pool_[static_cast<std::size_t>(place)]);
   p.count = 0;
   p.waits = 0;
-  p.gain = 0;
+  p.episode_return = 0;
   fleet_.observation(i, observation(i, 0));
 }
 
@@ -72,15 +72,15 @@ void Collector::run(std::size_t item) {
 /// What the last action of a flapper led to.
 void Collector::gather(std::size_t i, std::size_t item) {
   Pending& p = pending_[i];
-  const float gain = static_cast<float>(config_.reward_scale) * fleet_.gain(i);
-  p.gain += gain;
+  const float reward = static_cast<float>(config_.reward_scale) * fleet_.action_reward(i);
+  p.episode_return += reward;
   if (p.waits == 0) {
     const auto action = fleet_.action(i);
     std::copy(action.begin(), action.end(), &actions_[(i * kept_ + p.count) * flight::kActions]);
-    gains_[i * kept_ + p.count] = gain;
+    rewards_[i * kept_ + p.count] = reward;
     ++p.count;
   } else {
-    gains_[i * kept_ + p.count - 1] += gain;  // the last action is the one that is paid
+    rewards_[i * kept_ + p.count - 1] += reward;  // the last action is the one that is paid
   }
 
   float next[flight::kMaxObservation];
@@ -94,7 +94,7 @@ void Collector::gather(std::size_t i, std::size_t item) {
     while (p.count > 0) emit(i, item, next, terminated);
     ++p.episodes;
     p.sums.episodes += 1;
-    p.sums.gain += p.gain;
+    p.sums.returns += p.episode_return;
     p.sums.captured += fleet_.captured_s(i) > 0;
     p.sums.handed_back += handed_back;
     p.sums.terminated += terminated && !handed_back;
@@ -105,27 +105,28 @@ void Collector::gather(std::size_t i, std::size_t item) {
   std::copy_n(next, inputs_, observation(i, p.count));
 }
 
-/// Tells of the oldest action that is pending: its return over all that are, then the value of what is seen now.
+/// Tells of the oldest of the n actions that are pending: its n-step return sum over k < n of discount^k r_k, and what the value
+/// of the observation now is weighed by, discount^n.
 void Collector::emit(std::size_t i, std::size_t item, const float* next, bool terminated) {
   Pending& p = pending_[i];
   const auto discount = static_cast<float>(config_.discount);
   float* action = &actions_[i * kept_ * flight::kActions];
-  float* gain = &gains_[i * kept_];
-  float sum = 0, weight = 1;
+  float* reward = &rewards_[i * kept_];
+  float n_step_return = 0, weight = 1;
   for (std::uint32_t k = 0; k < p.count; ++k) {
-    sum += weight * gain[k];
+    n_step_return += weight * reward[k];
     weight *= discount;
   }
   std::vector<float>& to = staged_[item];
   to.insert(to.end(), observation(i, 0), observation(i, 1));
   to.insert(to.end(), action, action + flight::kActions);
-  to.push_back(sum);
+  to.push_back(n_step_return);
   to.push_back(terminated ? 0 : weight);
   to.insert(to.end(), next, next + inputs_);
   --p.count;
   std::copy_n(observation(i, 1), p.count * inputs_, observation(i, 0));
   std::copy_n(action + flight::kActions, p.count * flight::kActions, action);
-  std::copy_n(gain + 1, p.count, gain);
+  std::copy_n(reward + 1, p.count, reward);
 }
 
 void Collector::end(Replay& replay) {
@@ -141,7 +142,7 @@ EpisodeSums Collector::take_sums() {
   EpisodeSums all;
   for (Pending& p : pending_) {
     const EpisodeSums s = std::exchange(p.sums, {});
-    all.episodes += s.episodes, all.gain += s.gain, all.captured += s.captured;
+    all.episodes += s.episodes, all.returns += s.returns, all.captured += s.captured;
     all.handed_back += s.handed_back, all.terminated += s.terminated;
   }
   return all;
@@ -168,7 +169,7 @@ void Collector::save(CheckpointWriter& to) {
   to.put_bytes("pending", std::as_bytes(std::span(pending_)));
   to.put("pending_observations", observations_);
   to.put("pending_actions", actions_);
-  to.put("pending_gains", gains_);
+  to.put("pending_gains", rewards_);
 }
 
 void Collector::restore(const Checkpoint& from) {
@@ -180,7 +181,7 @@ void Collector::restore(const Checkpoint& from) {
   from.get_bytes("pending", std::as_writable_bytes(std::span(pending_)));
   from.get("pending_observations", observations_);
   from.get("pending_actions", actions_);
-  from.get("pending_gains", gains_);
+  from.get("pending_gains", rewards_);
 }
 
 }  // namespace flappy::learn

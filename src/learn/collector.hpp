@@ -11,7 +11,7 @@ namespace flappy::learn {
 
 /// Sums over the episodes that ended since they were last taken.
 struct EpisodeSums {
-  double episodes = 0, gain = 0, captured = 0, handed_back = 0, terminated = 0;
+  double episodes = 0, returns = 0, captured = 0, handed_back = 0, terminated = 0;
 };
 
 class Collector {
@@ -42,7 +42,7 @@ class Collector {
     std::uint32_t episode = 0;
     std::uint64_t episodes = 0, waits = 0;  // 1: handed back, and paid until the task's reward ends
     EpisodeSums sums;
-    double gain = 0;  // of its episode
+    double episode_return = 0;
   };
   void start(std::size_t i);
   void gather(std::size_t i, std::size_t item);
@@ -57,7 +57,7 @@ class Collector {
   std::uint32_t paid_ticks_;
   std::vector<Pending> pending_;            // of each flapper
   std::vector<float> observations_;         // [flapper][kept_][inputs_]: before each action that is pending
-  std::vector<float> actions_, gains_;      // [flapper][kept_][kActions], [flapper][kept_]
+  std::vector<float> actions_, rewards_;    // [flapper][kept_][kActions], [flapper][kept_]
   std::vector<std::vector<float>> staged_;  // of each block: transitions, row after row as Replay has them
   std::vector<double> seconds_;             // of each block
 };

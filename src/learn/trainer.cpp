@@ -175,7 +175,7 @@ class Trainer {
     const double figures[] = {static_cast<double>(updates()),
                               static_cast<double>(collector_.env_steps()),
                               static_cast<double>(collector_.episodes()),
-                              share(sums.gain),
+                              share(sums.returns),
                               share(sums.captured),
                               share(sums.handed_back),
                               share(sums.terminated),
@@ -186,7 +186,7 @@ class Trainer {
                               success_,
                               flown.captured.value,
                               flown.capture_s.median.value_or(std::numeric_limits<double>::quiet_NaN())};
-    return_mean_ = share(sums.gain);
+    return_mean_ = share(sums.returns);
     losses_ = values_ = actor_values_ = 0, samples_ = actor_samples_ = 0;
     evaluation_s_ += seconds_since(from);
     const auto [updates_per_s, env_steps_per_s] = rates_since(last_);

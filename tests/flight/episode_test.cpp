@@ -142,7 +142,7 @@ std::uint32_t ends(const Limits<double>& k, const V& p, double facing = 1, doubl
   Score<double> s{};
   s.position_m = p, s.facing = facing, s.upright = 1;
   std::uint32_t bits = 0;
-  look_for_ends(k, s, time_s, [&](bool mask, std::uint32_t bit) { bits |= mask ? bit : 0; });
+  check_termination(k, s, time_s, [&](bool mask, std::uint32_t bit) { bits |= mask ? bit : 0; });
   return bits;
 }
 

@@ -85,7 +85,7 @@ TEST(Collector, OneStepTransitionsAreWhatWasFlown) {
   const Collected all = collect(c);
   ASSERT_EQ(all.replay.size(), kSteps * c.flappers);
   const Transitions t(c, all.replay);
-  double episodes = 0, gain = 0;
+  double episodes = 0, returns = 0;
   for (std::size_t i = 0; i < c.flappers; ++i) {
     double since = 0;
     for (int step = 0; step < kSteps; ++step) {
@@ -94,7 +94,7 @@ TEST(Collector, OneStepTransitionsAreWhatWasFlown) {
       const bool ended = t.discount(row) == 0;
       ASSERT_NEAR(t.reward(row), 0.5 * 5, 1e-5);  // the periods of an action, handed back within it or not
       since += t.reward(row);
-      if (ended) episodes += 1, gain += since, since = 0;
+      if (ended) episodes += 1, returns += since, since = 0;
       else ASSERT_FLOAT_EQ(t.discount(row), 0.9F);
       if (step + 1 == kSteps) continue;
       const float* after = t.row(step + 1, i);
@@ -105,7 +105,7 @@ TEST(Collector, OneStepTransitionsAreWhatWasFlown) {
   EXPECT_GE(episodes, c.flappers);  // 0.6 s of flights of at most 0.35 s
   EXPECT_EQ(all.sums.episodes, episodes);
   EXPECT_EQ(all.episodes, episodes);
-  EXPECT_NEAR(all.sums.gain, gain, 1e-3 * gain);
+  EXPECT_NEAR(all.sums.returns, returns, 1e-3 * returns);
   EXPECT_EQ(all.sums.handed_back + all.sums.terminated, episodes);
   EXPECT_EQ(all.env_steps, kSteps * 5 * c.flappers);
 }
@@ -175,7 +175,7 @@ TEST(Collector, PaysTheLastActionForWhatComesAfterIt) {
   EXPECT_EQ(last, static_cast<std::size_t>(all.sums.handed_back));
   EXPECT_GT(others, 20 * last);
   EXPECT_EQ(all.sums.terminated, 0);
-  EXPECT_NEAR(all.sums.gain / all.sums.episodes, 0.5 * 250, 1e-3);  // 0.5 s each
+  EXPECT_NEAR(all.sums.returns / all.sums.episodes, 0.5 * 250, 1e-3);  // 0.5 s each
 }
 
 TEST(Collector, ATimeOutIsNoTermination) {
