@@ -5,11 +5,13 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "io/installation.hpp"
+
 namespace flappy::benchmark {
 
 struct DetectabilityCommand {
-  std::string vehicle, randomise = FLAPPY_CONFIGS "/randomisation/published.toml",
-                       priors = FLAPPY_CONFIGS "/gap/priors.toml", out;
+  std::string vehicle, randomise = io::config_path("randomisation/published.toml"),
+                       priors = io::config_path("gap/priors.toml"), out;
   int vehicles = 8;
   std::uint64_t seed = 2001;  ///< of the first
   int threads = 0;            ///< 0: one for each processor

@@ -9,13 +9,14 @@
 
 #include "benchmark/plan.hpp"
 #include "blind/flights.hpp"
+#include "io/installation.hpp"
 
 namespace flappy::benchmark {
 
 struct MakeCommand {
-  std::filesystem::path out, vehicle = FLAPPY_CONFIGS "/vehicles/hummingbird_nominal.toml",
-                             randomise = FLAPPY_CONFIGS "/randomisation/published.toml",
-                             detectable = FLAPPY_CONFIGS "/gap/detectable.toml";
+  std::filesystem::path out, vehicle = io::config_path("vehicles/hummingbird_nominal.toml"),
+                             randomise = io::config_path("randomisation/published.toml"),
+                             detectable = io::config_path("gap/detectable.toml");
   PlanOptions plan;
   int threads = 0;  ///< 0: one for each processor
   /// What of the catalogue's parameters comes nearest to the effects of a case, by "effect.parameter"; null: nothing does.

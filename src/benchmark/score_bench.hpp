@@ -5,13 +5,14 @@
 #include <nlohmann/json.hpp>
 
 #include "benchmark/predict/predict.hpp"
+#include "io/installation.hpp"
 
 namespace flappy::benchmark {
 
 struct ScoreCommand {
   std::filesystem::path folder, vehicle;  ///< the latter: empty for the manifest's
-  std::filesystem::path priors = FLAPPY_CONFIGS "/gap/priors.toml";
-  std::filesystem::path experiments = FLAPPY_CONFIGS "/gap/experiments";  ///< for the prediction
+  std::filesystem::path priors = io::config_path("gap/priors.toml");
+  std::filesystem::path experiments = io::config_path("gap/experiments");  ///< for the prediction
   int threads = 0;  ///< cases at a time; 0: one for each processor
   Predictor predictor = predict;
 };

@@ -1,4 +1,5 @@
-# Installs the build to a prefix of its own, then configures, builds and runs examples/hover against it.
+# Installs the build to a prefix of its own, then configures, builds and runs examples/hover against it. The installed
+# programs find the configurations beside them.
 set(prefix ${BUILD_DIR}/example/prefix)
 set(build ${BUILD_DIR}/example/build)
 file(REMOVE_RECURSE ${BUILD_DIR}/example)
@@ -20,3 +21,13 @@ message("${output}")
 if(NOT output MATCHES "^hummingbird_nominal lifts off at (8|9|10)\\.[0-9] V\n$")
   message(FATAL_ERROR "not the expected output")
 endif()
+
+unset(ENV{FLAPPY_CONFIGS})
+foreach(name IN ITEMS bench blind eval export fly gap identify train tune)
+  run(${prefix}/bin/flappy-${name} --version)
+endforeach()
+run(${prefix}/bin/flappy-gap diagnose --help)
+if(NOT output MATCHES "${prefix}/share/flappy/configs/gap/priors.toml")
+  message(FATAL_ERROR "the installed flappy-gap does not look for its configurations beside itself:\n${output}")
+endif()
+run(${prefix}/bin/flappy-fly ${prefix}/share/flappy/configs/fly/hover.toml --set flight.duration_s=0.1)

@@ -9,6 +9,7 @@
 #include "flappy/batch.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "hover.hpp"
+#include "io/installation.hpp"
 #include "io/parallel.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
@@ -75,7 +76,7 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
               100 * thrust_error, 1e3 * position_error);
   std::printf("%zu bytes per float flapper\n", bytes);
 
-  const LoopReport loop = measure_closed_loop(vehicle, FLAPPY_CONFIGS, options);
+  const LoopReport loop = measure_closed_loop(vehicle, io::configs_folder(), options);
   std::printf("closed loop, one core, float: 2 ms of physics, sensors, estimator, controller, reward and observation\n");
   for (const LoopRow& row : loop.rows)
     std::printf("  %-24s %8.2f M control steps/s  [%5.2f .. %5.2f]\n", row.name.c_str(),
@@ -167,8 +168,9 @@ Json learner(const SpeedOptions& options) {
 
 Json busy(const model::Vehicle& vehicle, const SpeedOptions& options) {
   io::ProgressLine progress("measured");
-  const std::vector<BusyRow> rows = measure_busy(
-      vehicle, FLAPPY_CONFIGS, options, [&](int done, int total) { progress.show(static_cast<double>(done) / total); });
+  const std::vector<BusyRow> rows = measure_busy(vehicle, io::configs_folder(), options, [&](int done, int total) {
+    progress.show(static_cast<double>(done) / total);
+  });
   progress.clear();
   std::printf(
       "work per second of processor time beside a busy loop on each of %d processors, median of %d [range], %s\n",
@@ -202,7 +204,7 @@ int main(int argc, char** argv) {
       "Speed and accuracy of the simulator and the learner, side by side with DART, MuJoCo and LibTorch.",
       bench::facts());
   CLI::App& app = program.app();
-  std::string vehicle = FLAPPY_CONFIGS "/vehicles/hummingbird_nominal.toml";
+  std::string vehicle = io::config_path("vehicles/hummingbird_nominal.toml");
   bench::SpeedOptions options;
   app.add_option("--vehicle", vehicle, "vehicle file")->capture_default_str();
   app.add_option("--rounds", options.rounds, "rounds to take the median of")

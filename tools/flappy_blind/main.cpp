@@ -10,6 +10,7 @@
 #include "escapes.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
+#include "io/installation.hpp"
 
 namespace flappy::blind {
 namespace {
@@ -57,7 +58,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   fly->add_option("--out", robot.out, "folder for flight_1, flight_2, flight_3")->required();
   CLI::App* escape = program.app().add_subcommand("escape", "flies a policy's manoeuvre many times over");
-  blind::EscapeOptions escapes{.robot = {}, .policy = {}, .config = FLAPPY_CONFIGS "/fly/escape.toml"};
+  blind::EscapeOptions escapes{.robot = {}, .policy = {}, .config = io::config_path("fly/escape.toml")};
   blind::add_robot_options(*escape, escapes.robot);
   escape->add_option("--policy", escapes.policy, "an actor (.json), TorchScript (.pt) or a C header (.h)")->required();
   escape->add_option("--config", escapes.config, "task and controller that it was trained with")->capture_default_str();

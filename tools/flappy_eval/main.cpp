@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "io/installation.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/toml_writer.hpp"
@@ -44,7 +45,7 @@ std::string file_override(const char* key, const fs::path& path) {
 /// What is flown: the run's own configuration, or --config with the policy in it.
 FlyConfig read_config(const Request& r) {
   const fs::path policy = r.policy;
-  fs::path config = r.config.empty() ? fs::path(FLAPPY_CONFIGS "/fly/escape.toml") : fs::path(r.config);
+  fs::path config = r.config.empty() ? io::config_path("fly/escape.toml") : r.config;
   std::vector<std::string> overrides;
   if (fs::is_directory(policy)) {
     if (!r.config.empty())
@@ -281,7 +282,7 @@ Json json_of(const Request& request, const FlyConfig& config, const std::vector<
 /// The controller of this name: the one that is flown with where it is of that kind.
 Controller controller_named(const std::string& name, const FlyConfig& config) {
   if (config.fleet.controller.kind == flight::controller_kind(name)) return config.fleet.controller;
-  return flight::read_controller(io::Config::load(fs::path(FLAPPY_CONFIGS "/controllers") / (name + ".toml")).root());
+  return flight::read_controller(io::Config::load(io::config_path("controllers/" + name + ".toml")).root());
 }
 
 void evaluate(const Request& request, const io::Program& program) {

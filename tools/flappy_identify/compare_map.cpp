@@ -4,6 +4,7 @@
 
 #include "command.hpp"
 #include "identify/linear_map.hpp"
+#include "io/installation.hpp"
 #include "shared_options.hpp"
 
 namespace flappy::identify {
@@ -11,7 +12,7 @@ namespace flappy::identify {
 Command add_compare_map(CLI::App& program) {
   struct Settings {
     MapSource source;
-    std::string published = FLAPPY_CONFIGS "/identify/published_map.toml";
+    std::string published = io::config_path("identify/published_map.toml");
   };
   const auto s = std::make_shared<Settings>();
   s->source.moment_point = "com";

@@ -1,11 +1,12 @@
 #include "fit_options.hpp"
 
+#include "io/installation.hpp"
 #include "shared_options.hpp"
 
 namespace flappy::identify {
 
 void FitSettings::add(CLI::App& app) {
-  config = FLAPPY_CONFIGS "/identify/forces.toml";
+  config = io::config_path("identify/forces.toml");
   app.add_option("--config", config, "parameters and their bounds")->capture_default_str();
   app.add_option("--parameters", parameters, "fit these of the configuration alone, as a,b,c")->delimiter(',');
   app.add_option("--method", method, "gn: Gauss-Newton from several starts; ga: genetic algorithm; cmaes: CMA-ES")

@@ -121,8 +121,8 @@ Asked read_asked(const DiagnoseCommand& command) {
   flightlog::check_each_once(command.flights);
   return {vehicle,
           sim::read_randomisation(vehicle, io::Config::load(command.priors).root()),
-          rollout::read_fly_config(command.manoeuvre.empty() ? FLAPPY_CONFIGS "/fly/hover.toml" : command.manoeuvre),
-          read_manoeuvres(FLAPPY_CONFIGS "/gap/experiments"),
+          rollout::read_fly_config(command.manoeuvre.empty() ? io::config_path("fly/hover.toml") : command.manoeuvre),
+          read_manoeuvres(io::config_path("gap/experiments")),
           {.threads = command.threads,
            .withheld = withheld,
            .progress = {},

@@ -5,12 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "io/installation.hpp"
+
 namespace flappy::gap {
 
 struct DiagnoseCommand {
-  std::string vehicle, priors = FLAPPY_CONFIGS "/gap/priors.toml",
-                       discrepancy = FLAPPY_CONFIGS "/gap/model_discrepancy.toml",
-                       verdict = FLAPPY_CONFIGS "/gap/verdict.toml";
+  std::string vehicle, priors = io::config_path("gap/priors.toml"),
+                       discrepancy = io::config_path("gap/model_discrepancy.toml"),
+                       verdict = io::config_path("gap/verdict.toml");
   std::string
       manoeuvre;  ///< configuration of flappy-fly that the flights flew; empty: the recorded paths, under our hover's
   std::vector<std::string> flights, withheld;

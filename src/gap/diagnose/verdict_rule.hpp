@@ -33,6 +33,6 @@ struct VerdictRule {
   } naming;
 };
 
-VerdictRule read_verdict_rule(const std::filesystem::path& path = FLAPPY_CONFIGS "/gap/verdict.toml");
+VerdictRule read_verdict_rule(const std::filesystem::path& path = io::config_path("gap/verdict.toml"));
 
 }  // namespace flappy::gap
