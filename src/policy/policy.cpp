@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "io/files.hpp"
+#include "io/installation.hpp"
 #include "io/run_program.hpp"
 #include "io/temporary_folder.hpp"
 #include "policy/torch_script.hpp"
@@ -102,6 +103,20 @@ std::unique_ptr<const Policy> load_header(const fs::path& path, int observations
   return policy;
 }
 
+fs::path torch_plugin() { return io::beside_program("lib/flappy/torch_script.so"); }
+
+/// Loaded once, and never unloaded.
+const TorchFunctions& torch() {
+  static const TorchFunctions* const functions = [] {
+    const fs::path plugin = torch_plugin();
+    void* loaded = dlopen(plugin.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (loaded == nullptr)
+      refuse(plugin, "cannot be loaded: " + std::string(dlerror()), "LibTorch as it was built with (libtorch1.13)");
+    return static_cast<const TorchFunctions*>(dlsym(loaded, "flappy_torch_functions"));
+  }();
+  return *functions;
+}
+
 }  // namespace
 
 std::unique_ptr<const Policy> load_policy(const fs::path& path, int observations, int actions) {
@@ -110,18 +125,18 @@ std::unique_ptr<const Policy> load_policy(const fs::path& path, int observations
   refuse(path, "is no policy", "a TorchScript file (.pt) or a C header (.h)");
 }
 
-#ifndef FLAPPY_HAVE_TORCH
-bool reads_torch_script() { return false; }
+bool reads_torch_script() { return fs::exists(torch_plugin()); }
 
-std::string torch_script(const PolicyNetwork&, const std::string&) {
-  throw std::invalid_argument("TorchScript is not written by a build without LibTorch");
+std::string torch_script(const PolicyNetwork& network, const std::string& contract) {
+  if (!reads_torch_script()) throw std::invalid_argument("TorchScript is not written by a build without LibTorch");
+  return torch().write(network, contract);
 }
 
-std::unique_ptr<const Policy> load_torch_script(const fs::path& path, int, int) {
+std::unique_ptr<const Policy> load_torch_script(const fs::path& path, int observations, int actions) {
+  if (reads_torch_script()) return torch().load(path, observations, actions);
   io::read_text(path);
   refuse(path, "cannot be read by this build, which has no LibTorch",
          "a C header (.h), or a build with libtorch-dev installed");
 }
-#endif
 
 }  // namespace flappy::policy

@@ -32,7 +32,7 @@ class Policy {
 /// io::InputError, one line, where it is neither, has other sizes, does not compile or fails its test.
 std::unique_ptr<const Policy> load_policy(const std::filesystem::path& path, int observations, int actions);
 
-/// Whether this build reads TorchScript.
+/// Whether this build or installation reads and writes TorchScript.
 bool reads_torch_script();
 
 }  // namespace flappy::policy

@@ -46,11 +46,7 @@ class TorchScript : public Policy {
   mutable torch::jit::Module module_;  // forward() is not const, but changes nothing
 };
 
-}  // namespace
-
-bool reads_torch_script() { return true; }
-
-std::string torch_script(const PolicyNetwork& n, const std::string& contract) {
+std::string write(const PolicyNetwork& n, const std::string& contract) {
   const auto tensor = [](const std::vector<float>& numbers) { return torch::tensor(numbers); };
   torch::jit::Module module("FlappyPolicy");
   module.register_attribute("contract", torch::jit::StringType::get(), contract);
@@ -87,7 +83,7 @@ std::string torch_script(const PolicyNetwork& n, const std::string& contract) {
   return file.str();
 }
 
-std::unique_ptr<const Policy> load_torch_script(const std::filesystem::path& path, int observations, int actions) {
+std::unique_ptr<const Policy> load(const std::filesystem::path& path, int observations, int actions) {
   const auto refuse = [&](const std::string& what, const std::string& accepted) {
     throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
   };
@@ -118,5 +114,9 @@ std::unique_ptr<const Policy> load_torch_script(const std::filesystem::path& pat
   }
   return policy;
 }
+
+}  // namespace
+
+const TorchFunctions flappy_torch_functions = {load, write};
 
 }  // namespace flappy::policy

@@ -158,9 +158,9 @@ TEST(TorchScriptPolicy, RefusesWhatIsNone) {
 #else
 TEST(TorchScriptPolicy, IsNotReadWithoutLibTorch) {
   const Folder folder;
-  EXPECT_FALSE(reads_torch_script());
+  EXPECT_FALSE(policy::reads_torch_script());
   const std::string name = folder.write("p.pt", "");
-  EXPECT_EQ(message([&] { load_policy(name, 3, 2); }),
+  EXPECT_EQ(message([&] { policy::load_policy(name, 3, 2); }),
             name +
                 ": cannot be read by this build, which has no LibTorch; accepted: a C header (.h), or a build with "
                 "libtorch-dev installed");

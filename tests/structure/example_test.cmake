@@ -1,5 +1,5 @@
 # Installs the build to a prefix of its own, then configures, builds and runs examples/hover against it. The installed
-# programs find the configurations beside them.
+# programs find the configurations beside them; of LibTorch they load nothing at their start.
 set(prefix ${BUILD_DIR}/example/prefix)
 set(build ${BUILD_DIR}/example/build)
 file(REMOVE_RECURSE ${BUILD_DIR}/example)
@@ -25,6 +25,10 @@ endif()
 unset(ENV{FLAPPY_CONFIGS})
 foreach(name IN ITEMS bench blind eval export fly gap identify train tune)
   run(${prefix}/bin/flappy-${name} --version)
+  run(readelf -d ${prefix}/bin/flappy-${name})
+  if(NOT name STREQUAL "bench" AND output MATCHES "torch")
+    message(FATAL_ERROR "flappy-${name} loads LibTorch, whether it needs it or not")
+  endif()
 endforeach()
 run(${prefix}/bin/flappy-gap diagnose --help)
 if(NOT output MATCHES "${prefix}/share/flappy/configs/gap/priors.toml")
