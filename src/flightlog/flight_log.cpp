@@ -20,7 +20,6 @@ using io::positive;
 using io::shortest_digits;
 
 constexpr double kUnitTolerance = 1e-3;
-constexpr std::string_view kBothOrNeither = "both or neither";
 
 /// A column of a stream and the largest magnitude that is still read; what is merely odd is left to the checks.
 template <class Stream>
@@ -345,18 +344,15 @@ const std::string& text_of(const LogFiles& files, const std::string& name, const
   return found->second;
 }
 
-/// The stream of an optional file, whose table of the same name the header must have exactly where the file is.
+/// The stream of an optional file, which the header's table of the same name says how to read.
 template <class Stream>
 std::optional<Stream> parse_optional(const LogFiles& files, const std::string& name, const fs::path& folder,
-                                     bool declared, const io::Table& root, const std::vector<Field<Stream>>& fields) {
-  const std::string table = name.substr(0, name.find('.'));
+                                     bool declared, const std::vector<Field<Stream>>& fields) {
   const auto found = files.find(name);
-  if (found == files.end()) {
-    if (declared) root.fail(table, "is declared, but " + name + " is missing", kBothOrNeither);
-    return std::nullopt;
-  }
+  if (found == files.end()) return std::nullopt;
+  const std::string table = "[" + name.substr(0, name.find('.')) + "]";
   if (!declared)
-    refuse((folder / name).string(), "is there, but " + kHeader + " has no [" + table + "]", kBothOrNeither);
+    refuse((folder / name).string(), "is there, but " + kHeader + " has no " + table, table + ", or no " + name);
   return parse_stream(found->second, folder / name, fields);
 }
 
@@ -369,8 +365,8 @@ FlightLog parse_flight_log(const LogFiles& files, const fs::path& folder) {
   log.command = parse_command(text_of(files, kCommand, folder), folder / kCommand);
   log.mocap = parse_mocap(text_of(files, kMocap, folder), folder / kMocap);
   log.imu = parse_stream(text_of(files, kImu, folder), folder / kImu, kImuFields);
-  log.power = parse_optional(files, kPower, folder, log.header.power.has_value(), root, kPowerFields);
-  log.wings = parse_optional(files, kWings, folder, log.header.wings.has_value(), root, kWingsFields);
+  log.power = parse_optional(files, kPower, folder, log.header.power.has_value(), kPowerFields);
+  log.wings = parse_optional(files, kWings, folder, log.header.wings.has_value(), kWingsFields);
   require_overlap(log, folder);
   return log;
 }

@@ -4,8 +4,8 @@
 //   command.csv   t_s,left_voltage_V,right_voltage_V; optional: amplitude_V,difference_V,bias_V,split_cycle and phase_rad
 //   mocap.csv     t_s,x_m,y_m,z_m,qw,qx,qy,qz
 //   imu.csv       t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2
-//   power.csv     optional: t_s,battery_V,left_current_A,right_current_A
-//   wings.csv     optional: t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad
+//   power.csv     optional, declared in [power]: t_s,battery_V,left_current_A,right_current_A
+//   wings.csv     optional, declared in [wings]: t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad
 //   truth.csv     only from a simulator: the full state; no reader here opens it
 //
 // All streams share one clock; each has its own rate and may have gaps; time increases. World W: z up. Body B: x
@@ -119,7 +119,7 @@ struct FlightLog {
   CommandStream command;
   MocapStream mocap;
   ImuStream imu;
-  std::optional<PowerStream> power;  ///< where the header has it, as the next
+  std::optional<PowerStream> power;  ///< only where the header has it, as the next
   std::optional<WingsStream> wings;
   bool operator==(const FlightLog&) const = default;
 };
@@ -163,7 +163,8 @@ using LogFiles = std::map<std::string, std::string>;
 
 /// Reads a log. InputError "folder/file:line: column: what is wrong; what is accepted" for a file or column that is
 /// missing, unknown or faulty, time that does not increase, a quaternion whose length is not 1 to 1e-3 (others are
-/// normalised), and streams that never overlap. Never opens truth.csv.
+/// normalised), and streams that never overlap. Warns of an optional stream that is declared without its file, and does
+/// without it. Never opens truth.csv.
 FlightLog read_flight_log(const std::filesystem::path& folder);
 
 /// The same from texts; `folder` stands for the place in messages.

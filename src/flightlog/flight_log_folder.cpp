@@ -7,6 +7,7 @@
 #include "flightlog/flight_log.hpp"
 #include "io/config.hpp"
 #include "io/csv.hpp"
+#include "io/log.hpp"
 
 namespace flappy::flightlog {
 namespace {
@@ -92,7 +93,14 @@ FlightLog read_flight_log(const fs::path& folder) {
   }
   if (error) refuse(folder, "cannot be read: " + error.message(), "");
   for (const auto& name : {kHeader, kCommand, kMocap, kImu}) files[name] = io::read_text(folder / name);
-  return parse_flight_log(files, folder);
+  FlightLog log = parse_flight_log(files, folder);
+  const auto warn = [&](const char* table, const std::string& name) {
+    io::log(io::LogLevel::warning,
+            (folder / kHeader).string() + ": " + table + ": is declared, but there is no " + name + ": done without");
+  };
+  if (log.header.power && !log.power) warn("power", kPower);
+  if (log.header.wings && !log.wings) warn("wings", kWings);
+  return log;
 }
 
 void write_flight_log(const fs::path& folder, const FlightLog& log) {

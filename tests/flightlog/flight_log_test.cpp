@@ -204,6 +204,20 @@ TEST(FlightLog, RefusesFaultySamples) {
             "log/imu.csv:3:16: row has 6 cells; accepted: 7, as in the header");
 }
 
+/// Whoever declares a stream and does not have it is done without it.
+TEST(FlightLog, AsksForADeclaredStreamOnlyWhereItIsUsed) {
+  flightlog::LogFiles files = flight_log_files(sample_log());
+  files.erase("power.csv");
+  files.erase("wings.csv");
+  flightlog::FlightLog expected = sample_log();
+  expected.power.reset();
+  expected.wings.reset();
+  const flightlog::FlightLog log = flightlog::parse_flight_log(files, "log");
+  EXPECT_EQ(log, expected);
+  EXPECT_TRUE(log.header.power && log.header.wings);
+  EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(log), "log"), expected);
+}
+
 TEST(FlightLog, RefusesWhatIsMissingOrApart) {
   const auto changed = [](const std::function<void(flightlog::LogFiles&)>& change) {
     flightlog::LogFiles files = flight_log_files(sample_log());
@@ -212,13 +226,11 @@ TEST(FlightLog, RefusesWhatIsMissingOrApart) {
   };
   EXPECT_EQ(changed([](flightlog::LogFiles& f) { f.erase("imu.csv"); }),
             "log/imu.csv: is missing; accepted: a folder with flight.toml, command.csv, mocap.csv and imu.csv");
-  EXPECT_EQ(changed([](flightlog::LogFiles& f) { f.erase("power.csv"); }),
-            "log/flight.toml:28:1: power: is declared, but power.csv is missing; accepted: both or neither");
   EXPECT_EQ(changed([](flightlog::LogFiles& f) {
               std::string& header = f["flight.toml"];
               header.resize(header.find("\n[wings]"));
             }),
-            "log/wings.csv: is there, but flight.toml has no [wings]; accepted: both or neither");
+            "log/wings.csv: is there, but flight.toml has no [wings]; accepted: [wings], or no wings.csv");
   EXPECT_EQ(
       changed([](flightlog::LogFiles& f) { f["wings.csv"] = f["wings.csv"].substr(0, f["wings.csv"].find('\n')); }),
       "log/wings.csv: holds 0 samples; accepted: at least 2");
@@ -339,9 +351,12 @@ TEST_F(FlightLogFolder, RefusesWhatIsNotThere) {
                                        ": is no stream of a flight log; accepted: power.csv or "
                                        "wings.csv; did you mean \"power.csv\"?");
   fs::remove(folder_ / "Power.csv");
-  EXPECT_EQ(read_message(folder_),
-            (folder_ / "flight.toml").string() +
-                ":28:1: power: is declared, but power.csv is missing; accepted: both or neither");
+  testing::internal::CaptureStderr();
+  const flightlog::FlightLog without = flightlog::read_flight_log(folder_);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "warning: " + (folder_ / "flight.toml").string() +
+                ": power: is declared, but there is no power.csv: done without\n");
+  EXPECT_FALSE(without.power);
   fs::remove(folder_ / "flight.toml");
   EXPECT_EQ(read_message(folder_), (folder_ / "flight.toml").string() + ": cannot be read: No such file or directory");
 }

@@ -10,8 +10,8 @@ function(expect_line text)
   endif()
 endfunction()
 
-# Three seconds standing still, in `folder`, with this gravity in the accelerometer.
-function(write_flight folder gravity)
+# Standing still, in `folder`, with this gravity in the accelerometer, for so many intervals of 20 ms.
+function(write_flight folder gravity intervals)
   file(WRITE ${folder}/flight.toml
     "schema = 1\nvehicle = \"bird.toml\"\nflapping_Hz = 10\ngravity_m_s2 = 9.81\n"
     "[ambient]\nair_density_kg_m3 = 1.18\nground_z_m = 0\nceiling_z_m = 3\nwalls = []\n"
@@ -21,7 +21,7 @@ function(write_flight folder gravity)
   set(command "t_s,left_voltage_V,right_voltage_V\n")
   set(mocap "t_s,x_m,y_m,z_m,qw,qx,qy,qz\n")
   set(imu "t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2\n")
-  foreach(i RANGE 150)
+  foreach(i RANGE ${intervals})
     math(EXPR ms "1000 + 20 * ${i}")
     string(REGEX REPLACE "(...)$" ".\\1" t "${ms}")
     math(EXPR phase "${i} % 5")
@@ -38,11 +38,11 @@ set(volts 9 2.8 -7.3 -7.3 2.8)
 
 # ---- what is read
 
-write_flight(${WORK}/good 9.81)
-write_flight(${WORK}/bad 0)
+write_flight(${WORK}/good 9.81 150)
+write_flight(${WORK}/bad 0 150)
 run(check ${WORK}/good)
 expect_equal("stderr" "${err}" "")
-expect_equal("exit code" "${code}" 0)
+expect_equal("exit code where a fault forbids a diagnosis" "${code}" 1)
 expect_line("${WORK}/good: bird.toml, 10 Hz")
 expect_line("  imu            151     3.000     50.00     50.00        20.00         0  0.00 %      0.000")
 expect_line("  command        151     3.000     50.00         -        20.00         -       -      0.000")
@@ -53,7 +53,7 @@ expect_line("  forbids a diagnosis: ${WORK}/good/command.csv:152: the flight las
 expect_line("1 readable, faults 1, warnings 0, not tested 4")
 
 run(check ${WORK}/good ${WORK}/bad --json ${WORK}/out.json)
-expect_equal("exit code" "${code}" 0)
+expect_equal("exit code" "${code}" 1)
 expect_line("  accelerometer      warning: mean specific force (0.00, 0.00, 0.00) m/s^2 in W, (0, 0, 9.81) +- 3.0 expected: gravity is missing: acceleration instead of specific force")
 expect_line("2 readable, faults 2, warnings 1, not tested 8")
 file(READ ${WORK}/out.json json)
@@ -70,13 +70,21 @@ endforeach()
 # Truth is there to be judged against, not to be read.
 file(WRITE ${WORK}/good/truth.csv "no table")
 run(check ${WORK}/good)
-expect_equal("exit code beside a truth" "${code}" 0)
+expect_equal("stderr beside a truth" "${err}" "")
 
 run(--help)
 expect_equal("exit code" "${code}" 0)
 if(NOT out MATCHES "check +axes, units, clocks and dropouts")
   message(SEND_ERROR "--help does not tell of check: ${out}")
 endif()
+
+# A stream that is declared and not there is done without; nothing forbids a diagnosis of a flight that is long enough.
+write_flight(${WORK}/long 9.81 350)
+file(APPEND ${WORK}/long/flight.toml "[wings]\nrate_hz = 500\nnoise_rad = 0.01\n")
+run(check ${WORK}/long)
+expect_equal("stderr" "${err}" "warning: ${WORK}/long/flight.toml: wings: is declared, but there is no wings.csv: done without\n")
+expect_match("stdout" "${out}" "1 readable, faults 0, ")
+expect_equal("exit code" "${code}" 0)
 
 # ---- what is refused
 

@@ -113,8 +113,8 @@ Json check(const std::vector<std::string>& folders) {
 int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-gap", "What a flight log says of the difference between a robot and its model.", {});
-  CLI::App* check =
-      program.app().add_subcommand("check", "axes, units, clocks and dropouts of logs, without a diagnosis");
+  CLI::App* check = program.app().add_subcommand(
+      "check", "axes, units, clocks and dropouts of logs; exit code 1 where a fault forbids a diagnosis");
   std::vector<std::string> folders;
   check->add_option("flight", folders, "folders of flight logs")->required();
   CLI::App* diagnose = program.app().add_subcommand("diagnose", "what is missing in the model of a robot that flew");
@@ -130,11 +130,15 @@ int main(int argc, char** argv) {
   diagnose->add_option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
   diagnose->add_option("--threads", command.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
   program.app().require_subcommand(1);
-  return program.run(argc, argv, [&] {
+  bool faulty = false;
+  const int code = program.run(argc, argv, [&] {
     if (check->parsed()) {
-      program.write_json(gap::check(folders));
+      const nlohmann::ordered_json found = gap::check(folders);
+      faulty = found["faults"] > 0;
+      program.write_json(found);
     } else {
       program.write_json(gap::run_diagnose(command));
     }
   });
+  return faulty ? 1 : code;
 }

@@ -176,10 +176,10 @@ Rows PredictedFlight::declared_noise(std::uint64_t seed) const {
       before[i] = rate;
       s[kForceX + i] = h.imu.accel_noise_m_s2 * normal(random);
     }
-    for (int i = 0; i < 2; ++i) s[kStrokeLeft + i] = h.wings ? h.wings->noise_rad * normal(random) : 0;
+    for (int i = 0; i < 2; ++i) s[kStrokeLeft + i] = recording_.log.wings ? h.wings->noise_rad * normal(random) : 0;
   }
   Rows rows = rows_of(samples);
-  if (h.power) {
+  if (recording_.log.power) {
     std::vector<double> power;
     for (std::size_t i = 0; i < power_sample_.size(); ++i)
       power.insert(power.end(), {h.power->voltage_noise_V * normal(random), h.power->current_noise_A * normal(random),
