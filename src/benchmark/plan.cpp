@@ -38,7 +38,8 @@ class Planner {
       throw io::InputError(
           "--detectable: nothing outside the catalogue is detectable; accepted: a table of flappy-blind detectability");
     if (detectable_.size() < 2)
-      throw io::InputError("--detectable: fewer than two effects are detectable; accepted: a table of flappy-blind detectability");
+      throw io::InputError(
+          "--detectable: fewer than two effects are detectable; accepted: a table of flappy-blind detectability");
   }
 
   std::vector<PlannedCase> run() {
@@ -110,7 +111,8 @@ class Planner {
     const std::vector<std::string> group = model::whole_group(first);
     std::vector<std::string> others = detectable_;
     std::erase_if(others, [&](const std::string& id) { return std::ranges::count(group, id) > 0; });
-    if (others.empty()) throw io::InputError("--detectable: all are of one group; accepted: a table of flappy-blind detectability");
+    if (others.empty())
+      throw io::InputError("--detectable: all are of one group; accepted: a table of flappy-blind detectability");
     c.effects = {at_twice(first), at_twice(others[below(others.size())])};
   }
 

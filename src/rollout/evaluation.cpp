@@ -29,7 +29,10 @@ class Part {
  public:
   Part(FlyConfig config, std::size_t count, const policy::Policy* policy, std::vector<flight::Snapshot<T>>& hover,
        Detail detail)
-      : flights_(std::move(config), count, policy, &hover), fleet_(flights_.fleet()), outcomes_(count), drawn_J_(count) {
+      : flights_(std::move(config), count, policy, &hover),
+        fleet_(flights_.fleet()),
+        outcomes_(count),
+        drawn_J_(count) {
     for (std::size_t i = 0; i < count && detail == Detail::full; ++i)
       monitors_.emplace_back(fleet_.options().task, fleet_.truth(i), fleet_.target(i));
   }

@@ -77,7 +77,8 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
   std::printf("%zu bytes per float flapper\n", bytes);
 
   const LoopReport loop = measure_closed_loop(vehicle, io::configs_folder(), options);
-  std::printf("closed loop, one core, float: 2 ms of physics, sensors, estimator, controller, reward and observation\n");
+  std::printf(
+      "closed loop, one core, float: 2 ms of physics, sensors, estimator, controller, reward and observation\n");
   for (const LoopRow& row : loop.rows)
     std::printf("  %-24s %8.2f M control steps/s  [%5.2f .. %5.2f]\n", row.name.c_str(),
                 row.control_steps_per_s.median / 1e6, row.control_steps_per_s.low / 1e6,

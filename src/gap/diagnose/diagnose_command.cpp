@@ -10,6 +10,7 @@
 #include "gap/diagnose/summary.hpp"
 #include "io/config.hpp"
 #include "io/files.hpp"
+#include "io/installation.hpp"
 #include "io/log.hpp"
 #include "io/progress.hpp"
 #include "model/effects/registry.hpp"

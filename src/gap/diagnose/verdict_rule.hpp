@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "io/installation.hpp"
+
 namespace flappy::gap {
 
 struct VerdictRule {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "gap/replay/reset_prediction.hpp"
+#include "io/installation.hpp"
 
 namespace flappy::gap {
 
@@ -49,7 +50,7 @@ struct ModelDiscrepancy {
   std::map<std::string, double> background;  ///< by effect, and of "other"
 };
 
-ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path = FLAPPY_CONFIGS
-                                        "/gap/model_discrepancy.toml");
+ModelDiscrepancy read_model_discrepancy(
+    const std::filesystem::path& path = io::config_path("gap/model_discrepancy.toml"));
 
 }  // namespace flappy::gap
