@@ -196,7 +196,7 @@ Flight fly(const model::Vehicle& vehicle, const Integrator& integrate, const Par
   const V torso =
       f.com_m + rotation_matrix(f.q) * (V{vehicle.torso.com_m.x, vehicle.torso.com_m.y, vehicle.torso.com_m.z} -
                                         centre_of_mass(p, state_of(f)));
-  return {torso.x, torso.y, torso.z};
+  return {torso.x, torso.y, torso.z, {f.q.w, f.q.x, f.q.y, f.q.z}};
 }
 
 }  // namespace
@@ -218,8 +218,8 @@ std::vector<IntegratorRow> integrator_study(const model::Vehicle& vehicle) {
     for (const double us : {500, 200, 100, 50, 20, 10}) {
       const double step_s = us * 1e-6;
       const Flight flight = fly(vehicle, c.integrate, derive(vehicle, c.implicit_damping ? step_s : 0), step_s);
-      rows.push_back(
-          {c.name, step_s, static_cast<int>(std::lround(0.3 / step_s)) * c.evaluations, distance_m(flight, exact)});
+      rows.push_back({c.name, step_s, static_cast<int>(std::lround(0.3 / step_s)) * c.evaluations,
+                      distance_m(flight, exact), turn_rad(flight, exact)});
     }
   return rows;
 }

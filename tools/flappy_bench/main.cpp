@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "accuracy.hpp"
 #include "busy.hpp"
@@ -111,23 +112,33 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
 
 Json convergence(const model::Vehicle& vehicle) {
   Json steps = Json::array(), integrators = Json::array();
-  std::printf("our step, 10 V: torso after 0.3 s of free flight against the 5 us run, mean thrust welded\n");
-  std::printf("  %8s %14s %12s %18s\n", "step us", "error mm", "thrust N", "from converged");
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  std::printf("our step, 10 V: 0.3 s of free flight against the 5 us run, mean thrust welded\n");
+  std::printf("  torso: error at the end; wings: rms of both over the flight\n");
+  std::printf("  %8s %10s %13s %11s %13s %12s %16s\n", "step us", "torso mm", "attitude deg", "stroke deg",
+              "rotation deg", "thrust N", "from converged");
   for (const StepRow& r : step_study(vehicle)) {
     const double error = r.thrust_N / kConvergedThrust_N - 1;
-    std::printf("  %8.0f %14.3f %12.6f %+16.3f %%\n", r.step_s * 1e6, r.position_error_m * 1e3, r.thrust_N,
-                100 * error);
-    steps.push_back({{"step_s", r.step_s}, {"position_error_m", r.position_error_m}, {"thrust_N", r.thrust_N}});
+    std::printf("  %8.0f %10.3f %13.3f %11.3f %13.3f %12.6f %+14.3f %%\n", r.step_s * 1e6, r.position_error_m * 1e3,
+                r.attitude_error_rad * kDegrees, r.stroke_error_rad * kDegrees, r.rotation_error_rad * kDegrees,
+                r.thrust_N, 100 * error);
+    steps.push_back({{"step_s", r.step_s},
+                     {"position_error_m", r.position_error_m},
+                     {"attitude_error_rad", r.attitude_error_rad},
+                     {"stroke_error_rad", r.stroke_error_rad},
+                     {"rotation_error_rad", r.rotation_error_rad},
+                     {"thrust_N", r.thrust_N}});
   }
   std::printf("integrators on the same equations, free flight against our 1 us run\n");
-  std::printf("  %-10s %8s %14s %14s\n", "", "step us", "evaluations", "error mm");
+  std::printf("  %-10s %8s %14s %14s %14s\n", "", "step us", "evaluations", "torso mm", "attitude deg");
   for (const IntegratorRow& r : integrator_study(vehicle)) {
-    std::printf("  %-10s %8.0f %14d %14.3f\n", r.integrator.c_str(), r.step_s * 1e6, r.evaluations,
-                r.position_error_m * 1e3);
+    std::printf("  %-10s %8.0f %14d %14.3f %14.3f\n", r.integrator.c_str(), r.step_s * 1e6, r.evaluations,
+                r.position_error_m * 1e3, r.attitude_error_rad * kDegrees);
     integrators.push_back({{"integrator", r.integrator},
                            {"step_s", r.step_s},
                            {"evaluations", r.evaluations},
-                           {"position_error_m", r.position_error_m}});
+                           {"position_error_m", r.position_error_m},
+                           {"attitude_error_rad", r.attitude_error_rad}});
   }
   return {{"steps", steps}, {"integrators", integrators}};
 }
