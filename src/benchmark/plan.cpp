@@ -137,7 +137,7 @@ class Planner {
 std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file) {
   const io::Config config = io::Config::load(file);
   const io::Table root = config.root();
-  root.integer("schema", 1, 1);
+  root.schema(1);
   std::map<std::string, Detectability> all;
   for (const std::string& id : blind::effect_names()) {
     if (model::effect_index(id.c_str()) < 0 && !root.has(id)) continue;

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <set>
 
-#include "io/files.hpp"
+#include "io/schema.hpp"
 
 namespace flappy::benchmark {
 namespace {
@@ -56,6 +56,10 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "manifest.json";
   const Json json = read_json(file);
   try {
+    if (const Json& schema = json.at("schema"); schema != 1)
+      throw io::InputError(file.string() + ": schema " +
+                           io::other_schema(schema.get<std::int64_t>(), 1, json.value("commit", "")) +
+                           "; accepted: schema 1");
     Manifest m{json.at("set"),           json.at("vehicle"), json.at("vehicle_sha256"),
                json.at("labels_sha256"), json.at("commit"),  {}};
     for (const Json& c : json.at("cases"))

@@ -24,7 +24,7 @@ double low_pass_lag_s(const ImuSensor& imu) {
 
 Sensors read_sensors(const io::Table& table) {
   constexpr io::Range kRate{10, 10000}, kNoise = io::non_negative(100);
-  table.integer("schema", 1, 1);
+  table.schema(1);
   table.renamed("fusion", "estimator, with the same keys");
   Sensors s;
   s.imu.rate_hz = table.number("imu.rate_hz", kRate);
@@ -77,7 +77,7 @@ int controller_kind(const std::string& name) {
 }
 
 Controller read_controller(const io::Table& table) {
-  table.integer("schema", 1, 1);
+  table.schema(1);
   std::vector<std::string> names;
   for (int i = kNoController; i < kControllers; ++i) names.push_back(controller_name(i));
   Controller c;

@@ -306,7 +306,7 @@ sim::FlapperState Task::sample_start(sim::RandomKey key) const {
 }
 
 Task read_task(const io::Table& table, double tick_s) {
-  table.integer("schema", 1, 1);
+  table.schema(1);
   table.accept(
       {"schema", "name", "start", "path", "observation", "action", "reward", "end", "base", "hand_back", "success"});
   Task task;

@@ -73,7 +73,7 @@ void normalise(double length, std::initializer_list<double*> components) {
 // ---- the header
 
 FlightHeader parse_header(const io::Table& root) {
-  root.integer("schema", 1, 1);
+  root.schema(1);
   root.accept({"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2", "ambient", "mocap", "imu", "power",
                "wings"});
   FlightHeader h;

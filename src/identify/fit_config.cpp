@@ -9,7 +9,7 @@ namespace flappy::identify {
 FitConfig read_fit_config(const std::filesystem::path& path, const model::Vehicle& vehicle,
                           const std::vector<std::string>& chosen) {
   const io::Table root = io::Config::load(path).root();
-  root.integer("schema", 1, 1);
+  root.schema(1);
   root.accept({"schema", "unseen_share", "parameter"});
   FitConfig config;
   config.unseen_share = root.number("unseen_share", io::positive(1));

@@ -7,7 +7,7 @@ namespace flappy::identify {
 
 LinearMap read_published_map(const std::filesystem::path& path) {
   const io::Table root = io::Config::load(path).root();
-  root.integer("schema", 1, 1);
+  root.schema(1);
   LinearMap map;
   map[0] = {root.number("thrust.slope_N_V"), root.number("thrust.offset_N")};
   map[1] = {root.number("roll.slope_Nm_V"), root.number("roll.offset_Nm")};

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "io/schema.hpp"
 #include "io/toml.hpp"
 #include "io/toml_writer.hpp"
 
@@ -393,6 +394,13 @@ double Table::number_or(std::string_view key, double fallback, Range range) cons
 
 std::int64_t Table::integer(std::string_view key, std::int64_t low, std::int64_t high) const {
   return to_integer(find_required(*section_, key, describe(low, high)), low, high);
+}
+
+void Table::schema(std::int64_t read) const {
+  const std::string accepted = std::to_string(read);
+  const Entry entry = find_required(*section_, "schema", accepted);
+  const std::int64_t given = value_of<std::int64_t>(entry, accepted);
+  if (given != read) refuse(entry, other_schema(given, read), accepted);
 }
 
 std::int64_t Table::integer_or(std::string_view key, std::int64_t fallback, std::int64_t low, std::int64_t high) const {

@@ -46,6 +46,8 @@ class Table {
   double number(std::string_view key, Range range = {}) const;
   double number_or(std::string_view key, double fallback, Range range = {}) const;
   std::int64_t integer(std::string_view key, std::int64_t low, std::int64_t high) const;
+  /// Requires the key schema, and this value of it.
+  void schema(std::int64_t read) const;
   std::int64_t integer_or(std::string_view key, std::int64_t fallback, std::int64_t low, std::int64_t high) const;
   bool boolean(std::string_view key) const;
   bool boolean_or(std::string_view key, bool fallback) const;

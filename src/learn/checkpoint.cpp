@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "io/schema.hpp"
 #include "io/sha256.hpp"
 
 namespace flappy::learn {
@@ -110,7 +111,10 @@ Checkpoint::Checkpoint(std::filesystem::path path) : path_(std::move(path)), fil
   read_at(0, first);
   if (!kFirst.starts_with(first)) {
     if (!first.starts_with(kKind)) refuse("is no checkpoint of flappy");
-    refuse("is a checkpoint of another schema; accepted: one that begins with \"flappy checkpoint 1\"");
+    const auto schema = number(std::string_view(first).substr(kKind.size(), first.find('\n') - kKind.size()));
+    if (!schema) refuse("is damaged: its first line is not \"flappy checkpoint 1\"");
+    refuse("is a checkpoint whose schema " + io::other_schema(static_cast<std::int64_t>(*schema), 1) +
+           "; accepted: schema 1");
   }
   if (size < kFirst.size() + kTail) refuse("is damaged: it is cut short");
   std::array<char, kTail> tail;
@@ -166,14 +170,16 @@ const CheckpointSection& Checkpoint::section(std::string_view name) const {
   if (found != sections_.end()) return *found;
   std::string here;
   for (const auto& s : sections_) here += (here.empty() ? "" : ", ") + s.name;
-  throw io::InputError(path_.string() + ": has no section " + std::string(name) + "; sections here: " + here);
+  throw io::InputError(path_.string() + ": has no section " + std::string(name) + "; sections here: " + here +
+                       io::writer_reads(header_.commit));
 }
 
 void Checkpoint::get_bytes(std::string_view name, std::span<std::byte> bytes) const {
   const CheckpointSection& s = section(name);
   if (s.size != bytes.size())
     throw io::InputError(path_.string() + ": section " + s.name + " has " + std::to_string(s.size) +
-                         " bytes; accepted: " + std::to_string(bytes.size()) + ", as this configuration has it");
+                         " bytes; accepted: " + std::to_string(bytes.size()) + ", as this configuration has it" +
+                         io::writer_reads(header_.commit));
   if (fseeko(file_.get(), static_cast<off_t>(s.offset), SEEK_SET) != 0 ||
       std::fread(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size())
     throw io::InputError(path_.string() + ": cannot be read: " + std::generic_category().message(errno));

@@ -4,7 +4,7 @@
 #include <cctype>
 #include <nlohmann/json.hpp>
 
-#include "io/files.hpp"
+#include "io/schema.hpp"
 #include "io/sha256.hpp"
 #include "learn/train_config.hpp"
 
@@ -37,7 +37,8 @@ FinishedRun read_finished_run(const fs::path& folder) {
     refuse(folder, "is no run folder", "a folder that flappy-train left");
   FinishedRun run;
   read_json(start, [&](const Json& json) {
-    if (json.at("schema") != 1) refuse(start, "schema is " + json.at("schema").dump(), "schema 1");
+    if (const Json& schema = json.at("schema"); schema != 1)
+      refuse(start, "schema " + io::other_schema(schema.get<std::int64_t>(), 1, json.value("commit", "")), "schema 1");
     run.info.task = json.at("task").get<std::string>();
     run.info.config_sha256 = json.at("config_sha256").get<std::string>();
     run.info.commit = json.at("commit").get<std::string>();
@@ -61,12 +62,14 @@ FinishedRun read_finished_run(const fs::path& folder) {
              "the one with SHA-256 " + sha256 + ", as " + end.string() + " says");
   });
 
-  const auto policy = std::make_shared<const policy::Actor>(policy::read_actor(actor));
-  const TrainConfig config = read_train_config(folder / "config" / "train.toml");
+  const auto policy =
+      std::make_shared<const policy::Actor>(io::read_of_run(folder, [&] { return policy::read_actor(actor); }));
+  const TrainConfig config =
+      io::read_of_run(folder, [&] { return read_train_config(folder / "config" / "train.toml"); });
   if (config.sha256 != run.info.config_sha256)
     refuse(folder / "config", "is not the configuration of the run: SHA-256 " + config.sha256,
            "the one with " + run.info.config_sha256 + ", as " + start.string() + " says");
-  run.fly = rollout::read_fly_config(folder / "config" / "fly.toml");
+  run.fly = io::read_of_run(folder, [&] { return rollout::read_fly_config(folder / "config" / "fly.toml"); });
   run.fly.actor = policy;
   if (policy->task != run.info.task || run.fly.fleet.task.name != run.info.task)
     refuse(actor, "is of task " + policy->task, "a policy of the run's task " + run.info.task);

@@ -41,7 +41,7 @@ class Reader {
  public:
   Reader(const std::filesystem::path& path, const Overrides& own, const Overrides& flown)
       : main_(io::Config::load(path, own)), root_(main_.root()) {
-    root_.integer("schema", 1, 1);
+    root_.schema(1);
     root_.accept({"schema", "fly", "seed", "threads", "networks", "observation", "collect", "reward", "learn",
                   "evaluate", "checkpoint"});
     c_.fly = rollout::read_fly_config(root_.file("fly"), flown);

@@ -31,7 +31,7 @@ void read_effects(const io::Table& table, Vehicle& vehicle) {
 
 Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
   const io::Table root = io::Config::load(path, overrides).root();
-  root.integer("schema", 1, 1);
+  root.schema(1);
   Vehicle vehicle;
   std::vector<std::string> keys = {"schema", "name", "effects", "posterior"};
   for (const Parameter& p : parameters(vehicle)) keys.push_back(p.path.substr(0, p.path.find('.')));

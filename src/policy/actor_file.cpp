@@ -4,7 +4,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "io/files.hpp"
+#include "io/schema.hpp"
 
 namespace flappy::policy {
 namespace {
@@ -38,7 +38,8 @@ Actor read_actor(const std::filesystem::path& path) {
       if (!(x.*is)()) refuse(path, std::string(key) + " has " + x.dump() + " in it", accepted);
   };
   try {
-    if (json.at("schema") != 1) refuse(path, "schema is not 1", "schema 1");
+    if (const Json& schema = json.at("schema"); schema != 1)
+      refuse(path, "schema " + io::other_schema(schema.get<std::int64_t>(), 1), "schema 1");
     a.task = json.at("task").get<std::string>();
     a.observation = json.at("observation").get<std::vector<std::string>>();
     a.action = json.at("action").get<std::vector<std::string>>();

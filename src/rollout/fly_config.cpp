@@ -97,7 +97,7 @@ class Reader {
       : to_(routed(overrides)), main_(io::Config::load(path, to_[""])), root_(main_.root()) {}
 
   FlyConfig read() {
-    root_.integer("schema", 1, 1);
+    root_.schema(1);
     root_.accept({"schema", "precision", "flight", "world", "constant_input", "excitation", "log", "vehicle", "task",
                   "sensors", "controller", "randomisation", "actor"});
     c_.precision = root_.choice("precision", {"float", "double"});

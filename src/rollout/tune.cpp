@@ -103,7 +103,7 @@ double cost_of_trial(const TuneConfig& config, const Trial& trial, const flight:
 
 TuneConfig read_tune_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
   const io::Table root = io::Config::load(path, overrides).root();
-  root.integer("schema", 1, 1);
+  root.schema(1);
   root.accept({"schema", "vary", "duration_s", "settle_s", "seed", "population", "generations", "trial"});
   TuneConfig c;
   c.vary = root.strings("vary");

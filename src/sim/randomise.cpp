@@ -202,7 +202,7 @@ model::Vehicle Randomisation::at(const std::vector<double>& variates) const {
 }
 
 Randomisation read_randomisation(model::Vehicle nominal, const io::Table& root) {
-  root.integer("schema", 1, 1);
+  root.schema(1);
   Randomisation randomisation(std::move(nominal), root);
   root.finish();
   return randomisation;

@@ -129,7 +129,8 @@ TEST(FlightLog, RefusesFaultyHeaders) {
     return edited("flight.toml", old, fresh);
   };
   EXPECT_EQ(header("schema = 1", "schema = 2"),
-            "log/flight.toml:1:10: schema: 2 is out of range; accepted: an integer from 1 to 1");
+            "log/flight.toml:1:10: schema: 2 is read by a newer flappy than this one; accepted: 1");
+  EXPECT_EQ(header("schema = 1", "schema = 0"), "log/flight.toml:1:10: schema: 0 is read by no flappy; accepted: 1");
   EXPECT_EQ(header("gravity_m_s2", "gravity"),
             "log/flight.toml: gravity_m_s2: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(header("flapping_Hz = 34.0", "flapping_Hz = -34.0"),

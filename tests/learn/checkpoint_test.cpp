@@ -140,11 +140,12 @@ TEST_F(CheckpointTest, RefusesEveryChangedByte) {
   }
   const auto has = [&](const std::string& reason) { return reasons.contains(": " + reason); };
   EXPECT_TRUE(has("is no checkpoint of flappy"));
-  EXPECT_TRUE(has("is a checkpoint of another schema; accepted: one that begins with \"flappy checkpoint 1\""));
+  EXPECT_TRUE(has("is a checkpoint whose schema 0 is read by no flappy; accepted: schema 1"));
+  EXPECT_TRUE(has("is damaged: its first line is not \"flappy checkpoint 1\""));
   EXPECT_TRUE(has("is damaged: section actor differs from its checksum"));
   EXPECT_TRUE(has("is damaged: the list of its sections differs from its checksum"));
   EXPECT_TRUE(has("is damaged: its end is missing"));
-  EXPECT_EQ(reasons.size(), 8u) << "four sections have bytes";
+  EXPECT_EQ(reasons.size(), 9u) << "four sections have bytes";
 }
 
 TEST_F(CheckpointTest, RefusesEveryOtherLength) {
@@ -169,6 +170,9 @@ TEST_F(CheckpointTest, RefusesWhatIsNoCheckpoint) {
   EXPECT_EQ(open(""), folder + "/: is not a regular file");
   ASSERT_EQ(mkfifo((run_ / "pipe").c_str(), 0600), 0);
   EXPECT_EQ(open("pipe"), folder + "/pipe: is not a regular file");
+  EXPECT_EQ(
+      open_bytes("flappy checkpoint 12\n"),
+      folder + "/changed: is a checkpoint whose schema 12 is read by a newer flappy than this one; accepted: schema 1");
   EXPECT_EQ(open_bytes("{\"schema\": 1}"), folder + "/changed: is no checkpoint of flappy");
 }
 
@@ -176,15 +180,16 @@ TEST_F(CheckpointTest, RefusesOtherSections) {
   write(7);
   const Checkpoint checkpoint(run_ / checkpoint_name(7));
   const std::string name = (run_ / checkpoint_name(7)).string();
+  const std::string by = "; flappy at commit c0ffee wrote it, and reads it";
   std::vector<float> actor(5);
   EXPECT_EQ(refusal([&] { checkpoint.get("actor", actor); }),
-            name + ": section actor has 16 bytes; accepted: 20, as this configuration has it");
+            name + ": section actor has 16 bytes; accepted: 20, as this configuration has it" + by);
   EXPECT_EQ(refusal([&] { checkpoint.get("actor", std::span(actor).first(3)); }),
-            name + ": section actor has 16 bytes; accepted: 12, as this configuration has it");
+            name + ": section actor has 16 bytes; accepted: 12, as this configuration has it" + by);
   EXPECT_EQ(refusal([&] { checkpoint.get("critic", actor); }),
-            name + ": has no section critic; sections here: actor, update, phase, config, empty");
+            name + ": has no section critic; sections here: actor, update, phase, config, empty" + by);
   EXPECT_EQ(refusal([&] { static_cast<void>(checkpoint.text("critic")); }),
-            name + ": has no section critic; sections here: actor, update, phase, config, empty");
+            name + ": has no section critic; sections here: actor, update, phase, config, empty" + by);
   CheckpointWriter writer(run_ / "twice", {});
   writer.put("a", 1);
   EXPECT_THROW(writer.put("a", 1), std::logic_error);

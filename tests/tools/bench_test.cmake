@@ -141,7 +141,7 @@ file(WRITE ${WORK}/wide.toml "${wide}")
 expect_refused("${WORK}/wide.toml:3:14: randomise[0].parameters: torso.mass_kg could become -0.00218134; accepted: draws between 1e-09 and 10"
   batch ${WORK}/good.toml --set randomisation=wide.toml)
 file(WRITE ${WORK}/no_schema.toml "")
-expect_refused("${WORK}/no_schema.toml: schema: is missing; accepted: an integer from 1 to 1" batch ${WORK}/no_schema.toml)
+expect_refused("${WORK}/no_schema.toml: schema: is missing; accepted: 1" batch ${WORK}/no_schema.toml)
 expect_refused("--set count=0: count: 0 is out of range; accepted: an integer from 1 to 1000000"
   batch ${WORK}/good.toml --set count=0)
 expect_refused("${WORK}/none.toml: cannot be read: No such file or directory" batch ${WORK}/none.toml)

@@ -28,7 +28,7 @@ struct Job {
 
 Job read_job(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
   const io::Table root = io::Config::load(path, overrides).root();
-  root.integer("schema", 1, 1);
+  root.schema(1);
   root.accept({"schema", "vehicle", "precision", "count", "seed", "duration_s", "input", "randomisation", "step_s",
                "threads", "world"});
   const model::Vehicle vehicle = model::read_vehicle(root.file("vehicle"));

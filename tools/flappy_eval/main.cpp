@@ -9,6 +9,7 @@
 #include "io/installation.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "io/schema.hpp"
 #include "io/toml_writer.hpp"
 #include "rollout/evaluation.hpp"
 
@@ -58,7 +59,7 @@ FlyConfig read_config(const Request& r) {
   if (!r.vehicle.empty()) overrides.push_back(file_override("vehicle", r.vehicle));
   if (!r.task.empty()) overrides.push_back(file_override("task", r.task));
   overrides.insert(overrides.end(), r.overrides.begin(), r.overrides.end());
-  FlyConfig c = rollout::read_fly_config(config, overrides);
+  FlyConfig c = io::read_of_run(policy, [&] { return rollout::read_fly_config(config, overrides); });
   if (fs::is_directory(policy) && !c.actor)
     throw io::InputError(config.string() + ": actor: is missing; accepted: the trained actor's file");
   c.fleet.seed = r.seed;

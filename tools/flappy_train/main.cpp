@@ -10,6 +10,7 @@
 #include "io/log.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "io/schema.hpp"
 #include "learn/checkpoint.hpp"
 #include "learn/learning_curve.hpp"
 #include "learn/trainer.hpp"
@@ -136,7 +137,8 @@ int main(int argc, char** argv) {
       return list;
     };
     if (!resume.empty()) {
-      const learn::TrainConfig config = learn::read_train_config(train::config_of(resume), with_threads({}));
+      const learn::TrainConfig config =
+          io::read_of_run(resume, [&] { return learn::read_train_config(train::config_of(resume), with_threads({})); });
       options.folder = resume;
       options.from = from.empty() ? learn::newest_checkpoint(resume).path() : fs::path(resume) / from;
       program.write_json(learn::json_of(train::train_one(config, options)));
