@@ -134,11 +134,11 @@ FLAPPY_INLINE L<T> beat_phase(const sim::Block<T>& body, int first) {
 template <class T>
 FLAPPY_INLINE MocapSample<L<T>> see(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Truth<L<T>>& truth,
                                     const L<T>& seen, std::uint32_t index, int first) {
-  const auto draw = [&](std::uint32_t k) {
+  const auto noise = [&](std::uint32_t k) {
     return sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap), 3 * index + k,
                               s.flight.flapper + first, s.flight.flight + first);
   };
-  auto sample = sample_mocap(plan.mocap, truth, seen, draw(0), draw(1));
+  auto sample = sample_mocap(plan.mocap, truth, seen, noise(0), noise(1));
   if (s.effects.set & kMocapEffects) disturb(s.effects, truth.attitude, sample, first);
   return sample;
 }
@@ -164,13 +164,13 @@ FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
   FlightBlock<T>& f = s.flight;
   const auto truth = load_rows<Truth<L<T>>>(f.truth, first);
   if (slice.imu) {
-    const auto draw = [&](std::uint32_t k) {
+    const auto noise = [&](std::uint32_t k) {
       return sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::imu), 2 * slice.imu_index + k,
                                 f.flapper + first, f.flight + first);
     };
     auto imu = load_rows<Imu<L<T>>>(f.imu, first);
     const L<T> interval(slice.imu_interval_s);
-    auto sample = sample_imu(plan.imu, L<T>(L<T>(1) / interval), truth, imu, draw(0), draw(1));
+    auto sample = sample_imu(plan.imu, L<T>(L<T>(1) / interval), truth, imu, noise(0), noise(1));
     store_rows(imu, f.imu, first);
     if (s.effects.set & kImuEffects)
       disturb(s.effects, flight_time_s(f, plan, steps, first), beat_phase(s.body, first), imu.low_passed.accel_m_s2,

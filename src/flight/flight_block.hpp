@@ -79,7 +79,7 @@ struct FlightPlan {
   PathView<T> path;
   policy::ActorView<T> actor;
   std::uint32_t action_repeat;  // control periods for which an action stays
-  std::uint32_t period;         // since the fleet began; counts draws of exploration
+  std::uint32_t period;         // since the fleet began; counts samples of exploration
   bool explores;
   T noise_kept, noise_fresh;  // shares of the last and of a new normal in the noise, from action to action
   T noise_low, noise_more;    // its standard deviation: of the fleet's first flapper, and from each to the next

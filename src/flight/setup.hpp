@@ -14,7 +14,7 @@ struct ImuSensor {
   double low_pass_hz = 0;                             ///< 0: none beyond the mean over a sample's interval
   model::Triple position_m;                           ///< in B
   double gyro_noise_rad_s = 0, accel_noise_m_s2 = 0;  ///< standard deviation of a sample, each axis
-  model::Triple gyro_bias_sd_rad_s;                   ///< drawn once for each flight
+  model::Triple gyro_bias_sd_rad_s;                   ///< sampled once for each flight
 };
 
 struct MocapSensor {

@@ -288,15 +288,15 @@ void Task::forbid_actions() {
 sim::FlapperState Task::sample_start(sim::RandomKey key) const {
   key.stream = sim::Stream::start;
   std::uint32_t index = 0;
-  const auto draw = [&](const Spread& s) {
+  const auto sampled = [&](const Spread& s) {
     return s.centre + s.half * (2 * sim::uniform_pair(key, index++).first - 1);
   };
   sim::FlapperState s;
   double turn[3];
-  for (int i = 0; i < 3; ++i) s.position_m[i] = draw(start.position_m[i]);
-  for (int i = 0; i < 3; ++i) turn[i] = draw(start.rotation_rad[i]);
-  for (int i = 0; i < 3; ++i) s.velocity_m_s[i] = draw(start.velocity_m_s[i]);
-  for (int i = 0; i < 3; ++i) s.body_rate_rad_s[i] = draw(start.body_rate_rad_s[i]);
+  for (int i = 0; i < 3; ++i) s.position_m[i] = sampled(start.position_m[i]);
+  for (int i = 0; i < 3; ++i) turn[i] = sampled(start.rotation_rad[i]);
+  for (int i = 0; i < 3; ++i) s.velocity_m_s[i] = sampled(start.velocity_m_s[i]);
+  for (int i = 0; i < 3; ++i) s.body_rate_rad_s[i] = sampled(start.body_rate_rad_s[i]);
   s.position_m[0] = std::clamp(s.position_m[0], start.x_low_m, start.x_high_m);
   const double angle = std::sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
   const auto half = model::sin_cos_wide(angle / 2);

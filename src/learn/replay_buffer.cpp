@@ -54,7 +54,7 @@ void Replay::add(const Transition& transition) {
   advance(1);
 }
 
-void Replay::draw(std::uint64_t seed, std::uint64_t update, std::size_t first, std::span<std::uint32_t> out) const {
+void Replay::sample(std::uint64_t seed, std::uint64_t update, std::size_t first, std::span<std::uint32_t> out) const {
   const sim::RandomKey key{seed, static_cast<std::uint32_t>(update), static_cast<std::uint32_t>(update >> 32),
                            sim::Stream::replay};
   const auto place = [&](double u) {

@@ -1,4 +1,4 @@
-// Replay memory: the last transitions, one row of float each, so that a random draw touches one place in memory.
+// Replay memory: the last transitions, one row of float each, so that a random sample touches one place in memory.
 #pragma once
 
 #include <cstddef>
@@ -42,7 +42,7 @@ class Replay {
   /// Overwrites the oldest one once the memory is full.
   void add(const Transition& transition);
   /// The same in two steps, for many at once: threads may put different `ahead` (from 0, below `capacity`) at a time, then
-  /// one of them advances past all that were put. Nobody may draw meanwhile.
+  /// one of them advances past all that were put. Nobody may sample meanwhile.
   void put(std::size_t ahead, const Transition& transition);
   void advance(std::size_t count);
 
@@ -54,9 +54,9 @@ class Replay {
   std::size_t bytes() const { return rows_.size() * sizeof(float); }
   const float* row(std::size_t i) const { return &rows_[i * layout_.row]; }
 
-  /// Draws rows `first` to `first + out.size() - 1` of the batch of an update, uniformly among those held: a function of
+  /// Samples rows `first` to `first + out.size() - 1` of the batch of an update, uniformly among those held: a function of
   /// seed, update, number in the batch, and size alone. `first` is even.
-  void draw(std::uint64_t seed, std::uint64_t update, std::size_t first, std::span<std::uint32_t> out) const;
+  void sample(std::uint64_t seed, std::uint64_t update, std::size_t first, std::span<std::uint32_t> out) const;
 
   /// For checkpoints: the rows held, the first size() of all.
   std::span<const float> rows() const { return {rows_.data(), size_ * layout_.row}; }

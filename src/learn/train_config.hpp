@@ -2,11 +2,11 @@
 //
 //   schema = 1
 //   fly = "file"            what is flown: vehicles, task, sensors, controller; relative to the folder of the configuration
-//   seed                    of weights, draws, noise and the vehicles trained on; evaluation flies with the seed of `fly`
+//   seed                    of weights, samples, noise and the vehicles trained on; evaluation flies with the seed of `fly`
 //   threads                 0: all
 //   [observation]           optional: part = [scale of each of its signals], in place of 2 / (high - low) of their ranges
 //   [networks]              actor, critic: widths of hidden layers; activation = "relu" | "tanh"
-//   [collect]               flappers, vehicles (settled, from which episodes are drawn), noise_low, noise_high, noise_kept (from
+//   [collect]               flappers, vehicles (settled, from which episodes are sampled), noise_low, noise_high, noise_kept (from
 //                           action to action), steps_before (actions of each flapper before the first update)
 //   [reward]                scale, discount (from action to action), steps (of the return that the critics learn)
 //   [learn]                 updates, updates_per_step, batch, actor_rate, critic_rate, last_rate (share of the rates at the

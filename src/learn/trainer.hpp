@@ -8,7 +8,7 @@
 //   RUN/summary.json
 //   RUN/log.txt          what flappy-train notes
 //
-// In every step, the actor as it was after the step before flies, while the learner draws from what was flown before: the
+// In every step, the actor as it was after the step before flies, while the learner samples from what was flown before: the
 // lag is one step, whoever is faster. All but timing.jsonl, summary.json, run.json, the events and log.txt is the same for
 // any number of threads, and after any number of resumptions.
 #pragma once

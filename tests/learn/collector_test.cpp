@@ -214,7 +214,7 @@ TEST(Collector, VehiclesAndStartsDiffer) {
     trims.insert(trim);
   }
   EXPECT_EQ(starts.size(), c.flappers);
-  EXPECT_GT(trims.size(), 4u);  // of 8 vehicles, drawn 40 times: all but 1 in 25 of them
+  EXPECT_GT(trims.size(), 4u);  // of 8 vehicles, sampled 40 times: all but 1 in 25 of them
   EXPECT_LE(trims.size(), 8u);
 }
 

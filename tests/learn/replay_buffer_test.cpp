@@ -61,30 +61,30 @@ TEST(Replay, putting_many_at_once_is_adding_them) {
   EXPECT_TRUE(std::ranges::equal(one.rows(), other.rows()));
 }
 
-TEST(Replay, draws_are_uniform_among_those_held) {
+TEST(Replay, samples_are_uniform_among_those_held) {
   Replay replay({1, 0, 1}, 1000);
   for (int i = 0; i < 10; ++i) add_numbered(replay, i);
   std::array<int, 10> counts{};
   constexpr int kUpdates = 500, kBatch = 64;
   for (std::uint64_t update = 0; update < kUpdates; ++update) {
     std::array<std::uint32_t, kBatch> rows;
-    replay.draw(9, update, 0, rows);
+    replay.sample(9, update, 0, rows);
     for (const std::uint32_t r : rows) ++counts.at(r);
   }
   // each count is binomial: mean 3200, sd 54
   for (const int n : counts) EXPECT_NEAR(n, kUpdates * kBatch / 10, 5 * 54);
 }
 
-TEST(Replay, a_draw_depends_on_its_place_in_the_batch_alone) {
+TEST(Replay, a_sample_depends_on_its_place_in_the_batch_alone) {
   const Replay replay = random_replay({1, 0, 1}, 1000);
   std::array<std::uint32_t, 128> all;
   std::array<std::uint32_t, 64> half;
-  replay.draw(9, 5, 0, all);
-  replay.draw(9, 5, 64, half);
+  replay.sample(9, 5, 0, all);
+  replay.sample(9, 5, 64, half);
   EXPECT_TRUE(std::equal(half.begin(), half.end(), all.begin() + 64));
   std::array<std::uint32_t, 64> other;
   for (const auto& [seed, update] : {std::pair<std::uint64_t, std::uint64_t>{9, 6}, {10, 5}, {9, 5 + (1ULL << 32)}}) {
-    replay.draw(seed, update, 64, other);
+    replay.sample(seed, update, 64, other);
     EXPECT_NE(other, half);
   }
 }

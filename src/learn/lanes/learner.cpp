@@ -24,9 +24,10 @@ constexpr std::ptrdiff_t kShard = 2048;
 
 /// Numbers that begin with a line of the cache.
 template <class T>
-class Numbers {
+class AlignedArray {
  public:
-  explicit Numbers(std::size_t count) : lines_((count * sizeof(T) + sizeof(Line) - 1) / sizeof(Line)), count_(count) {}
+  explicit AlignedArray(std::size_t count)
+      : lines_((count * sizeof(T) + sizeof(Line) - 1) / sizeof(Line)), count_(count) {}
   T* data() { return reinterpret_cast<T*>(lines_.data()); }
   const T* data() const { return reinterpret_cast<const T*>(lines_.data()); }
   std::size_t size() const { return count_; }
@@ -68,7 +69,7 @@ struct Learner<T>::Storage {
   UpdatePlan<T> plan;
   std::ptrdiff_t count;  // weights of all networks
   std::size_t parts;     // of the gradients
-  Numbers<T> input_numbers, numbers, gradients, work;
+  AlignedArray<T> input_numbers, numbers, gradients, work;
   std::vector<ChunkSums<T>> sums;  // of each chunk
   std::ptrdiff_t work_size;
   LearnerCounters counters;
@@ -95,7 +96,7 @@ struct Learner<T>::Storage {
     start(plan.actor, plan.actor_at(), 0);
   }
 
-  static std::ptrdiff_t work_room(const UpdatePlan<T>& p) { return (Workplace<T>::count(p) + 15) / 16 * 16; }
+  static std::ptrdiff_t work_room(const UpdatePlan<T>& p) { return (Workspace<T>::count(p) + 15) / 16 * 16; }
 
   static void put_input(InputView<T>& view, const Normaliser& n, T* to) {
     std::ranges::transform(n.mean, to, [](double x) { return static_cast<T>(x); });
@@ -136,13 +137,13 @@ struct Learner<T>::Storage {
   void work_on(std::size_t part, const Replay& replay, int thread) {
     T* place = work.data() + thread * work_size;
     const std::size_t chunks = sums.size();
-    bool onto = false;
+    bool accumulate = false;
     for (std::size_t c = part * chunks / parts; c < (part + 1) * chunks / parts; ++c) {
       std::array<std::uint32_t, kChunk> rows;
-      replay.draw(options.seed, counters.updates, c * kChunk, rows);
+      replay.sample(options.seed, counters.updates, c * kChunk, rows);
       sums[c] = kernel->chunk(plan, place, replay.row(0), rows.data(), static_cast<std::uint32_t>(c * kChunk),
-                              gradients.data() + static_cast<std::ptrdiff_t>(part) * count, onto);
-      onto = true;
+                              gradients.data() + static_cast<std::ptrdiff_t>(part) * count, accumulate);
+      accumulate = true;
     }
   }
 
@@ -290,7 +291,7 @@ void Learner<T>::act(const float* observations, std::size_t count, T* actions) c
   const Storage& s = *storage_;
   const auto inputs = static_cast<std::size_t>(s.options.shape.actor_observation);
   const auto outputs = static_cast<std::size_t>(s.options.shape.action);
-  Numbers<T> work(static_cast<std::size_t>(s.work_size));
+  AlignedArray<T> work(static_cast<std::size_t>(s.work_size));
   std::vector<float> in(kChunk * inputs);
   std::vector<T> out(kChunk * outputs);
   for (std::size_t first = 0; first < count; first += kChunk) {

@@ -1,4 +1,4 @@
-// TD3 (Fujimoto et al. 2018) and DDPG (Lillicrap et al. 2016): one gradient step on a batch drawn from a replay memory.
+// TD3 (Fujimoto et al. 2018) and DDPG (Lillicrap et al. 2016): one gradient step on a batch sampled from a replay memory.
 // For a transition (s, a, r, s') with discount d:
 //   a' = clip(mu'(s') + clip(noise, +-noise_clip), +-1)
 //   y  = r + d min_i Q'_i(s', a')

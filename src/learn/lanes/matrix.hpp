@@ -29,7 +29,7 @@ inline constexpr int kTile = 12, kTileVectors = 2, kTileRows = 6;
 inline constexpr int kTile = 4, kTileVectors = 2, kTileRows = 2;
 #endif
 
-template <class T, int kRows, int kVectors, bool kOnto>
+template <class T, int kRows, int kVectors, bool kAccumulate>
 FLAPPY_INLINE void multiply_tile(int depth, Strided<T> a, const T* b, std::ptrdiff_t b_row, T* c,
                                  std::ptrdiff_t c_row) {
   using L = Lanes<T, kWidth<T>>;
@@ -37,7 +37,7 @@ FLAPPY_INLINE void multiply_tile(int depth, Strided<T> a, const T* b, std::ptrdi
 #pragma GCC unroll 12
   for (int i = 0; i < kRows; ++i)
 #pragma GCC unroll 4
-    for (int j = 0; j < kVectors; ++j) sum[i][j] = kOnto ? L::load(c + i * c_row + j * kWidth<T>) : L(0);
+    for (int j = 0; j < kVectors; ++j) sum[i][j] = kAccumulate ? L::load(c + i * c_row + j * kWidth<T>) : L(0);
   for (int k = 0; k < depth; ++k) {
     L column[kVectors];
 #pragma GCC unroll 4
@@ -58,37 +58,37 @@ FLAPPY_INLINE void multiply_tile(int depth, Strided<T> a, const T* b, std::ptrdi
 }
 
 /// The last rows, fewer than a tile has.
-template <class T, int kRows, int kVectors, bool kOnto>
+template <class T, int kRows, int kVectors, bool kAccumulate>
 FLAPPY_INLINE void multiply_rest(int rows, int depth, Strided<T> a, const T* b, std::ptrdiff_t b_row, T* c,
                                  std::ptrdiff_t c_row) {
   if constexpr (kRows > 0) {
-    if (rows == kRows) multiply_tile<T, kRows, kVectors, kOnto>(depth, a, b, b_row, c, c_row);
-    else multiply_rest<T, kRows - 1, kVectors, kOnto>(rows, depth, a, b, b_row, c, c_row);
+    if (rows == kRows) multiply_tile<T, kRows, kVectors, kAccumulate>(depth, a, b, b_row, c, c_row);
+    else multiply_rest<T, kRows - 1, kVectors, kAccumulate>(rows, depth, a, b, b_row, c, c_row);
   }
 }
 
 /// Columns of C, as many as kVectors registers hold.
-template <class T, int kVectors, bool kOnto>
+template <class T, int kVectors, bool kAccumulate>
 void multiply_panel(int rows, int depth, Strided<T> a, const T* b, std::ptrdiff_t b_row, T* c, std::ptrdiff_t c_row) {
   constexpr int kRows = kTile / kVectors < kTileRows ? kTile / kVectors : kTileRows;
   for (; rows >= kRows; rows -= kRows, a.data += kRows * a.row, c += kRows * c_row)
-    multiply_tile<T, kRows, kVectors, kOnto>(depth, a, b, b_row, c, c_row);
-  multiply_rest<T, kRows - 1, kVectors, kOnto>(rows, depth, a, b, b_row, c, c_row);
+    multiply_tile<T, kRows, kVectors, kAccumulate>(depth, a, b, b_row, c, c_row);
+  multiply_rest<T, kRows - 1, kVectors, kAccumulate>(rows, depth, a, b, b_row, c, c_row);
 }
 
-/// C[rows][columns] = sum over k < depth of A(i, k) B[k][j], or added onto what C holds. `columns` is a multiple of 16.
-template <class T, bool kOnto = false>
+/// C[rows][columns] = sum over k < depth of A(i, k) B[k][j], or added to what C holds. `columns` is a multiple of 16.
+template <class T, bool kAccumulate = false>
 void multiply(int rows, int columns, int depth, Strided<T> a, const T* b, std::ptrdiff_t b_row, T* c,
               std::ptrdiff_t c_row) {
   constexpr int kW = kWidth<T>;
   int j = 0;
   for (; j + kTileVectors * kW <= columns; j += kTileVectors * kW)
-    multiply_panel<T, kTileVectors, kOnto>(rows, depth, a, b + j, b_row, c + j, c_row);
+    multiply_panel<T, kTileVectors, kAccumulate>(rows, depth, a, b + j, b_row, c + j, c_row);
   if (kTileVectors > 2 && j + 2 * kW <= columns) {
-    multiply_panel<T, 2, kOnto>(rows, depth, a, b + j, b_row, c + j, c_row);
+    multiply_panel<T, 2, kAccumulate>(rows, depth, a, b + j, b_row, c + j, c_row);
     j += 2 * kW;
   }
-  if (j < columns) multiply_panel<T, 1, kOnto>(rows, depth, a, b + j, b_row, c + j, c_row);
+  if (j < columns) multiply_panel<T, 1, kAccumulate>(rows, depth, a, b + j, b_row, c + j, c_row);
 }
 
 template <bool kHigh, class L, std::size_t... i>
@@ -99,7 +99,7 @@ FLAPPY_INLINE L interleaved(L x, L y, std::index_sequence<i...>) {
 
 /// to[j][i] = from[i][j] for N rows and columns: each pass of perfect shuffles moves one bit of i into j.
 template <class T, int N>
-FLAPPY_INLINE void turn_tile(const T* from, std::ptrdiff_t from_row, T* to, std::ptrdiff_t to_row) {
+FLAPPY_INLINE void transpose_tile(const T* from, std::ptrdiff_t from_row, T* to, std::ptrdiff_t to_row) {
   using L = Lanes<T, N>;
   using Index = std::make_index_sequence<N>;
   L a[N], b[N];
@@ -123,11 +123,11 @@ FLAPPY_INLINE void turn_tile(const T* from, std::ptrdiff_t from_row, T* to, std:
 
 /// to[j][i] = from[i][j]; rows and columns are multiples of 16.
 template <class T>
-void turn(int rows, int columns, const T* from, std::ptrdiff_t from_row, T* to, std::ptrdiff_t to_row) {
+void transpose(int rows, int columns, const T* from, std::ptrdiff_t from_row, T* to, std::ptrdiff_t to_row) {
   constexpr int kW = kWidth<T>;
   for (int i = 0; i < rows; i += kW)
     for (int j = 0; j < columns; j += kW)
-      turn_tile<T, kW>(from + i * from_row + j, from_row, to + j * to_row + i, to_row);
+      transpose_tile<T, kW>(from + i * from_row + j, from_row, to + j * to_row + i, to_row);
 }
 
 }  // namespace FLAPPY_ISA

@@ -75,17 +75,17 @@ FLAPPY_INLINE void activate(policy::Activation kind, int rows, T* at) {
   else for_rows<T>(rows, [&](std::ptrdiff_t i) { tanh(L<T>::load(at + i)).store(at + i); });
 }
 
-/// Multiplies slopes by the derivative of what gave `out`.
+/// From the gradient of the loss by what an activation gives, `out`, to that by what it takes, in place.
 template <class T>
-FLAPPY_INLINE void deactivate(policy::Activation kind, int rows, const T* out, T* slope) {
+FLAPPY_INLINE void backpropagate(policy::Activation kind, int rows, const T* out, T* gradient) {
   if (kind == policy::Activation::relu)
     for_rows<T>(rows, [&](std::ptrdiff_t i) {
-      where(L<T>::load(out + i) > L<T>(0), L<T>::load(slope + i), L<T>(0)).store(slope + i);
+      where(L<T>::load(out + i) > L<T>(0), L<T>::load(gradient + i), L<T>(0)).store(gradient + i);
     });
   else
     for_rows<T>(rows, [&](std::ptrdiff_t i) {
       const L<T> y = L<T>::load(out + i);
-      L<T>(L<T>::load(slope + i) * L<T>(L<T>(1) - y * y)).store(slope + i);
+      L<T>(L<T>::load(gradient + i) * L<T>(L<T>(1) - y * y)).store(gradient + i);
     });
 }
 
@@ -102,34 +102,34 @@ void forward(const NetworkShape& net, const T* weights, T* values) {
   }
 }
 
-/// What the backward pass works in: slopes of two layers, [widest][kChunk], and one of them turned.
+/// What the backward pass works in: the loss's gradients by the outputs of two layers, [widest][kChunk], and one transposed.
 template <class T>
-struct Slopes {
-  T *now, *next, *turned;
+struct ActivationGradients {
+  T *now, *next, *transposed;
 };
 
-/// Of a sum over samples, given its slopes by the outputs in s.now. Gradients by the weights go to, or onto, `gradient`
-/// unless that is null; slopes by `inputs` of the network's inputs from number `first` go to s.now.
+/// Backpropagation of a sum over samples, given its gradient by the outputs in s.now. The gradient by the weights is written or
+/// added to `gradient` unless that is null; that by `inputs` of the network's inputs from number `first` goes to s.now.
 template <class T>
-void backward(const NetworkShape& net, const T* weights, const T* values, Slopes<T>& s, T* gradient, bool onto,
-              int first, int inputs) {
+void backward(const NetworkShape& net, const T* weights, const T* values, ActivationGradients<T>& s, T* gradient,
+              bool accumulate, int first, int inputs) {
   if (net.bounded)
-    deactivate(policy::Activation::tanh, net.widths[net.layers], values + net.values[net.layers] + kRow, s.now);
+    backpropagate(policy::Activation::tanh, net.widths[net.layers], values + net.values[net.layers] + kRow, s.now);
   for (int l = net.layers - 1; l >= 0; --l) {
     const int in = net.widths[l], out = net.widths[l + 1], wide = padded(out);
     if (gradient != nullptr) {
       for (std::ptrdiff_t i = out * kRow; i < wide * kRow; ++i) s.now[i] = 0;
-      turn(wide, kRow, s.now, kRow, s.turned, wide);
+      transpose(wide, kRow, s.now, kRow, s.transposed, wide);
       const Strided<T> a{values + net.values[l], kRow, 1};
       T* to = gradient + net.weights[l];
-      if (onto) multiply<T, true>(1 + in, wide, kRow, a, s.turned, wide, to, wide);
-      else multiply<T>(1 + in, wide, kRow, a, s.turned, wide, to, wide);
+      if (accumulate) multiply<T, true>(1 + in, wide, kRow, a, s.transposed, wide, to, wide);
+      else multiply<T>(1 + in, wide, kRow, a, s.transposed, wide, to, wide);
     }
     const int from = l > 0 ? 0 : first, count = l > 0 ? in : inputs;
     if (count == 0) continue;
     multiply<T>(count, kRow, out, {weights + net.weights[l] + std::ptrdiff_t{1 + from} * wide, wide, 1}, s.now, kRow,
                 s.next, kRow);
-    if (l > 0) deactivate(net.hidden, count, values + net.values[l] + kRow, s.next);
+    if (l > 0) backpropagate(net.hidden, count, values + net.values[l] + kRow, s.next);
     T* const spare = s.now;
     s.now = s.next, s.next = spare;
   }

@@ -19,9 +19,9 @@ FLAPPY_INLINE T folded(T* numbers) {
 
 /// The chunk's transitions, a row of kChunk for each of their numbers.
 template <class T>
-FLAPPY_INLINE void gather(const UpdatePlan<T>& plan, const Workplace<T>& w, const float* memory,
+FLAPPY_INLINE void gather(const UpdatePlan<T>& plan, const Workspace<T>& w, const float* memory,
                           const std::uint32_t* rows) {
-  const std::ptrdiff_t wide = Workplace<T>::row(plan);
+  const std::ptrdiff_t wide = Workspace<T>::row(plan);
   const auto row = [&](std::ptrdiff_t s) { return memory + static_cast<std::ptrdiff_t>(rows[s]) * plan.row; };
   for (std::ptrdiff_t s = 0; s < kRow; ++s)
     for (std::ptrdiff_t i = 0; i < plan.row; i += 16) __builtin_prefetch(row(s) + i);
@@ -30,7 +30,7 @@ FLAPPY_INLINE void gather(const UpdatePlan<T>& plan, const Workplace<T>& w, cons
     T* to = w.gathered + s * wide;
     for (std::ptrdiff_t i = 0; i < plan.row; ++i) to[i] = static_cast<T>(from[i]);
   }
-  turn(kRow, static_cast<int>(wide), w.gathered, wide, w.columns, kRow);
+  transpose(kRow, static_cast<int>(wide), w.gathered, wide, w.columns, kRow);
 }
 
 /// Rows as a network sees them.
@@ -68,10 +68,10 @@ FLAPPY_INLINE void add_noise(const UpdatePlan<T>& plan, std::uint32_t sample, in
     }
 }
 
-/// What the critics are to predict, into w.goal. A discount of 0 hides what comes next, which the clip has made finite
+/// Targets y of the critics, into w.target. A discount of 0 hides what comes next, which the clip has made finite
 /// whatever it was.
 template <class T>
-FLAPPY_INLINE void find_goal(const UpdatePlan<T>& plan, const Workplace<T>& w, std::uint32_t sample) {
+FLAPPY_INLINE void find_targets(const UpdatePlan<T>& plan, const Workspace<T>& w, std::uint32_t sample) {
   const int actions = plan.actor.widths[plan.actor.layers];
   T* critic_in = rows_of(plan.critic, w.critic, 0);
   T* action = critic_in + plan.critic_input.count * kRow;
@@ -85,29 +85,29 @@ FLAPPY_INLINE void find_goal(const UpdatePlan<T>& plan, const Workplace<T>& w, s
     forward(plan.critic, plan.targets + c * plan.critic.weight_count(), w.critic);
     for_rows<T>(1, [&](std::ptrdiff_t s) {
       const L<T> next = L<T>::load(q + s);
-      (c == 0 ? next : min(L<T>::load(w.goal + s), next)).store(w.goal + s);
+      (c == 0 ? next : min(L<T>::load(w.target + s), next)).store(w.target + s);
     });
   }
   for_rows<T>(1, [&](std::ptrdiff_t s) {
     const L<T> reward = L<T>::load(w.columns + plan.reward * kRow + s);
     const L<T> discount = L<T>::load(w.columns + plan.discount * kRow + s);
-    L<T>(discount * L<T>::load(w.goal + s) + reward).store(w.goal + s);
+    L<T>(discount * L<T>::load(w.target + s) + reward).store(w.target + s);
   });
 }
 
-/// Slopes of the loss by the critic's outputs, into w.slopes.now; returns the sum of the losses.
+/// Gradient of the loss by the critic's outputs, into w.gradients.now; returns the sum of the losses.
 template <class T>
-FLAPPY_INLINE T find_error(const UpdatePlan<T>& plan, const Workplace<T>& w, const T* q) {
+FLAPPY_INLINE T find_loss(const UpdatePlan<T>& plan, const Workspace<T>& w, const T* q) {
   T* loss = w.q;
   const L<T> share(plan.critic_share), bend(plan.huber);
   for_rows<T>(1, [&](std::ptrdiff_t s) {
-    const L<T> error = L<T>::load(q + s) - L<T>::load(w.goal + s);
+    const L<T> error = L<T>::load(q + s) - L<T>::load(w.target + s);
     if (plan.huber > 0) {
       const L<T> near = clamp(error, L<T>(-bend), bend);  // |e| <= bend: e^2 / 2, beyond: bend (|e| - bend / 2)
-      L<T>(share * near).store(w.slopes.now + s);
+      L<T>(share * near).store(w.gradients.now + s);
       L<T>(near * L<T>(error - L<T>(L<T>(0.5) * near))).store(loss + s);
     } else {
-      L<T>(share * error).store(w.slopes.now + s);
+      L<T>(share * error).store(w.gradients.now + s);
       L<T>(error * error).store(loss + s);
     }
   });
@@ -115,15 +115,15 @@ FLAPPY_INLINE T find_error(const UpdatePlan<T>& plan, const Workplace<T>& w, con
 }
 
 template <class T>
-FLAPPY_INLINE T sum_of(const Workplace<T>& w, const T* row) {
+FLAPPY_INLINE T sum_of(const Workspace<T>& w, const T* row) {
   copy_rows(1, row, w.q);
   return folded(w.q);
 }
 
 template <class T>
 ChunkSums<T> chunk(const UpdatePlan<T>& plan, T* work, const float* memory, const std::uint32_t* rows,
-                   std::uint32_t sample, T* gradient, bool onto) {
-  Workplace<T> w(plan, work);
+                   std::uint32_t sample, T* gradient, bool accumulate) {
+  Workspace<T> w(plan, work);
   const int actions = plan.actor.widths[plan.actor.layers], seen = plan.critic_input.count;
   T* critic_in = rows_of(plan.critic, w.critic, 0);
   const T* q = rows_of(plan.critic, w.critic, plan.critic.layers);
@@ -132,16 +132,16 @@ ChunkSums<T> chunk(const UpdatePlan<T>& plan, T* work, const float* memory, cons
   put_ones(plan.critic, w.critic);
   gather(plan, w, memory, rows);
 
-  find_goal(plan, w, sample);
+  find_targets(plan, w, sample);
 
   normalise(plan.critic_input, w.columns + plan.critic_input.now * kRow, critic_in);
   copy_rows(actions, w.columns + plan.action * kRow, critic_in + seen * kRow);
   for (int c = 0; c < plan.critics; ++c) {
     const std::ptrdiff_t at = c * plan.critic.weight_count();
     forward(plan.critic, plan.weights + at, w.critic);
-    sums.loss += find_error(plan, w, q);
+    sums.loss += find_loss(plan, w, q);
     if (c == 0) sums.q = sum_of(w, q);
-    backward<T>(plan.critic, plan.weights + at, w.critic, w.slopes, gradient + at, onto, 0, 0);
+    backward<T>(plan.critic, plan.weights + at, w.critic, w.gradients, gradient + at, accumulate, 0, 0);
   }
 
   if (plan.actor_learns) {
@@ -151,9 +151,9 @@ ChunkSums<T> chunk(const UpdatePlan<T>& plan, T* work, const float* memory, cons
     copy_rows(actions, rows_of(plan.actor, w.actor, plan.actor.layers), critic_in + seen * kRow);
     forward(plan.critic, plan.weights, w.critic);
     sums.actor_q = sum_of(w, q);
-    for_rows<T>(1, [&](std::ptrdiff_t s) { L<T>(-plan.actor_share).store(w.slopes.now + s); });
-    backward<T>(plan.critic, plan.weights, w.critic, w.slopes, nullptr, false, seen, actions);
-    backward<T>(plan.actor, mine, w.actor, w.slopes, gradient + plan.actor_at(), onto, 0, 0);
+    for_rows<T>(1, [&](std::ptrdiff_t s) { L<T>(-plan.actor_share).store(w.gradients.now + s); });
+    backward<T>(plan.critic, plan.weights, w.critic, w.gradients, nullptr, false, seen, actions);
+    backward<T>(plan.actor, mine, w.actor, w.gradients, gradient + plan.actor_at(), accumulate, 0, 0);
   }
   return sums;
 }
@@ -180,7 +180,7 @@ void adam(const AdamPlan<T>& p, std::ptrdiff_t begin, std::ptrdiff_t end) {
 
 template <class T>
 void act(const UpdatePlan<T>& plan, T* work, const float* observations, T* actions) {
-  const Workplace<T> w(plan, work);
+  const Workspace<T> w(plan, work);
   const int inputs = plan.actor_input.count, outputs = plan.actor.widths[plan.actor.layers];
   put_ones(plan.actor, w.actor);
   for (std::ptrdiff_t s = 0; s < kRow; ++s)

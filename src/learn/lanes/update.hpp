@@ -23,7 +23,7 @@ struct UpdatePlan {
   InputView<T> actor_input, critic_input;
   std::ptrdiff_t action = 0, reward = 0, discount = 0, row = 0;  // columns of a transition, and how many
   T noise_sd = 0, noise_clip = 0, huber = 0;
-  T critic_share = 0, actor_share = 0;  // of one sample in the slopes of the losses
+  T critic_share = 0, actor_share = 0;  // weight of one sample in the gradients of the losses
   std::uint64_t seed = 0;
   std::uint32_t update = 0;
   bool actor_learns = false;
@@ -42,12 +42,12 @@ inline namespace FLAPPY_ISA {
 
 /// Where one thread works: as many numbers as count() says.
 template <class T>
-struct Workplace {
+struct Workspace {
   T* gathered;        // [kChunk][row]: transitions
-  T* columns;         // [row][kChunk]: the same, turned
+  T* columns;         // [row][kChunk]: the same, transposed
   T *actor, *critic;  // values of their neurons
-  T *goal, *q;        // [kChunk]
-  Slopes<T> slopes;
+  T *target, *q;      // [kChunk]
+  ActivationGradients<T> gradients;
 
   static std::ptrdiff_t row(const UpdatePlan<T>& plan) { return (plan.row + 15) / 16 * 16; }
   static std::ptrdiff_t widest(const UpdatePlan<T>& plan) {
@@ -56,16 +56,16 @@ struct Workplace {
   static std::ptrdiff_t count(const UpdatePlan<T>& plan) {
     return kRow * (2 * row(plan) + 3 * widest(plan) + 2) + plan.actor.value_count() + plan.critic.value_count();
   }
-  Workplace(const UpdatePlan<T>& plan, T* at) {
+  Workspace(const UpdatePlan<T>& plan, T* at) {
     gathered = at, at += kRow * row(plan);
     columns = at, at += kRow * row(plan);
     actor = at, at += plan.actor.value_count();
     critic = at, at += plan.critic.value_count();
-    goal = at, at += kRow;
+    target = at, at += kRow;
     q = at, at += kRow;
-    slopes.now = at, at += kRow * widest(plan);
-    slopes.next = at, at += kRow * widest(plan);
-    slopes.turned = at;
+    gradients.now = at, at += kRow * widest(plan);
+    gradients.next = at, at += kRow * widest(plan);
+    gradients.transposed = at;
   }
 };
 
@@ -85,10 +85,10 @@ struct AdamPlan {
 
 template <class T>
 struct UpdateKernel {
-  /// Gradients of kChunk samples, to or onto `gradient` as `onto` says. `rows` are their transitions in `memory`, `sample` is
-  /// the number of the first in the batch.
+  /// Writes the gradients of kChunk samples to `gradient`, or adds them where it is to accumulate. `rows` are their transitions
+  /// in `memory`, `sample` is the number of the first in the batch.
   ChunkSums<T> (*chunk)(const UpdatePlan<T>&, T* work, const float* memory, const std::uint32_t* rows,
-                        std::uint32_t sample, T* gradient, bool onto);
+                        std::uint32_t sample, T* gradient, bool accumulate);
   /// Numbers `begin` to `end`, multiples of 16.
   void (*adam)(const AdamPlan<T>&, std::ptrdiff_t begin, std::ptrdiff_t end);
   /// Actions of kChunk observations, row by row.

@@ -59,7 +59,7 @@ struct Pair {
   void update(double actor_rate, double critic_rate) {
     const LearnerOptions& o = ours.options();
     std::vector<std::uint32_t> rows(o.batch);
-    replay.draw(o.seed, updates, 0, rows);
+    replay.sample(o.seed, updates, 0, rows);
     std::vector<double> noise;
     using One = model::Lanes<double, 1>;
     for (std::uint32_t s = 0; s < o.batch && o.noise_sd > 0; ++s)
