@@ -93,7 +93,7 @@ struct ArcController {
   }
 
   template <class T>
-  static void rotate_z(const T& sin, const T& cos, Arc<T>& m) {
+  static void rotate(const T& sin, const T& cos, Arc<T>& m) {
     const Vec3<T> push = turn_z(sin, cos, Vec3<T>{m.disturbance_x_m_s2, m.disturbance_y_m_s2, T(0)});
     const Vec3<T> predicted = turn_z(sin, cos, Vec3<T>{m.predicted_x_m_s, m.predicted_y_m_s, T(0)});
     m.disturbance_x_m_s2 = push.x, m.disturbance_y_m_s2 = push.y;
@@ -162,9 +162,9 @@ FLAPPY_INLINE WingBeat<T> ArcController::update(const ArcConstants<Element<T>>& 
   const T upright = max(R.row_z.z, T(0.5));
   const T lean_x = T(g * R.row_x.z) / upright, lean_y = T(g * R.row_y.z) / upright;
   const auto predict = [&](T& disturbance, T& predicted, const T& lean, const T& velocity) {
-    const T surprise = velocity - predicted;
-    predicted += dt * T(lean + (disturbance + T(k.predictor_1_s) * surprise));
-    disturbance = adapted(k.disturbance_m_s2, disturbance, surprise, dt, T(0));
+    const T innovation = velocity - predicted;
+    predicted += dt * T(lean + (disturbance + T(k.predictor_1_s) * innovation));
+    disturbance = adapted(k.disturbance_m_s2, disturbance, innovation, dt, T(0));
   };
   predict(m.disturbance_x_m_s2, m.predicted_x_m_s, lean_x, x.velocity_m_s.x);
   predict(m.disturbance_y_m_s2, m.predicted_y_m_s, lean_y, x.velocity_m_s.y);

@@ -9,7 +9,7 @@
 //   trim(constants, memory)      the inputs that it has learnt: those of a settled vehicle
 //   unlearn(held, before, now)   takes back what it learnt in the last period in the lanes `held`
 //   kSource, exported(constants, add)    optional: the C code that flies it on board, and add(member, number or numbers) for its constants
-//   rotate_z(sin, cos, memory)   memory of a flight that is turned about z of W
+//   rotate(sin, cos, memory)     memory of a flight that is turned about z of W
 #pragma once
 
 #include <algorithm>

@@ -297,7 +297,7 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   estimator.covariance.gyro_bias = learnt.covariance.gyro_bias;
   estimator.covariance.accel_bias = learnt.covariance.accel_bias;
   put(estimator, f.estimator, lane);
-  change_controller(i, [&]<class C>(C, auto& memory) { C::rotate_z(turn.sin, turn.cos, memory); });
+  change_controller(i, [&]<class C>(C, auto& memory) { C::rotate(turn.sin, turn.cos, memory); });
   show(i);
 }
 

@@ -124,7 +124,7 @@ struct PidController {
   }
 
   template <class T>
-  static void rotate_z(const T& sin, const T& cos, Pid<T>& m) {
+  static void rotate(const T& sin, const T& cos, Pid<T>& m) {
     const Vec3<T> integral = turn_z(sin, cos, Vec3<T>{m.integral_x, m.integral_y, T(0)});
     m.integral_x = integral.x;
     m.integral_y = integral.y;
