@@ -94,11 +94,11 @@ struct ArcController {
 
   template <class T>
   static void rotate(const T& sin, const T& cos, Arc<T>& m) {
-    const Vec3<T> push = turn_z(sin, cos, Vec3<T>{m.disturbance_x_m_s2, m.disturbance_y_m_s2, T(0)});
-    const Vec3<T> predicted = turn_z(sin, cos, Vec3<T>{m.predicted_x_m_s, m.predicted_y_m_s, T(0)});
+    const Vec3<T> push = rotate_z(sin, cos, Vec3<T>{m.disturbance_x_m_s2, m.disturbance_y_m_s2, T(0)});
+    const Vec3<T> predicted = rotate_z(sin, cos, Vec3<T>{m.predicted_x_m_s, m.predicted_y_m_s, T(0)});
     m.disturbance_x_m_s2 = push.x, m.disturbance_y_m_s2 = push.y;
     m.predicted_x_m_s = predicted.x, m.predicted_y_m_s = predicted.y;
-    m.velocity_m_s = turn_z(sin, cos, m.velocity_m_s);
+    m.velocity_m_s = rotate_z(sin, cos, m.velocity_m_s);
   }
 
   template <class T>

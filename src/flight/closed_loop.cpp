@@ -226,7 +226,7 @@ FLAPPY_INLINE void estimate(const FlightSpace<T>& s, const FlightPlan<T>& plan, 
   Pose<L<T>> ahead = estimator.now;
   if (plan.newest.slot >= 0) {
     const L<T> per_duration(1 / plan.newest.duration_s);
-    estimator.body_rate_rad_s = per_duration * increment(plan.newest.slot).turn_rad - estimator.gyro_bias_rad_s;
+    estimator.body_rate_rad_s = per_duration * increment(plan.newest.slot).rotation_rad - estimator.gyro_bias_rad_s;
     if (plan.ahead_s > 0)
       move(ahead, {plan.newest.slot, plan.ahead_s / plan.newest.duration_s, plan.newest.duration_s});
   }

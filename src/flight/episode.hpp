@@ -186,11 +186,11 @@ FLAPPY_INLINE int observe(std::uint32_t parts, const Estimate<T>& x, const Setpo
   if (observes(Part::previous_action))
     for (int i = 0; i < kActions; ++i) row[n++] = e.adds[i];
   if (observes(Part::goal_rotation)) {
-    const auto turned_back = [&](const Vec3<T>& x_row, const Vec3<T>& y_row) {
+    const auto rotated_back = [&](const Vec3<T>& x_row, const Vec3<T>& y_row) {
       return add_scaled(ref.heading.cos * x_row, ref.heading.sin, y_row);
     };
     const Vec3<T> minus_x{-R.row_x.x, -R.row_x.y, -R.row_x.z};
-    add(turned_back(R.row_x, R.row_y)), add(turned_back(R.row_y, minus_x)), add(R.row_z);
+    add(rotated_back(R.row_x, R.row_y)), add(rotated_back(R.row_y, minus_x)), add(R.row_z);
   }
   if (observes(Part::time)) row[n++] = time_s;
   if (observes(Part::trim)) {

@@ -38,7 +38,7 @@ struct Pose {
 /// Turn and velocity gained over some time, in B at its middle, as measured.
 template <class T>
 struct Increment {
-  Vec3<T> turn_rad, velocity_m_s;
+  Vec3<T> rotation_rad, velocity_m_s;
 };
 
 template <class T>
@@ -67,8 +67,8 @@ FLAPPY_INLINE void gather(Increment<T>& sum, const ImuSample<T>& sample, const T
   const Vec3<T> turn = interval_s * sample.gyro_rad_s, gained = interval_s * sample.accel_m_s2;
   // the later sample, seen from the frame of the earlier ones
   sum.velocity_m_s =
-      sum.velocity_m_s + (gained + T(0.5) * cross(sum.turn_rad, gained)) - T(0.5) * cross(turn, sum.velocity_m_s);
-  sum.turn_rad = sum.turn_rad + turn;
+      sum.velocity_m_s + (gained + T(0.5) * cross(sum.rotation_rad, gained)) - T(0.5) * cross(turn, sum.velocity_m_s);
+  sum.rotation_rad = sum.rotation_rad + turn;
 }
 
 /// Moves a pose by `share` of an increment that took `duration_s` in all.
@@ -76,13 +76,13 @@ template <class T>
 FLAPPY_INLINE void advance(Pose<T>& x, const Increment<T>& increment, const Vec3<T>& gyro_bias,
                            const Vec3<T>& accel_bias, const T& share, const T& duration_s, const T& gravity_m_s2) {
   const T time = share * duration_s;
-  const Vec3<T> quarter = T(T(0.25) * share) * (increment.turn_rad - duration_s * gyro_bias);
-  const Quaternion<T> middle = turned(x.attitude, quarter);
+  const Vec3<T> quarter = T(T(0.25) * share) * (increment.rotation_rad - duration_s * gyro_bias);
+  const Quaternion<T> middle = rotated(x.attitude, quarter);
   Vec3<T> gained = rotation_matrix(middle) * (share * (increment.velocity_m_s - duration_s * accel_bias));
   gained.z -= time * gravity_m_s2;
   x.position_m = add_scaled(x.position_m, time, add_scaled(x.velocity_m_s, T(0.5), gained));
   x.velocity_m_s = x.velocity_m_s + gained;
-  x.attitude = turned(middle, quarter);
+  x.attitude = rotated(middle, quarter);
 }
 
 template <class T>
@@ -131,7 +131,7 @@ FLAPPY_INLINE void correct(Estimator<T>& f, const EstimatorConstants<Element<T>>
   f.angle_innovation = where(lost, f.angle_innovation, T(dot(angle, angle) * per_angle));
   const T to_angle = where(lost, none, T(c.angle * per_angle));
   const T to_gyro = where(lost, none, T(c.angle_bias * per_angle));
-  f.horizon.attitude = turned(f.horizon.attitude, T(T(0.5) * to_angle) * angle);
+  f.horizon.attitude = rotated(f.horizon.attitude, T(T(0.5) * to_angle) * angle);
   f.gyro_bias_rad_s = add_scaled(f.gyro_bias_rad_s, to_gyro, angle);
   c.gyro_bias -= to_gyro * c.angle_bias;
   c.angle_bias -= to_angle * c.angle_bias;

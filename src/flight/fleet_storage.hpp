@@ -270,23 +270,23 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
                             now.cos * s.target.heading_cos + now.sin * s.target.heading_sin};
   const double half = atan2(turn.sin, turn.cos) / 2;
   const SinCos<double> h = sin_cos_wide(half);
-  const auto turned_z = [&](const Vec3<double>& v) { return turn_z(turn.sin, turn.cos, v); };
-  const auto turned_q = [&](const Quaternion<double>& q) {
+  const auto rotated_z = [&](const Vec3<double>& v) { return rotate_z(turn.sin, turn.cos, v); };
+  const auto rotated_q = [&](const Quaternion<double>& q) {
     return Quaternion<double>{h.cos * q.w - h.sin * q.z, h.cos * q.x - h.sin * q.y, h.cos * q.y + h.sin * q.x,
                               h.cos * q.z + h.sin * q.w};
   };
   const Vec3<double> from{s.target.position_m[0], s.target.position_m[1], s.target.position_m[2]};
   const Vec3<double> at_m{to.position_m[0], to.position_m[1], to.position_m[2]};
   auto x = get<State<double>>(block.state, lane);
-  x.position_m = at_m + turned_z(x.position_m - from);
-  x.attitude = turned_q(x.attitude);
-  x.com_velocity_m_s = turned_z(x.com_velocity_m_s);
+  x.position_m = at_m + rotated_z(x.position_m - from);
+  x.attitude = rotated_q(x.attitude);
+  x.com_velocity_m_s = rotated_z(x.com_velocity_m_s);
   put(x, block.state, lane);
 
   const auto imu = get<Imu<double>>(f.imu, lane);
   const auto learnt = get<Estimator<double>>(f.estimator, lane);
   const auto flown = get<Truth<double>>(f.truth, lane);
-  start_lane(i, episode, {x.position_m, x.attitude, turned_z(flown.velocity_m_s), flown.body_rate_rad_s});
+  start_lane(i, episode, {x.position_m, x.attitude, rotated_z(flown.velocity_m_s), flown.body_rate_rad_s});
   auto fresh_imu = get<Imu<double>>(f.imu, lane);
   fresh_imu.gyro_bias_rad_s = imu.gyro_bias_rad_s;
   fresh_imu.low_passed = imu.low_passed;
@@ -313,7 +313,7 @@ void Fleet<T>::Storage::start_estimator(std::size_t i, const Truth<double>& trut
   };
   key.stream = sim::Stream::start_estimate;
   Estimate<double> x{truth.position_m + noise(s.mocap.position_noise_m, 0),
-                     turned(truth.attitude, noise(s.mocap.attitude_noise_rad / 2, 3)),
+                     rotated(truth.attitude, noise(s.mocap.attitude_noise_rad / 2, 3)),
                      truth.velocity_m_s + noise(s.estimator.initial_velocity_sd_m_s, 6), truth.body_rate_rad_s};
   put(x, f.estimate, lane);
 

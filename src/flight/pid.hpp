@@ -125,10 +125,10 @@ struct PidController {
 
   template <class T>
   static void rotate(const T& sin, const T& cos, Pid<T>& m) {
-    const Vec3<T> integral = turn_z(sin, cos, Vec3<T>{m.integral_x, m.integral_y, T(0)});
+    const Vec3<T> integral = rotate_z(sin, cos, Vec3<T>{m.integral_x, m.integral_y, T(0)});
     m.integral_x = integral.x;
     m.integral_y = integral.y;
-    m.velocity_m_s = turn_z(sin, cos, m.velocity_m_s);
+    m.velocity_m_s = rotate_z(sin, cos, m.velocity_m_s);
   }
 
   template <class T>

@@ -93,7 +93,7 @@ FLAPPY_INLINE ImuSample<T> sample_imu(const ImuConstants<Element<T>>& k, const T
   const Vec3<T> velocity = point_velocity(t, {T(k.position_m[0]), T(k.position_m[1]), T(k.position_m[2])});
   Vec3<T> force = per_interval * (velocity - imu.velocity_m_s);
   force.z += T(k.gravity_m_s2);
-  const Matrix3<T> halfway = rotation_matrix(turned(imu.attitude, T(0.25) * turn));
+  const Matrix3<T> halfway = rotation_matrix(rotated(imu.attitude, T(0.25) * turn));
   const ImuSample<T> mean{per_interval * turn, transpose_times(halfway, force)};
   ImuSample<T>& y = imu.low_passed;
   y.gyro_rad_s = add_scaled(y.gyro_rad_s, T(k.low_pass_share), mean.gyro_rad_s - y.gyro_rad_s);
@@ -122,7 +122,7 @@ template <class T>
 FLAPPY_INLINE MocapSample<T> sample_mocap(const MocapConstants<Element<T>>& k, const Truth<T>& t, const T& seen,
                                           const sim::Normals4<T>& a, const sim::Normals4<T>& b) {
   return {add_scaled(t.position_m, T(k.position_noise_m), Vec3<T>{a.n[0], a.n[1], a.n[2]}),
-          turned(t.attitude, T(0.5 * k.attitude_noise_rad) * Vec3<T>{a.n[3], b.n[0], b.n[1]}), seen};
+          rotated(t.attitude, T(0.5 * k.attitude_noise_rad) * Vec3<T>{a.n[3], b.n[0], b.n[1]}), seen};
 }
 
 }  // namespace FLAPPY_ISA

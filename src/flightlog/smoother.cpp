@@ -84,7 +84,7 @@ struct Smoother::Noise {
 /// interval: a mean knows no other frame.
 struct Smoother::Reading {
   double duration_s, to_middle_s;
-  Vector3d turn_rad, turn_to_middle_rad, gained_m_s, moved_m;
+  Vector3d rotation_rad, turn_to_middle_rad, gained_m_s, moved_m;
   bool gap;
 };
 
@@ -187,7 +187,7 @@ Quaterniond Smoother::to_middle(const State& x, const Reading& r) {
 }
 
 auto Smoother::moved(const State& x, const Reading& r) const -> State {
-  const Vector3d turn = r.turn_rad - r.duration_s * x.gyro_bias;
+  const Vector3d turn = r.rotation_rad - r.duration_s * x.gyro_bias;
   const double dt = r.duration_s;
   const Quaterniond middle = to_middle(x, r);
   const Vector3d down(0, 0, -gravity_m_s2_);
@@ -201,7 +201,7 @@ auto Smoother::moved(const State& x, const Reading& r) const -> State {
 
 auto Smoother::transition(const State& x, const Reading& r) const -> Covariance {
   const double dt = r.duration_s;
-  const Vector3d turn = r.turn_rad - dt * x.gyro_bias;
+  const Vector3d turn = r.rotation_rad - dt * x.gyro_bias;
   const Matrix3d half = to_middle(x, r).toRotationMatrix();
   const Matrix3d leans = -half * cross_matrix(r.gained_m_s - dt * x.accel_bias);  // velocity for an angle
   Covariance f = Covariance::Identity();

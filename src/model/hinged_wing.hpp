@@ -43,7 +43,7 @@ template <int side, class T>
 FLAPPY_INLINE Vec3<T> moment_about_shoulder(const SideParameters<T>& p, const SideState<T>& q) {
   const SinCos<T> beta = sin_cos(T(T(side) * q.stroke_rad)), theta = sin_cos(q.rotation_rad);
   const Vec3<T>& h = p.wing_moment_kg_m;
-  return turn_z(beta.sin, beta.cos, p.edge_moment_kg_m + turn_y(theta.sin, theta.cos, h));
+  return rotate_z(beta.sin, beta.cos, p.edge_moment_kg_m + rotate_y(theta.sin, theta.cos, h));
 }
 
 template <int side, class T>
@@ -53,11 +53,11 @@ FLAPPY_INLINE WingPose<T> place_wing(const SideParameters<T>& p, const SideState
   g.theta = sin_cos(q.rotation_rad);
   const T b = g.beta_rate = T(side) * q.stroke_rate_rad_s;
   const T t = g.theta_rate = q.rotation_rate_rad_s;
-  const Vec3<T> hw = g.wing_moment_L = turn_y(g.theta.sin, g.theta.cos, p.wing_moment_kg_m);
+  const Vec3<T> hw = g.wing_moment_L = rotate_y(g.theta.sin, g.theta.cos, p.wing_moment_kg_m);
   const Vec3<T> h = g.moment_L = p.edge_moment_kg_m + hw;
-  g.moment = turn_z(g.beta.sin, g.beta.cos, h);
-  g.momentum = turn_z(g.beta.sin, g.beta.cos, Vec3<T>{t * hw.z - b * h.y, b * h.x, -(t * hw.x)});
-  g.body_rate_L = turn_back_z(g.beta.sin, g.beta.cos, body_rate);
+  g.moment = rotate_z(g.beta.sin, g.beta.cos, h);
+  g.momentum = rotate_z(g.beta.sin, g.beta.cos, Vec3<T>{t * hw.z - b * h.y, b * h.x, -(t * hw.x)});
+  g.body_rate_L = rotate_back_z(g.beta.sin, g.beta.cos, body_rate);
   return g;
 }
 
@@ -66,15 +66,15 @@ FLAPPY_INLINE WingInertia<T> wing_inertia(const SideParameters<T>& p, const Wing
   WingInertia<T> i;
   const Vec3<T>&w = g.body_rate_L, &h = g.moment_L, &hw = g.wing_moment_L;
   const T &b = g.beta_rate, &t = g.theta_rate;
-  const Sym3<T> pw = turn_y(g.theta.sin, g.theta.cos, p.wing_second_kg_m2);
+  const Sym3<T> pw = rotate_y(g.theta.sin, g.theta.cos, p.wing_second_kg_m2);
   const Sym3<T> P = p.edge_second_kg_m2 + pw;
-  i.second = turn_z(g.beta.sin, g.beta.cos, P);
+  i.second = rotate_z(g.beta.sin, g.beta.cos, P);
   i.stroke_inertia = P.xx + P.yy;
   i.rotation_inertia = pw.xx + pw.zz;
   i.cross_inertia = -pw.yz;
-  i.rotation_column = turn_z(g.beta.sin, g.beta.cos, hw.z, T(-hw.x));
+  i.rotation_column = rotate_z(g.beta.sin, g.beta.cos, hw.z, T(-hw.x));
   i.stroke_spin = {-i.second.xz, -i.second.yz, i.stroke_inertia};
-  i.rotation_spin = turn_z(g.beta.sin, g.beta.cos, Vec3<T>{-pw.xy, i.rotation_inertia, -pw.yz});
+  i.rotation_spin = rotate_z(g.beta.sin, g.beta.cos, Vec3<T>{-pw.xy, i.rotation_inertia, -pw.yz});
 
   const T Pw_x = P.xx * w.x + (P.xy * w.y + P.xz * w.z), Pw_y = P.xy * w.x + (P.yy * w.y + P.yz * w.z);
   const T pw_x = pw.xx * w.x + (pw.xy * w.y + pw.xz * w.z), pw_z = pw.xz * w.x + (pw.yz * w.y + pw.zz * w.z);

@@ -90,52 +90,52 @@ FLAPPY_INLINE Sym3<T> inertia_of(const Sym3<T>& p) {
   return {p.yy + p.zz, p.xx + p.zz, p.xx + p.yy, -p.xy, -p.yz, -p.xz};
 }
 
-/// Turns a vector by an angle about z, given its sine and cosine.
+/// Rotates a vector by an angle about z, given its sine and cosine.
 template <class T>
-FLAPPY_INLINE Vec3<T> turn_z(const T& s, const T& c, const Vec3<T>& v) {
+FLAPPY_INLINE Vec3<T> rotate_z(const T& s, const T& c, const Vec3<T>& v) {
   return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
 }
-/// Turns (x, 0, z).
+/// Rotates (x, 0, z).
 template <class T>
-FLAPPY_INLINE Vec3<T> turn_z(const T& s, const T& c, const T& x, const T& z) {
+FLAPPY_INLINE Vec3<T> rotate_z(const T& s, const T& c, const T& x, const T& z) {
   return {c * x, s * x, z};
 }
-/// Turns it back.
+/// Rotates it back: by the transpose.
 template <class T>
-FLAPPY_INLINE Vec3<T> turn_back_z(const T& s, const T& c, const Vec3<T>& v) {
+FLAPPY_INLINE Vec3<T> rotate_back_z(const T& s, const T& c, const Vec3<T>& v) {
   return {c * v.x + s * v.y, c * v.y - s * v.x, v.z};
 }
 
 /// The same about x and y.
 template <class T>
-FLAPPY_INLINE Vec3<T> turn_x(const T& s, const T& c, const Vec3<T>& v) {
+FLAPPY_INLINE Vec3<T> rotate_x(const T& s, const T& c, const Vec3<T>& v) {
   return {v.x, c * v.y - s * v.z, s * v.y + c * v.z};
 }
 template <class T>
-FLAPPY_INLINE Vec3<T> turn_back_x(const T& s, const T& c, const Vec3<T>& v) {
+FLAPPY_INLINE Vec3<T> rotate_back_x(const T& s, const T& c, const Vec3<T>& v) {
   return {v.x, c * v.y + s * v.z, c * v.z - s * v.y};
 }
 template <class T>
-FLAPPY_INLINE Vec3<T> turn_y(const T& s, const T& c, const Vec3<T>& v) {
+FLAPPY_INLINE Vec3<T> rotate_y(const T& s, const T& c, const Vec3<T>& v) {
   return {c * v.x + s * v.z, v.y, c * v.z - s * v.x};
 }
 template <class T>
-FLAPPY_INLINE Vec3<T> turn_back_y(const T& s, const T& c, const Vec3<T>& v) {
+FLAPPY_INLINE Vec3<T> rotate_back_y(const T& s, const T& c, const Vec3<T>& v) {
   return {c * v.x - s * v.z, v.y, s * v.x + c * v.z};
 }
 
-/// R P R^T for a turn about z: the xy block turns by the double angle.
+/// R P R^T for a rotation about z: the xy block rotates by the double angle.
 template <class T>
-FLAPPY_INLINE Sym3<T> turn_z(const T& s, const T& c, const Sym3<T>& p) {
+FLAPPY_INLINE Sym3<T> rotate_z(const T& s, const T& c, const Sym3<T>& p) {
   const T twice = s + s, s2 = twice * c, c2 = T(1) - twice * s;
   const T mean = T(0.5) * T(p.xx + p.yy), half = T(0.5) * T(p.xx - p.yy);
   const T d = half * c2 - p.xy * s2;
   return {mean + d, mean - d, p.zz, half * s2 + p.xy * c2, s * p.xz + c * p.yz, c * p.xz - s * p.yz};
 }
 
-/// R P R^T for a turn about y.
+/// R P R^T for a rotation about y.
 template <class T>
-FLAPPY_INLINE Sym3<T> turn_y(const T& s, const T& c, const Sym3<T>& p) {
+FLAPPY_INLINE Sym3<T> rotate_y(const T& s, const T& c, const Sym3<T>& p) {
   const T twice = s + s, s2 = twice * c, c2 = T(1) - twice * s;
   const T mean = T(0.5) * T(p.xx + p.zz), half = T(0.5) * T(p.xx - p.zz);
   const T d = half * c2 + p.xz * s2;
@@ -174,10 +174,10 @@ FLAPPY_INLINE Matrix3<T> rotation_matrix(const Quaternion<T>& q) {
           {q.x * z2 - wy, q.y * z2 + wx, T(1) - (xx + yy)}};
 }
 
-/// Attitude after turning by the small rotation vector 2 e given in body axes: q (1, e), brought back to unit
+/// Attitude after a rotation by the small rotation vector 2 e given in body axes: q (1, e), brought back to unit
 /// length by one Newton step, exact to |e|^4 and free of drift.
 template <class T>
-FLAPPY_INLINE Quaternion<T> turned(const Quaternion<T>& q, const Vec3<T>& e) {
+FLAPPY_INLINE Quaternion<T> rotated(const Quaternion<T>& q, const Vec3<T>& e) {
   const Quaternion<T> r{q.w - (q.x * e.x + (q.y * e.y + q.z * e.z)), q.x + (q.w * e.x + (q.y * e.z - q.z * e.y)),
                         q.y + (q.w * e.y + (q.z * e.x - q.x * e.z)), q.z + (q.w * e.z + (q.x * e.y - q.y * e.x))};
   const T norm2 = r.w * r.w + (r.x * r.x + (r.y * r.y + r.z * r.z));

@@ -158,9 +158,9 @@ FLAPPY_INLINE BodyDrive<T> drive_body(const Parameters<T>& p, const State<T>& x,
                                       const BodyInertia<T>& inertia, const Sides<SideLoad<T>>& load,
                                       const BodyLoad<T>& body, const Vec3<T>& up_B, const T& gravity) {
   const Vec3<T>& w = x.body_rate_rad_s;
-  const auto to_B = [](const WingPose<T>& g, const Vec3<T>& a) { return turn_z(g.beta.sin, g.beta.cos, a); };
+  const auto to_B = [](const WingPose<T>& g, const Vec3<T>& a) { return rotate_z(g.beta.sin, g.beta.cos, a); };
   const auto air = [](const WingPose<T>& g, const SideLoad<T>& a) {
-    return turn_z(g.beta.sin, g.beta.cos, a.force_x_N, a.force_z_N);
+    return rotate_z(g.beta.sin, g.beta.cos, a.force_x_N, a.force_z_N);
   };
   const Vec3<T> air_l = air(pose.left, load.left), air_r = air(pose.right, load.right);
   const Vec3<T> net_l = air_l - to_B(pose.left, wing.left.relative_force_L);

@@ -35,15 +35,15 @@ FLAPPY_INLINE ShoulderWrench<T> air_on_driven_wing(const SideParameters<T>& p, c
                    lift_rate = T(side) * rates.deviation_rad;
   const auto to_E = [&](const Vec3<T>& v, const Vec3<T>& plane_part, const Vec3<T>& beta_part,
                         const Vec3<T>& lift_part) {
-    const Vec3<T> in_plane = turn_back_y(plane.sin, plane.cos, v + plane_part) + beta_part;
-    return turn_back_x(lift.sin, lift.cos, turn_back_z(beta.sin, beta.cos, in_plane) + lift_part);
+    const Vec3<T> in_plane = rotate_back_y(plane.sin, plane.cos, v + plane_part) + beta_part;
+    return rotate_back_x(lift.sin, lift.cos, rotate_back_z(beta.sin, beta.cos, in_plane) + lift_part);
   };
   const Vec3<T> none{zero, zero, zero};
   const Vec3<T> v = to_E(velocity_B, none, none, none);
   const Vec3<T> w = to_E(body_rate, {zero, plane_rate, zero}, {zero, zero, beta_rate}, {lift_rate, zero, zero});
   const WingWrench<T> air = blade_element<side>(p, theta, rates.rotation_rad, v, w);
   const auto to_B = [&](const Vec3<T>& a) {
-    return turn_y(plane.sin, plane.cos, turn_z(beta.sin, beta.cos, turn_x(lift.sin, lift.cos, a)));
+    return rotate_y(plane.sin, plane.cos, rotate_z(beta.sin, beta.cos, rotate_x(lift.sin, lift.cos, a)));
   };
   return {to_B({air.force_x_N, zero, air.force_z_N}), to_B(air.moment_Nm)};
 }

@@ -80,7 +80,7 @@ FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<
 /// Air on one wing, from the velocity of its shoulder in B.
 template <int side, class T>
 FLAPPY_INLINE WingWrench<T> air_on_wing(const SideParameters<T>& p, const WingPose<T>& g, const Vec3<T>& velocity_B) {
-  return blade_element<side>(p, g.theta, g.theta_rate, turn_back_z(g.beta.sin, g.beta.cos, velocity_B),
+  return blade_element<side>(p, g.theta, g.theta_rate, rotate_back_z(g.beta.sin, g.beta.cos, velocity_B),
                              {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate});
 }
 
@@ -270,10 +270,10 @@ FLAPPY_INLINE void feel(const Parameters<T>& p, State<T>& x, const Sides<WingPos
                         const Sides<WingWrench<T>>& air, const T& lift, const T& step, typename T::Mask held) {
   if (!rarely(held)) return;
   const auto force = [](const WingPose<T>& g, const WingWrench<T>& a) {
-    return turn_z(g.beta.sin, g.beta.cos, a.force_x_N, a.force_z_N);
+    return rotate_z(g.beta.sin, g.beta.cos, a.force_x_N, a.force_z_N);
   };
   const auto moment = [](const WingPose<T>& g, const WingWrench<T>& a) {
-    return turn_z(g.beta.sin, g.beta.cos, a.moment_Nm);
+    return rotate_z(g.beta.sin, g.beta.cos, a.moment_Nm);
   };
   const Vec3<T> force_l = force(pose.left, air.left), force_r = force(pose.right, air.right);
   const Vec3<T> about_origin = (moment(pose.left, air.left) + moment(pose.right, air.right)) +
@@ -371,7 +371,7 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
   turn<+1>(p.left, x.left, m.stroke_left, m.rotation_left, k.per_step);
   turn<-1>(p.right, x.right, m.stroke_right, m.rotation_right, k.per_step);
   com_m = add_scaled(com_m, k.step, x.com_velocity_m_s);
-  x.attitude = turned(x.attitude, k.half_step * x.body_rate_rad_s);
+  x.attitude = rotated(x.attitude, k.half_step * x.body_rate_rad_s);
   feel(p, x, pose, acting.air, force.z, k.step, held);
   if constexpr (with_effects) {
     const auto& [left, right] = acting.s.figures;

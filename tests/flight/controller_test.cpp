@@ -257,7 +257,7 @@ struct Body {
       const V turn{(roll_Nm_V * u.difference_V + torque_Nm.x) / inertia_x,
                    (pitch_Nm_V * u.bias_V + torque_Nm.y) / inertia_y,
                    (yaw_Nm_split * u.split_cycle + torque_Nm.z) / inertia_z};
-      x.attitude = turned(x.attitude, 0.5 * kStep * (x.body_rate_rad_s + 0.5 * kStep * turn));
+      x.attitude = rotated(x.attitude, 0.5 * kStep * (x.body_rate_rad_s + 0.5 * kStep * turn));
       x.body_rate_rad_s = x.body_rate_rad_s + kStep * turn;
     }
   }

@@ -134,7 +134,7 @@ class Rig {
     const Truth<double> first = course.at(-low_pass_lag_s(s.imu));
     const V turn = 0.5 * noise * s.mocap.attitude_noise_rad * V{normal(), normal(), normal()};
     Truth<double> x = first;
-    x.attitude = turned(first.attitude, turn);
+    x.attitude = rotated(first.attitude, turn);
     x.position_m = first.position_m + noise * s.mocap.position_noise_m * V{normal(), normal(), normal()};
     x.velocity_m_s = first.velocity_m_s + noise * f.initial_velocity_sd_m_s * V{normal(), normal(), normal()};
     estimator.horizon = estimator.now = {as<T>(x).attitude, as<T>(x.position_m), as<T>(x.velocity_m_s)};
@@ -180,7 +180,7 @@ class Rig {
     for (const Advance& a : p.replay) move(estimator.now, a);
     Pose<T> ahead = estimator.now;
     if (p.newest.slot >= 0) {
-      rate = (1 / p.newest.duration_s) * wide(ring_[static_cast<std::size_t>(p.newest.slot)].turn_rad) -
+      rate = (1 / p.newest.duration_s) * wide(ring_[static_cast<std::size_t>(p.newest.slot)].rotation_rad) -
              wide(estimator.gyro_bias_rad_s);
       if (p.ahead_s > 0) move(ahead, {p.newest.slot, p.ahead_s / p.newest.duration_s, p.newest.duration_s});
     }

@@ -864,7 +864,7 @@ TEST(AddedMass, LosesNoMomentum) {
       };
       const double change = before[0] * 2 * (momentum(s.memory + row) - momentum(before + row));
       moved += std::abs(change);
-      const Vec3<One> n = R * turn_z(g.beta.sin, g.beta.cos, g.theta.cos, One(-g.theta.sin));
+      const Vec3<One> n = R * rotate_z(g.beta.sin, g.beta.cos, g.theta.cos, One(-g.theta.sin));
       expected = expected - Vec3<double>{value(n.x) * change, value(n.y) * change, value(n.z) * change};
     };
     taken(pose.left, s.effects.figures().left, 1, 1);

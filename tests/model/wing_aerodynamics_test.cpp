@@ -81,10 +81,10 @@ void compare_with_paper(const model::Vehicle& vehicle) {
     const V w_B{rate[0], rate[1], rate[2]};
     const V shoulder_velocity = V{velocity[0], velocity[1], velocity[2]} + model::cross(w_B, p.shoulder_m);
     const double sb = std::sin(side * psi), cb = std::cos(side * psi);
-    V w_L = model::turn_back_z(sb, cb, w_B);
+    V w_L = model::rotate_back_z(sb, cb, w_B);
     w_L.z += side * psi_rate;
     const auto wrench = model::blade_element<side>(p, {std::sin(theta), std::cos(theta)}, theta_rate,
-                                                   model::turn_back_z(sb, cb, shoulder_velocity), w_L);
+                                                   model::rotate_back_z(sb, cb, shoulder_velocity), w_L);
     const double r_cp = p.span_to_pressure_m;
     EXPECT_NEAR(wrench.normal_force_N, expected.normal_force, 1e-12);
     EXPECT_NEAR(wrench.moment_Nm.y, expected.moment_y, 1e-13);
@@ -203,11 +203,11 @@ TEST(WingAngles, RobotIsTheCaseWithoutOffsetAndDeviation) {
   const V v{0.5, -0.3, 0.2}, w{3, -7, 5};
   const auto driven = model::air_on_driven_wing<-1>(p, Angles{0, 0.6, 0, -0.4}, Angles{0, 200, 0, 90}, v, w);
   const double s = std::sin(-0.6), c = std::cos(-0.6);
-  V w_E = model::turn_back_z(s, c, w);
+  V w_E = model::rotate_back_z(s, c, w);
   w_E.z -= 200;
   const auto robot =
-      model::blade_element<-1>(p, {std::sin(-0.4), std::cos(-0.4)}, 90.0, model::turn_back_z(s, c, v), w_E);
-  const V force = model::turn_z(s, c, robot.force_x_N, robot.force_z_N);
+      model::blade_element<-1>(p, {std::sin(-0.4), std::cos(-0.4)}, 90.0, model::rotate_back_z(s, c, v), w_E);
+  const V force = model::rotate_z(s, c, robot.force_x_N, robot.force_z_N);
   EXPECT_NEAR(driven.force_N.x, force.x, 1e-15);
   EXPECT_NEAR(driven.force_N.y, force.y, 1e-15);
   EXPECT_NEAR(driven.force_N.z, force.z, 1e-15);

@@ -85,7 +85,7 @@ void leapfrog(const Parameters<double>& p, Flapper& f, double volts, double step
   hinge_rates(e.motion, step, f.rate);
   for (int i = 0; i < 4; ++i) f.angle[i] += step * f.rate[i];
   f.com_m = f.com_m + step * f.com_velocity;
-  f.q = turned(f.q, step / 2 * f.body_rate);
+  f.q = rotated(f.q, step / 2 * f.body_rate);
 }
 
 Rates rates(const Parameters<double>& p, const Flapper& f, double volts) {

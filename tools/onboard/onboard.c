@@ -108,10 +108,10 @@ static void take_off(onboard *o, uint32_t now_us) {
 static int at_place(const flappy_controller *c) {
   const flappy_matrix R = flappy_rotation_matrix(c->estimate.attitude);
   const flappy_sin_cos is = flappy_heading(&R), wanted = c->hover_heading;
-  const float turn_rad = flappy_atan2(flappy_difference2(is.sin, wanted.cos, is.cos, wanted.sin),
+  const float rotation_rad = flappy_atan2(flappy_difference2(is.sin, wanted.cos, is.cos, wanted.sin),
                                       flappy_sum2(is.cos, wanted.cos, is.sin, wanted.sin));
   return flappy_plausible(flappy_minus(c->estimate.position_m, c->hover_m), ONBOARD_PLACE_M) &&
-         flappy_abs(turn_rad) <= ONBOARD_HEADING_RAD;
+         flappy_abs(rotation_rad) <= ONBOARD_HEADING_RAD;
 }
 
 /* Counts no further than it has to: a hover may outlast the clock. */

@@ -107,7 +107,7 @@ static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us
   const flappy_matrix R = flappy_rotation_matrix(attitude);
   flappy_estimator *e = &c->estimator;
   e->horizon.attitude = attitude;
-  e->horizon.position_m = flappy_plus(position_m, flappy_turn(&R, k->imu_position_m));
+  e->horizon.position_m = flappy_plus(position_m, flappy_rotate(&R, k->imu_position_m));
   e->horizon.velocity_m_s = none;
   e->now = e->horizon;
   e->gyro_bias_rad_s = e->accel_bias_m_s2 = e->body_rate_rad_s = none;
@@ -117,7 +117,7 @@ static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us
   e->velocity = k->start_velocity_m2_s2;
   e->accel_bias = k->start_accel_bias_m2_s4;
   e->angle_bias = e->position_velocity = e->position_bias = e->velocity_bias = 0.0F;
-  e->gathered.turn_rad = e->gathered.velocity_m_s = none;
+  e->gathered.rotation_rad = e->gathered.velocity_m_s = none;
   e->angle_innovation = e->position_innovation = 0.0F;
   c->estimate.position_m = position_m;
   c->estimate.attitude = attitude;
@@ -127,7 +127,7 @@ static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us
   c->phase = 0;
   c->now_us = c->last_imu_us = c->pushed_us = now_us;
   c->horizon_us = c->present_us = now_us - FLAPPY_CONTROLLER_IMU_LAG_US;
-  c->newest.turn_rad = c->newest.velocity_m_s = none;
+  c->newest.rotation_rad = c->newest.velocity_m_s = none;
   c->newest_us = c->oldest = c->in_ring = c->in_frames = 0;
   flappy_controller_hover(c);
   flappy_controller_begin(c);
@@ -147,10 +147,10 @@ static inline int flappy_controller_imu(flappy_controller *c, uint32_t taken_us,
   turn = flappy_times(interval_s, gyro_rad_s);
   gained = flappy_times(interval_s, accel_m_s2);
   /* the later sample, seen from the frame of the earlier ones */
-  gained = flappy_plus(gained, flappy_times(0.5F, flappy_cross(sum->turn_rad, gained)));
+  gained = flappy_plus(gained, flappy_times(0.5F, flappy_cross(sum->rotation_rad, gained)));
   sum->velocity_m_s = flappy_minus(flappy_plus(sum->velocity_m_s, gained),
                                    flappy_times(0.5F, flappy_cross(turn, sum->velocity_m_s)));
-  sum->turn_rad = flappy_plus(sum->turn_rad, turn);
+  sum->rotation_rad = flappy_plus(sum->rotation_rad, turn);
   return 1;
 }
 

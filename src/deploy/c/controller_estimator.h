@@ -12,16 +12,16 @@ static inline int flappy_after(uint32_t a, uint32_t b) { return (int32_t)(a - b)
 static inline void flappy_estimator_move(const flappy_estimator *e, flappy_pose *x, const flappy_increment *gained,
                                          uint32_t part_us, uint32_t whole_us) {
   const float share = (float)part_us / (float)whole_us, duration = flappy_seconds(whole_us), time = share * duration;
-  const flappy_vector turn = flappy_minus(gained->turn_rad, flappy_times(duration, e->gyro_bias_rad_s));
+  const flappy_vector turn = flappy_minus(gained->rotation_rad, flappy_times(duration, e->gyro_bias_rad_s));
   const flappy_vector quarter = flappy_times(0.25F * share, turn);
-  const flappy_quaternion middle = flappy_turned(x->attitude, quarter);
+  const flappy_quaternion middle = flappy_rotated(x->attitude, quarter);
   const flappy_matrix R = flappy_rotation_matrix(middle);
   flappy_vector v = flappy_minus(gained->velocity_m_s, flappy_times(duration, e->accel_bias_m_s2));
-  v = flappy_turn(&R, flappy_times(share, v));
+  v = flappy_rotate(&R, flappy_times(share, v));
   v.z = flappy_fma(-time, flappy_controller_k.gravity_m_s2, v.z);
   x->position_m = flappy_add_scaled(x->position_m, time, flappy_add_scaled(x->velocity_m_s, 0.5F, v));
   x->velocity_m_s = flappy_plus(x->velocity_m_s, v);
-  x->attitude = flappy_turned(middle, quarter);
+  x->attitude = flappy_rotated(middle, quarter);
 }
 
 /* Uncertainty grows with time. */
@@ -52,14 +52,14 @@ static inline void flappy_estimator_correct(flappy_estimator *e, const flappy_fr
   flappy_vector offset;
   float per_position, to_position, to_velocity, to_accel;
   if (seen) e->angle_innovation = flappy_dot(angle, angle) * per_angle;
-  e->horizon.attitude = flappy_turned(e->horizon.attitude, flappy_times(0.5F * to_angle, angle));
+  e->horizon.attitude = flappy_rotated(e->horizon.attitude, flappy_times(0.5F * to_angle, angle));
   e->gyro_bias_rad_s = flappy_add_scaled(e->gyro_bias_rad_s, to_gyro, angle);
   e->gyro_bias = flappy_fma(-to_gyro, e->angle_bias, e->gyro_bias);
   e->angle_bias = flappy_fma(-to_angle, e->angle_bias, e->angle_bias);
   e->angle = flappy_fma(-to_angle, e->angle, e->angle);
 
   R = flappy_rotation_matrix(e->horizon.attitude);
-  offset = flappy_minus(z->position_m, flappy_minus(e->horizon.position_m, flappy_turn(&R, k->imu_position_m)));
+  offset = flappy_minus(z->position_m, flappy_minus(e->horizon.position_m, flappy_rotate(&R, k->imu_position_m)));
   per_position = 1.0F / (e->position + k->mocap_position_m2);
   if (seen) e->position_innovation = flappy_dot(offset, offset) * per_position;
   to_position = seen ? e->position * per_position : 0.0F;
@@ -67,7 +67,7 @@ static inline void flappy_estimator_correct(flappy_estimator *e, const flappy_fr
   to_accel = seen ? e->position_bias * per_position : 0.0F;
   e->horizon.position_m = flappy_add_scaled(e->horizon.position_m, to_position, offset);
   e->horizon.velocity_m_s = flappy_add_scaled(e->horizon.velocity_m_s, to_velocity, offset);
-  e->accel_bias_m_s2 = flappy_add_scaled(e->accel_bias_m_s2, to_accel, flappy_turn_back(&R, offset));
+  e->accel_bias_m_s2 = flappy_add_scaled(e->accel_bias_m_s2, to_accel, flappy_rotate_back(&R, offset));
   e->accel_bias = flappy_fma(-to_accel, e->position_bias, e->accel_bias);
   e->velocity_bias = flappy_fma(-to_velocity, e->position_bias, e->velocity_bias);
   e->velocity = flappy_fma(-to_velocity, e->position_velocity, e->velocity);
@@ -115,7 +115,7 @@ static inline int flappy_controller_push(flappy_controller *c) {
   p->to_us = c->last_imu_us - FLAPPY_CONTROLLER_IMU_LAG_US;
   c->newest_us = p->to_us - p->from_us;
   c->pushed_us = c->last_imu_us;
-  c->estimator.gathered.turn_rad = c->estimator.gathered.velocity_m_s = none;
+  c->estimator.gathered.rotation_rad = c->estimator.gathered.velocity_m_s = none;
   return 1;
 }
 
@@ -153,15 +153,15 @@ static inline void flappy_controller_estimate(flappy_controller *c) {
   ahead = e->now;
   if (c->newest_us > 0) {
     const float per_duration = 1e6F / (float)c->newest_us;
-    e->body_rate_rad_s = flappy_minus(flappy_times(per_duration, c->newest.turn_rad), e->gyro_bias_rad_s);
+    e->body_rate_rad_s = flappy_minus(flappy_times(per_duration, c->newest.rotation_rad), e->gyro_bias_rad_s);
     ahead_us = flappy_after(c->now_us, c->present_us) ? c->now_us - c->present_us : 0;
     if (ahead_us > FLAPPY_CONTROLLER_AHEAD_US) ahead_us = FLAPPY_CONTROLLER_AHEAD_US;
     if (ahead_us > 0) flappy_estimator_move(e, &ahead, &c->newest, ahead_us, c->newest_us);
   }
   R = flappy_rotation_matrix(ahead.attitude);
-  c->estimate.position_m = flappy_minus(ahead.position_m, flappy_turn(&R, arm));
+  c->estimate.position_m = flappy_minus(ahead.position_m, flappy_rotate(&R, arm));
   c->estimate.attitude = ahead.attitude;
   c->estimate.velocity_m_s =
-      flappy_minus(ahead.velocity_m_s, flappy_turn(&R, flappy_cross(e->body_rate_rad_s, arm)));
+      flappy_minus(ahead.velocity_m_s, flappy_rotate(&R, flappy_cross(e->body_rate_rad_s, arm)));
   c->estimate.body_rate_rad_s = e->body_rate_rad_s;
 }

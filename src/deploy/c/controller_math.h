@@ -140,10 +140,10 @@ static inline flappy_vector flappy_cross(flappy_vector a, flappy_vector b) {
   return flappy_vector_of(flappy_difference2(a.y, b.z, a.z, b.y), flappy_difference2(a.z, b.x, a.x, b.z),
                           flappy_difference2(a.x, b.y, a.y, b.x));
 }
-static inline flappy_vector flappy_turn(const flappy_matrix *m, flappy_vector v) {
+static inline flappy_vector flappy_rotate(const flappy_matrix *m, flappy_vector v) {
   return flappy_vector_of(flappy_dot(m->x, v), flappy_dot(m->y, v), flappy_dot(m->z, v));
 }
-static inline flappy_vector flappy_turn_back(const flappy_matrix *m, flappy_vector v) {
+static inline flappy_vector flappy_rotate_back(const flappy_matrix *m, flappy_vector v) {
   return flappy_vector_of(flappy_fma(m->x.x, v.x, flappy_sum2(m->y.x, v.y, m->z.x, v.z)),
                           flappy_fma(m->x.y, v.x, flappy_sum2(m->y.y, v.y, m->z.y, v.z)),
                           flappy_fma(m->x.z, v.x, flappy_sum2(m->y.z, v.y, m->z.z, v.z)));
@@ -160,7 +160,7 @@ static inline flappy_matrix flappy_rotation_matrix(flappy_quaternion q) {
 }
 
 /* Attitude after turning by the small rotation vector 2 e in B: q (1, e), brought back to length 1 by a Newton step. */
-static inline flappy_quaternion flappy_turned(flappy_quaternion q, flappy_vector e) {
+static inline flappy_quaternion flappy_rotated(flappy_quaternion q, flappy_vector e) {
   flappy_quaternion r;
   float scale;
   r.w = q.w - flappy_fma(q.x, e.x, flappy_sum2(q.y, e.y, q.z, e.z));

@@ -47,7 +47,7 @@ static inline void flappy_controller_test_begin(flappy_controller *c, uint32_t z
   c->last_imu_us = c->pushed_us = zero_us + (uint32_t)clock[5];
   for (i = 0; i < FLAPPY_CONTROLLER_TEST_RING; ++i) {
     flappy_period *p = &c->ring[c->in_ring];
-    p->gained.turn_rad = flappy_vector_from(flappy_controller_test_ring + 6 * i);
+    p->gained.rotation_rad = flappy_vector_from(flappy_controller_test_ring + 6 * i);
     p->gained.velocity_m_s = flappy_vector_from(flappy_controller_test_ring + 6 * i + 3);
     p->from_us = zero_us + (uint32_t)flappy_controller_test_ring_us[2 * i];
     p->to_us = zero_us + (uint32_t)flappy_controller_test_ring_us[2 * i + 1];

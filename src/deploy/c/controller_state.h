@@ -26,7 +26,7 @@ typedef struct {
 
 /* Turn and velocity gained over some time, in B at its middle, as measured. */
 typedef struct {
-  flappy_vector turn_rad, velocity_m_s;
+  flappy_vector rotation_rad, velocity_m_s;
 } flappy_increment;
 
 typedef struct {

@@ -158,7 +158,7 @@ void add_trace(const ControllerTrace& t, Constants& to) {
   };
   numbers.clear();
   for (const auto& i : t.ring) {
-    append(i.turn_rad), append(i.velocity_m_s);
+    append(i.rotation_rad), append(i.velocity_m_s);
     times.insert(times.end(), {i.from_us, i.to_us});
   }
   put("test_ring", "6 * FLAPPY_CONTROLLER_TEST_RING");

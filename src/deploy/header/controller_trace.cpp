@@ -56,7 +56,7 @@ ControllerTrace::Increment gathered(const std::vector<ControllerTrace::Imu>& sam
   for (std::size_t i = first; i < last; ++i)
     gather(sum, {vector(samples[i].gyro_rad_s), vector(samples[i].accel_m_s2)},
            Lane((samples[i].taken_us - before_us(i)) / 1e6));
-  return {{sum.turn_rad.x.raw[0], sum.turn_rad.y.raw[0], sum.turn_rad.z.raw[0]},
+  return {{sum.rotation_rad.x.raw[0], sum.rotation_rad.y.raw[0], sum.rotation_rad.z.raw[0]},
           {sum.velocity_m_s.x.raw[0], sum.velocity_m_s.y.raw[0], sum.velocity_m_s.z.raw[0]},
           before_us(first),
           samples[last - 1].taken_us};

@@ -19,7 +19,7 @@ struct ControllerTrace {
     float position_m[3], attitude[4];
   };
   struct Increment {
-    float turn_rad[3], velocity_m_s[3];
+    float rotation_rad[3], velocity_m_s[3];
     std::int32_t from_us, to_us;
   };
   struct Period {

@@ -10,7 +10,7 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
   constexpr io::Range kPositive = io::positive(), kNats = io::non_negative(), kShare{0, 1};
   const io::Config config = io::Config::load(path);
   const io::Table root = config.root();
-  root.integer("schema", 1, 1);
+  root.schema(1);
   VerdictRule r{};
   const io::Table prior = root.table("prior");
   r.prior = {prior.number("none", io::positive(1)), prior.number("parameters", io::positive(1)),

@@ -25,7 +25,7 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   using enum BasisFunction;
   const io::Config config = io::Config::load(path);
   const io::Table root = config.root();
-  root.integer("schema", 1, 1);
+  root.schema(1);
   ModelDiscrepancy d;
   double sum = 0;
   for (const std::vector<double>& row : root.rows("scales", 2, io::positive())) {

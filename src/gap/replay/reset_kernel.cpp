@@ -36,7 +36,7 @@ void carry_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& 
       const Vec3<V> turn = flight::rotation_vector(flight::from_to(begin, flown.attitude));
       Vec3<V> force = per_interval * (flight::point_velocity(flown, imu) - load(kept.imu_velocity_m_s, first));
       force.z += V(gravity_m_s2);
-      const Matrix3<V> halfway = rotation_matrix(turned(begin, V(0.25) * turn));
+      const Matrix3<V> halfway = rotation_matrix(rotated(begin, V(0.25) * turn));
       const Vec3<V> missed =
           per_interval * flight::rotation_vector(flight::from_to(flown.attitude, quaternion(to.attitude)));
       store(missed, kept.rows + kTurnRate, first);

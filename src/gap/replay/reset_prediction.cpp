@@ -49,7 +49,7 @@ const char* channel_name(int channel) {
   static const char* const kNames[kChannels] = {
       "torque_x",    "torque_y",     "torque_z", "force_x",      "force_y",       "force_z",
       "stroke_left", "stroke_right", "battery",  "current_left", "current_right", "path_x",
-      "path_y",      "path_z",       "turn_x",   "turn_y",       "turn_z"};
+      "path_y",      "path_z",       "rotate_x", "rotate_y",     "rotate_z"};
   return kNames[channel];
 }
 

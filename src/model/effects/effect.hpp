@@ -157,7 +157,7 @@ struct WingFlow {
 template <int side, class T>
 FLAPPY_INLINE WingFlow<T> flow(const Surroundings<T>& s) {
   const WingPose<T>& g = of_side<side>(s.pose);
-  return {turn_back_z(g.beta.sin, g.beta.cos, of_side<side>(s.shoulder_B_m_s)),
+  return {rotate_back_z(g.beta.sin, g.beta.cos, of_side<side>(s.shoulder_B_m_s)),
           {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate}};
 }
 
