@@ -65,7 +65,7 @@ class Transitions {
  private:
   struct Flight;
   TransitionOptions options_;
-  double surprise_ = 0;
+  double normalised_innovation_ = 0;
   std::vector<std::unique_ptr<Flight>> flights_;
 };
 
