@@ -17,8 +17,8 @@ struct EvaluationOptions {
   std::size_t part = 1024;  ///< flights at a time: bounds memory
 };
 
-/// Who acts on top of the controller. Neither of them: the controller alone, the goal its set point, without hand-back and
-/// without the two rules that end flights early (faced_by_s, arrived_by_s).
+/// Who acts on top of the controller. Where it is neither, the controller flies alone, the goal its set point, without
+/// hand-back and without the two rules that end flights early (faced_by_s, arrived_by_s).
 struct Agent {
   std::shared_ptr<const policy::Actor> actor;
   const policy::Policy* policy = nullptr;

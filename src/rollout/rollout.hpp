@@ -16,8 +16,9 @@ class Rollout {
  public:
   using Hover = std::vector<flight::Snapshot<T>>;
 
-  /// `count` flights of the flappers from the configuration's first one on, which its actor or `policy` acts on, or only its
-  /// controller. Where the task starts settled, they start from `hover`; while that is empty, it is flown and kept there.
+  /// `count` flights, of the flappers from the configuration's first one on. Its actor acts, or `policy`; where there is
+  /// neither, the controller flies alone. Where the task starts settled, flights start from `hover`, which is flown first
+  /// while it is empty.
   Rollout(FlyConfig config, std::size_t count, const policy::Policy* policy = nullptr, Hover* hover = nullptr);
   Rollout(const Rollout&) = delete;
 
