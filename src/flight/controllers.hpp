@@ -8,8 +8,9 @@
 //   update(constants, memory, estimate, set point)    inputs of the wing beat for the next control period
 //   trim(constants, memory)      the inputs that it has learnt: those of a settled vehicle
 //   unlearn(held, before, now)   takes back what it learnt in the last period in the lanes `held`
-//   kSource, exported(constants, add)    optional: the C code that flies it on board, and add(member, number or numbers) for its constants
-//   rotate(sin, cos, memory)     memory of a flight that is turned about z of W
+//   rotate(sin, cos, memory)     memory of a flight that is rotated about z of W
+//   kSource, exported(constants, add)    where it can be exported: its C code (kSource.h and kSource_types.h in src/deploy/c),
+//                                        and add(member, number or struct of numbers) for each of its constants there
 #pragma once
 
 #include <algorithm>

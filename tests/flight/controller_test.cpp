@@ -48,6 +48,61 @@ U once(const PidConstants<double>& k, const Estimate<double>& x, const Setpoint<
   return PidController::update(k, m, x, ref);
 }
 
+/// A flight's estimate and set point at a control tick, rotated about z of W.
+std::pair<Estimate<double>, Setpoint<double>> wandering(int tick, double angle) {
+  const double s = std::sin(angle), c = std::cos(angle), t = tick * kPeriod_s;
+  const auto in_W = [&](double x, double y, double z) { return V{c * x - s * y, s * x + c * y, z}; };
+  const double yaw = 0.3 * std::sin(5 * t) + angle;
+  Estimate<double> x{in_W(0.02 * std::sin(9 * t), 0.01 * std::cos(7 * t), 0.02 * t),
+                     euler(0.1 * std::sin(11 * t), 0.08 * std::cos(8 * t), yaw),
+                     in_W(0.05 * std::cos(9 * t), -0.03 * std::sin(7 * t), 0.02),
+                     {0.3 * std::sin(13 * t), 0.2 * std::cos(17 * t), 0.4 * std::cos(5 * t)}};
+  const double heading = 0.2 + angle;
+  return {x,
+          {in_W(0.01, 0.005, 0), in_W(0.02, 0.01, 0), in_W(0.1, -0.1, 0), {std::sin(heading), std::cos(heading)}, 0.1}};
+}
+
+/// For each on the list: a table that another one is written by.
+TEST(Controllers, RotateWhatTheyRememberAndTakeBackWhatTheyLearnt) {
+  for (int kind = 0; kind < kControllers; ++kind)
+    with_controller(kind, [&]<class C>(C) {
+      Controller configured = controller(C::kName);
+      EXPECT_EQ(configured.kind, kind_of<C>());
+      auto& k = configured.constants.of<C>();
+      static_cast<LoopConstants<double>&>(k) = {0.2, 0.5, kPeriod_s, 1 / kPeriod_s, kGravity};
+      typename C::template Memory<double> there{}, here{};
+      C::start(there, wandering(0, 0).first);
+      const double angle = 2.1;
+      for (int tick = 0; tick < 200; ++tick) {
+        const auto [x, ref] = wandering(tick, 0);
+        const auto before = there;
+        const U u = C::update(k, there, x, ref);
+        if (tick == 100) {
+          here = there;
+          C::rotate(std::sin(angle), std::cos(angle), here);
+        }
+        if (tick > 100) {
+          const auto [rotated_x, rotated_ref] = wandering(tick, angle);
+          const U same = C::update(k, here, rotated_x, rotated_ref);
+          EXPECT_NEAR(same.amplitude_V, u.amplitude_V, 1e-10) << C::kName << tick;
+          EXPECT_NEAR(same.difference_V, u.difference_V, 1e-10) << C::kName << tick;
+          EXPECT_NEAR(same.bias_V, u.bias_V, 1e-10) << C::kName << tick;
+          EXPECT_NEAR(same.split_cycle, u.split_cycle, 1e-10) << C::kName << tick;
+        }
+        auto held = there, not_held = there;
+        C::unlearn(true, before, held);
+        C::unlearn(false, before, not_held);
+        const U was = C::trim(k, before), is = C::trim(k, there), taken_back = C::trim(k, held),
+                kept = C::trim(k, not_held);
+        if (tick > 0) EXPECT_NE(is.amplitude_V, was.amplitude_V);
+        EXPECT_EQ(taken_back.amplitude_V, was.amplitude_V);
+        EXPECT_EQ(taken_back.bias_V, was.bias_V);
+        EXPECT_EQ(kept.amplitude_V, is.amplitude_V);
+        EXPECT_EQ(kept.bias_V, is.bias_V);
+      }
+    });
+}
+
 TEST(Pid, SignsAndGainsOfEveryChannel) {
   const PidConstants<double> k = pid_constants();
   const U rest = once(k, level(), here());
