@@ -1,5 +1,6 @@
 #include "io/program.hpp"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -31,38 +32,40 @@ std::string subcommands(const CLI::App& app, const CLI::ParseError& error) {
 std::string commit() { return FLAPPY_COMMIT; }
 
 Program::Program(const std::string& name, const std::string& description, const std::vector<std::string>& facts)
-    : app_(description, name) {
+    : app_(std::make_unique<CLI::App>(description, name)) {
   std::string version = name + " " FLAPPY_VERSION "\ncommit " + commit() + "\ncompiler " + __VERSION__;
   for (const std::string& fact : facts) version += "\n" + fact;
   version += "\nCLI11 " CLI11_VERSION "\nnlohmann-json " + std::to_string(NLOHMANN_JSON_VERSION_MAJOR) + "." +
              std::to_string(NLOHMANN_JSON_VERSION_MINOR) + "." + std::to_string(NLOHMANN_JSON_VERSION_PATCH);
-  app_.set_version_flag("--version", version);
-  app_.add_option("--json", json_path_, "write the results as JSON to this file");
-  app_.add_option("--log-level", log_level_, "least level of what is noted on stderr")
+  app_->set_version_flag("--version", version);
+  app_->add_option("--json", json_path_, "write the results as JSON to this file");
+  app_->add_option("--log-level", log_level_, "least level of what is noted on stderr")
       ->check(CLI::IsMember(std::vector<std::string>(kLevels.begin(), kLevels.end())))
       ->capture_default_str();
-  app_.fallthrough();
+  app_->fallthrough();
 }
+
+Program::~Program() = default;
 
 int Program::run(int argc, char** argv, const std::function<void()>& job) {
   try {
-    app_.parse(argc, argv);
+    app_->parse(argc, argv);
     const auto level = std::ranges::find(kLevels, log_level_) - kLevels.begin();
-    start_log(static_cast<LogLevel>(level), app_.get_name() + " " FLAPPY_VERSION ", commit " + commit() + ": " +
+    start_log(static_cast<LogLevel>(level), app_->get_name() + " " FLAPPY_VERSION ", commit " + commit() + ": " +
                                                 joined(std::vector<std::string>(argv, argv + argc), " "));
     if (!json_path_.empty()) check_output(json_path_);
     job();
     return 0;
   } catch (const CLI::ParseError& e) {
-    if (e.get_exit_code() == 0) return app_.exit(e);  // --help, --version
-    std::fprintf(stderr, "%s: %s%s; see %s --help\n", app_.get_name().c_str(), e.what(), subcommands(app_, e).c_str(),
-                 app_.get_name().c_str());
+    if (e.get_exit_code() == 0) return app_->exit(e);  // --help, --version
+    std::fprintf(stderr, "%s: %s%s; see %s --help\n", app_->get_name().c_str(), e.what(), subcommands(*app_, e).c_str(),
+                 app_->get_name().c_str());
     return 2;
   } catch (const InputError& e) {
     log_error(e.what());
     return 2;
   } catch (const std::exception& e) {
-    log_error(app_.get_name() + ": internal fault: " + e.what());
+    log_error(app_->get_name() + ": internal fault: " + e.what());
     return 1;
   }
 }

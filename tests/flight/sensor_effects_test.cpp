@@ -59,7 +59,7 @@ TEST(SensorEffects, AreUndoneByTheDiagnosis) {
   const flightlog::FlightLog plain = open_loop({}, sharp);
   ASSERT_GT(plain.imu.t_s.size(), 400u);
   for (const char* id : {"accelerometer_misalignment", "mocap_tilt", "marker_offset"}) {
-    const gap::EffectValues one = {*flightlog::kAll.find(id)};
+    const gap::EffectValues one = {*kAll.find(id)};
     const flightlog::FlightLog seen = open_loop(one, sharp);
     EXPECT_GT(farthest(seen, plain), 0.009) << id;
     EXPECT_LT(farthest(gap::without(one, seen), plain), 1e-9) << id;
@@ -210,7 +210,7 @@ TEST(SensorEffects, WarmUpFromTheStart) {
 
 template <class T>
 Fleet<T> hover(std::size_t count, const std::string& set, bool beside,
-               const gap::EffectValues& effects = flightlog::kAll) {
+               const gap::EffectValues& effects = kAll) {
   rollout::FlyConfig c = read_fly_config(kHover);
   c.fleet.batch.instruction_set = set;
   c.fleet.batch.threads = 1;

@@ -59,7 +59,7 @@ class Torch {
   Torch(const LearnerOptions& o, const Replay& replay, const Learner<float>& start)
       : replay_(replay), rows_(o.batch), peer_(o, replay, false, oracle::TorchLearner::start(start)) {}
   void update() {
-    replay_.draw(0, count_++, 0, rows_);
+    replay_.sample(0, count_++, 0, rows_);
     peer_.update(rows_, {}, kRate, kRate);
   }
 

@@ -215,28 +215,24 @@ int main(int argc, char** argv) {
       "flappy-bench",
       "Speed and accuracy of the simulator and the learner, side by side with DART, MuJoCo and LibTorch.",
       bench::facts());
-  CLI::App& app = program.app();
+  const io::Command& app = program.app();
   std::string vehicle = io::config_path("vehicles/hummingbird_nominal.toml");
   bench::SpeedOptions options;
-  app.add_option("--vehicle", vehicle, "vehicle file")->capture_default_str();
-  app.add_option("--rounds", options.rounds, "rounds to take the median of")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  app.add_option("--seconds", options.seconds, "of each measurement")
-      ->check(CLI::Range(0.01, 60.0))
-      ->capture_default_str();
-  app.add_flag("!--no-peers", options.peers, "leave DART, MuJoCo and LibTorch out");
-  CLI::App* convergence =
-      app.add_subcommand("convergence", "error against step size, and against work for other integrators");
-  CLI::App* learner = app.add_subcommand("learner", "updates per second of the learner, beside LibTorch");
-  CLI::App* busy = app.add_subcommand("busy", "work per second of processor time while others hold all processors");
-  CLI::App* batch = app.add_subcommand("batch", "fly a batch at one input and summarise it");
+  app.option("--vehicle", vehicle, "vehicle file").shows_default();
+  app.option("--rounds", options.rounds, "rounds to take the median of").range(1, 1000).shows_default();
+  app.option("--seconds", options.seconds, "of each measurement").range(0.01, 60.0).shows_default();
+  app.flag("!--no-peers", options.peers, "leave DART, MuJoCo and LibTorch out");
+  io::Command convergence =
+      app.command("convergence", "error against step size, and against work for other integrators");
+  io::Command learner = app.command("learner", "updates per second of the learner, beside LibTorch");
+  io::Command busy = app.command("busy", "work per second of processor time while others hold all processors");
+  io::Command batch = app.command("batch", "fly a batch at one input and summarise it");
   std::string config;
   std::vector<std::string> overrides;
-  batch->add_option("config", config, "configuration of the batch")->required();
-  batch->add_option("--set", overrides, "override a key: a.b=c")
-      ->allow_extra_args(false);  // or one given before it takes the config too
-  app.require_subcommand(0, 1);
+  batch.option("config", config, "configuration of the batch").required();
+  batch.option("--set", overrides, "override a key: a.b=c")
+      .one_at_a_time();  // or one given before it takes the config too
+  app.expect_commands(0, 1);
   return program.run(argc, argv, [&] {
     if (*batch) return program.write_json(bench::fly_batch(config, overrides));
     if (*learner) return program.write_json(bench::learner(options));

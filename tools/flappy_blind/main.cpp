@@ -48,68 +48,60 @@ Json fly_case(const RobotOptions& o, Programme programme) {
 int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-blind", "A robot of another making, for a diagnosis to be tried on.", {});
-  CLI::App* list = program.app().add_subcommand("effects", "lists what may be wrong with it");
-  CLI::App* fly = program.app().add_subcommand("fly", "flies three times and writes the logs");
+  io::Command list = program.app().command("effects", "lists what may be wrong with it");
+  io::Command fly = program.app().command("fly", "flies three times and writes the logs");
   blind::RobotOptions robot;
   std::string programme = "rich";
-  blind::add_robot_options(*fly, robot);
-  fly->add_option("--programme", programme, "rich: excitation, a path, turns; hover: calm")
-      ->check(CLI::IsMember({"rich", "hover"}))
-      ->capture_default_str();
-  fly->add_option("--out", robot.out, "folder for flight_1, flight_2, flight_3")->required();
-  CLI::App* escape = program.app().add_subcommand("escape", "flies a policy's manoeuvre many times over");
+  blind::add_robot_options(fly, robot);
+  fly.option("--programme", programme, "rich: excitation, a path, turns; hover: calm")
+      .one_of({"rich", "hover"})
+      .shows_default();
+  fly.option("--out", robot.out, "folder for flight_1, flight_2, flight_3").required();
+  io::Command escape = program.app().command("escape", "flies a policy's manoeuvre many times over");
   blind::EscapeOptions escapes{.robot = {}, .policy = {}, .config = io::config_path("fly/escape.toml")};
-  blind::add_robot_options(*escape, escapes.robot);
-  escape->add_option("--policy", escapes.policy, "an actor (.json), TorchScript (.pt) or a C header (.h)")->required();
-  escape->add_option("--config", escapes.config, "task and controller that it was trained with")->capture_default_str();
-  escape->add_option("--draw", escapes.draw, "which of the seed's robots: that of fly, in its --json")
-      ->check(CLI::Range(std::uint64_t{0}, blind::kTries - 1))
-      ->capture_default_str();
-  escape->add_option("--count", escapes.count, "escapes, each from another start")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
-  escape->add_option("--out", escapes.robot.out, "folder for the logs: escape_1, escape_2, ...");
-  CLI::App* detectability =
-      program.app().add_subcommand("detectability", "finds how large effects have to be to be found");
+  blind::add_robot_options(escape, escapes.robot);
+  escape.option("--policy", escapes.policy, "an actor (.json), TorchScript (.pt) or a C header (.h)").required();
+  escape.option("--config", escapes.config, "task and controller that it was trained with").shows_default();
+  escape.option("--draw", escapes.draw, "which of the seed's robots: that of fly, in its --json")
+      .range(std::uint64_t{0}, blind::kTries - 1)
+      .shows_default();
+  escape.option("--count", escapes.count, "escapes, each from another start").range(1, 10000).shows_default();
+  escape.option("--out", escapes.robot.out, "folder for the logs: escape_1, escape_2, ...");
+  io::Command detectability = program.app().command("detectability", "finds how large effects have to be to be found");
   benchmark::DetectabilityCommand command;
-  detectability->add_option("--vehicle", command.vehicle, "the vehicle as declared")->required();
-  detectability->add_option("--randomise", command.randomise, "what robots are drawn from")->capture_default_str();
-  detectability->add_option("--priors", command.priors, "what is uncertain of them")->capture_default_str();
-  detectability->add_option("--vehicles", command.vehicles, "how many")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  detectability->add_option("--seed", command.seed, "of the first")
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 53))
-      ->capture_default_str();
-  detectability->add_option("--out", command.out, "file for what is found")->required();
-  detectability->add_option("--threads", command.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
-  const CLI::App* oracle = program.app().add_subcommand("oracle")->group("")->allow_extras();  // its name until now
-  CLI::App* make = program.app().add_subcommand("make", "flies the cases of a benchmark and seals what they are");
+  detectability.option("--vehicle", command.vehicle, "the vehicle as declared").required();
+  detectability.option("--randomise", command.randomise, "what robots are drawn from").shows_default();
+  detectability.option("--priors", command.priors, "what is uncertain of them").shows_default();
+  detectability.option("--vehicles", command.vehicles, "how many").range(1, 1000).shows_default();
+  detectability.option("--seed", command.seed, "of the first")
+      .range(std::uint64_t{0}, std::uint64_t{1} << 53)
+      .shows_default();
+  detectability.option("--out", command.out, "file for what is found").required();
+  detectability.option("--threads", command.threads, "0: one for each processor").range(0, 1024);
+  const io::Command oracle = program.app().hidden_command("oracle");  // its name until now
+  io::Command make = program.app().command("make", "flies the cases of a benchmark and seals what they are");
   benchmark::MakeCommand made;
   std::string set;
-  make->add_option("--out", made.out, "folder for the cases")->required();
-  make->add_option("--set", set, "development or reported: which seeds")
-      ->check(CLI::IsMember({"development", "reported"}))
-      ->required();
-  make->add_option("--part", made.plan.parts, "these parts alone")
-      ->check(CLI::IsMember(std::vector<std::string>(std::begin(benchmark::kParts), std::end(benchmark::kParts))));
-  make->add_option("--cases", made.plan.at_most, "of each part at most")->check(CLI::Range(1, 1000));
-  make->add_option("--vehicle", made.vehicle, "the robot as declared")->capture_default_str();
-  make->add_option("--randomise", made.randomise, "what robots are drawn from")->capture_default_str();
-  make->add_option("--detectable", made.detectable, "what is detectable of every effect")->capture_default_str();
-  make->add_option("--threads", made.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
-  CLI::App* score = program.app().add_subcommand("score", "diagnoses every case, then opens the labels and compares");
+  make.option("--out", made.out, "folder for the cases").required();
+  make.option("--set", set, "development or reported: which seeds").one_of({"development", "reported"}).required();
+  make.option("--part", made.plan.parts, "these parts alone")
+      .one_of(std::vector<std::string>(std::begin(benchmark::kParts), std::end(benchmark::kParts)));
+  make.option("--cases", made.plan.at_most, "of each part at most").range(1, 1000);
+  make.option("--vehicle", made.vehicle, "the robot as declared").shows_default();
+  make.option("--randomise", made.randomise, "what robots are drawn from").shows_default();
+  make.option("--detectable", made.detectable, "what is detectable of every effect").shows_default();
+  make.option("--threads", made.threads, "0: one for each processor").range(0, 1024);
+  io::Command score = program.app().command("score", "diagnoses every case, then opens the labels and compares");
   benchmark::ScoreCommand scored;
-  score->add_option("folder", scored.folder, "of flappy-blind make")->required();
-  score->add_option("--vehicle", scored.vehicle, "the robot as declared, where it is elsewhere now");
-  score->add_option("--priors", scored.priors, "what is uncertain of the vehicle")->capture_default_str();
-  score->add_option("--threads", scored.threads, "cases at a time; 0: one for each processor")
-      ->check(CLI::Range(0, 1024));
-  program.app().require_subcommand(1);
+  score.option("folder", scored.folder, "of flappy-blind make").required();
+  score.option("--vehicle", scored.vehicle, "the robot as declared, where it is elsewhere now");
+  score.option("--priors", scored.priors, "what is uncertain of the vehicle").shows_default();
+  score.option("--threads", scored.threads, "cases at a time; 0: one for each processor").range(0, 1024);
+  program.app().expect_commands(1, 1);
   return program.run(argc, argv, [&] {
     using blind::Programme;
-    if (*oracle) throw io::InputError("oracle: has another name now; accepted: detectability");
-    if (*make) {
+    if (oracle.given()) throw io::InputError("oracle: has another name now; accepted: detectability");
+    if (make.given()) {
       made.plan.reported = set == "reported";
       const sim::Randomisation uncertain =
           sim::read_randomisation(model::read_vehicle(made.vehicle), io::Config::load(scored.priors, {}).root());
@@ -117,13 +109,13 @@ int main(int argc, char** argv) {
         return benchmark::true_values(c, effects, uncertain, 1);
       };
       if (!benchmark::make_bench(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
-    } else if (*score) {
+    } else if (score.given()) {
       const nlohmann::ordered_json scores = benchmark::score_bench(scored);
       if (!scores.is_null()) program.write_json(scores);
-    } else if (*list)
+    } else if (list.given())
       for (const std::string& name : blind::effect_names()) std::printf("%s\n", name.c_str());
-    else if (*escape) program.write_json(blind::fly_escapes(escapes));
-    else if (*detectability) program.write_json(benchmark::run_detectability(command));
+    else if (escape.given()) program.write_json(blind::fly_escapes(escapes));
+    else if (detectability.given()) program.write_json(benchmark::run_detectability(command));
     else program.write_json(blind::fly_case(robot, programme == "rich" ? Programme::rich : Programme::hover));
   });
 }

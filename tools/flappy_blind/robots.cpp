@@ -30,17 +30,15 @@ sim::Randomisation read_spread(const model::Vehicle& declared, const std::string
 
 }  // namespace
 
-void add_robot_options(CLI::App& command, RobotOptions& o) {
-  command.add_option("--vehicle", o.vehicle, "the vehicle as declared")->required();
-  command.add_option("--randomise", o.randomise, "[[randomise]] tables that the robot is drawn from, or none")
-      ->capture_default_str();
-  command.add_option("--seed", o.seed, "of all that is drawn")
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 53))
-      ->required();
-  command.add_option("--effect", o.effects, "ID=SIZE; 1 is typical")->allow_extra_args(false);
-  command.add_flag("--power", o.power, "log battery and currents");
-  command.add_flag("--wings", o.wings, "log wing angles");
-  command.add_flag("--no-truth", o.no_truth, "leave out truth.csv");
+void add_robot_options(const io::Command& command, RobotOptions& o) {
+  command.option("--vehicle", o.vehicle, "the vehicle as declared").required();
+  command.option("--randomise", o.randomise, "[[randomise]] tables that the robot is drawn from, or none")
+      .shows_default();
+  command.option("--seed", o.seed, "of all that is drawn").range(std::uint64_t{0}, std::uint64_t{1} << 53).required();
+  command.option("--effect", o.effects, "ID=SIZE; 1 is typical").one_at_a_time();
+  command.flag("--power", o.power, "log battery and currents");
+  command.flag("--wings", o.wings, "log wing angles");
+  command.flag("--no-truth", o.no_truth, "leave out truth.csv");
 }
 
 Robots::Robots(const RobotOptions& o)

@@ -16,7 +16,7 @@ struct RobotOptions {
   bool power = false, wings = false, no_truth = false;
 };
 
-void add_robot_options(CLI::App& command, RobotOptions& o);
+void add_robot_options(const io::Command& command, RobotOptions& o);
 
 /// The robots of a seed.
 class Robots {

@@ -322,26 +322,23 @@ int main(int argc, char** argv) {
   io::Program program("flappy-eval", "Flies a policy on randomised vehicles, scored beside PID and ARC alone.",
                       {"instruction set " + sim::best_instruction_set(),
                        std::string("TorchScript ") + (policy::reads_torch_script() ? "yes" : "no")});
-  CLI::App& app = program.app();
+  const io::Command& app = program.app();
   eval::Request r;
-  app.add_option("policy", r.policy, eval::kPolicies)->required();
-  app.add_option("--config", r.config,
-                 "how a single file flies: configs/fly/*.toml (escape); a run folder has its own");
-  app.add_option("--vehicle", r.vehicle, "vehicle file instead");
-  app.add_option("--task", r.task, "task file instead");
-  app.add_option("--set", r.overrides, "override a key: task.hand_back.at_s=0.4")->allow_extra_args(false);
-  app.add_option("--episodes", r.episodes, "flights, each with vehicle, start and noise of its own")
-      ->check(CLI::Range(1, 100'000))
-      ->capture_default_str();
-  app.add_option("--seed", r.seed, "of vehicles, starts and noise")
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{INT64_MAX}))
-      ->capture_default_str();
-  app.add_option("--stream", r.stream, "vehicles that training never saw: \"test\", or \"validation\"")
-      ->check(CLI::IsMember({"test", "validation"}))
-      ->capture_default_str();
-  app.add_option("--threads", r.threads, "0: one for each processor")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  app.add_flag("--no-baselines", r.no_baselines, "without PID and ARC");
+  app.option("policy", r.policy, eval::kPolicies).required();
+  app.option("--config", r.config, "how a single file flies: configs/fly/*.toml (escape); a run folder has its own");
+  app.option("--vehicle", r.vehicle, "vehicle file instead");
+  app.option("--task", r.task, "task file instead");
+  app.option("--set", r.overrides, "override a key: task.hand_back.at_s=0.4").one_at_a_time();
+  app.option("--episodes", r.episodes, "flights, each with vehicle, start and noise of its own")
+      .range(1, 100'000)
+      .shows_default();
+  app.option("--seed", r.seed, "of vehicles, starts and noise")
+      .range(std::uint64_t{0}, std::uint64_t{INT64_MAX})
+      .shows_default();
+  app.option("--stream", r.stream, "vehicles that training never saw: \"test\", or \"validation\"")
+      .one_of({"test", "validation"})
+      .shows_default();
+  app.option("--threads", r.threads, "0: one for each processor").range(0, 1024).shows_default();
+  app.flag("--no-baselines", r.no_baselines, "without PID and ARC");
   return program.run(argc, argv, [&] { eval::evaluate(r, program); });
 }

@@ -166,11 +166,10 @@ int main(int argc, char** argv) {
   io::Program program("flappy-export", "Exports a finished run as TorchScript and as C headers that prove themselves.",
                       {std::string("TorchScript ") + (policy::reads_torch_script() ? "yes" : "no")});
   exports::Request r;
-  program.app().add_option("run", r.run, "run folder that flappy-train left")->required();
-  program.app().add_option("--out", r.out, "folder for what is exported")->required();
-  program.app().add_flag("--int8", r.int8, "the policy in whole numbers of 8 bits too: flappy_policy_int8.h");
-  program.app().add_flag(
-      "--prove", r.prove,
-      "prove it on every compiler at hand and on a Cortex-M4F, and measure what microcontrollers need");
+  program.app().option("run", r.run, "run folder that flappy-train left").required();
+  program.app().option("--out", r.out, "folder for what is exported").required();
+  program.app().flag("--int8", r.int8, "the policy in whole numbers of 8 bits too: flappy_policy_int8.h");
+  program.app().flag("--prove", r.prove,
+                     "prove it on every compiler at hand and on a Cortex-M4F, and measure what microcontrollers need");
   return program.run(argc, argv, [&] { exports::run(r, program); });
 }

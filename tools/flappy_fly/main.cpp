@@ -147,20 +147,17 @@ int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-fly", "Flies a configuration in closed loop, scores the flights, writes their logs.",
                       {"instruction set " + sim::best_instruction_set()});
-  CLI::App& app = program.app();
+  const io::Command& app = program.app();
   std::string config_name, log;
   std::vector<std::string> overrides;
   std::uint64_t seed = 0;
   rollout::FlyOptions options;
-  app.add_option("config", config_name, "what to fly: configs/fly/*.toml")->required();
-  app.add_option("--count", options.count, "flights, each with noise of its own")
-      ->check(CLI::Range(1, 1'000'000))
-      ->capture_default_str();
-  app.add_option("--log", log, "folder for the log of the flight, or one folder in it for each of several");
-  app.add_option("--set", overrides, "override a key: flight.duration_s=2, controller.attitude.pitch.p=4")
-      ->allow_extra_args(false);
-  CLI::Option* seeded = app.add_option("--seed", seed, "in place of flight.seed")
-                            ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{INT64_MAX}));
+  app.option("config", config_name, "what to fly: configs/fly/*.toml").required();
+  app.option("--count", options.count, "flights, each with noise of its own").range(1, 1'000'000).shows_default();
+  app.option("--log", log, "folder for the log of the flight, or one folder in it for each of several");
+  app.option("--set", overrides, "override a key: flight.duration_s=2, controller.attitude.pitch.p=4").one_at_a_time();
+  io::Option seeded =
+      app.option("--seed", seed, "in place of flight.seed").range(std::uint64_t{0}, std::uint64_t{INT64_MAX});
   return program.run(argc, argv, [&] {
     if (*seeded) overrides.push_back("flight.seed=" + std::to_string(seed));
     const rollout::FlyConfig config = rollout::read_fly_config(config_name, overrides);

@@ -113,26 +113,30 @@ Json check(const std::vector<std::string>& folders) {
 int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-gap", "What a flight log says of the difference between a robot and its model.", {});
-  CLI::App* check = program.app().add_subcommand(
+  io::Command check = program.app().command(
       "check", "axes, units, clocks and dropouts of logs; exit code 1 where a fault forbids a diagnosis");
   std::vector<std::string> folders;
-  check->add_option("flight", folders, "folders of flight logs")->required();
-  CLI::App* diagnose = program.app().add_subcommand("diagnose", "what is missing in the model of a robot that flew");
+  check.option("flight", folders, "folders of flight logs").required();
+  io::Command diagnose = program.app().command("diagnose", "what is missing in the model of a robot that flew");
   gap::DiagnoseCommand command;
-  diagnose->add_option("--vehicle", command.vehicle, "the vehicle's file, as it was believed")->required();
-  diagnose->add_option("--flights", command.flights, "folders of flight logs")->required();
-  diagnose->add_option("--priors", command.priors, "what is uncertain of the vehicle")->capture_default_str();
-  diagnose->add_option("--discrepancy", command.discrepancy, "what every model gets wrong")->capture_default_str();
-  diagnose->add_option("--verdict", command.verdict, "constants of the verdict")->capture_default_str();
-  diagnose->add_option("--manoeuvre", command.manoeuvre,
-                       "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
-  diagnose->add_option("--withhold", command.withheld, "entries that the catalogue is to lack");
-  diagnose->add_option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
-  diagnose->add_option("--threads", command.threads, "0: one for each processor")->check(CLI::Range(0, 1024));
-  program.app().require_subcommand(1);
+  diagnose.option("--vehicle", command.vehicle, "the vehicle's file, as it was believed").required();
+  diagnose.option("--flights", command.flights, "folders of flight logs").required();
+  diagnose.option("--priors", command.priors, "what is uncertain of the vehicle").shows_default();
+  diagnose.option("--discrepancy", command.discrepancy, "what every model gets wrong").shows_default();
+  diagnose.option("--verdict", command.verdict, "constants of the verdict").shows_default();
+  diagnose.option("--manoeuvre", command.manoeuvre,
+                  "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
+  diagnose.option("--withhold", command.withheld, "entries that the catalogue is to lack");
+  diagnose.option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
+  diagnose.option("--threads", command.threads, "0: one for each processor").range(0, 1024);
+  const io::Command blind = program.app().hidden_command("blind");  // where the benchmark was until now
+  program.app().expect_commands(1, 1);
   bool faulty = false;
   const int code = program.run(argc, argv, [&] {
-    if (check->parsed()) {
+    if (blind.given())
+      throw io::InputError(
+          "flappy-gap blind: is a program of its own now; accepted: flappy-blind make, flappy-blind score");
+    if (check.given()) {
       const nlohmann::ordered_json found = gap::check(folders);
       faulty = found["faults"] > 0;
       program.write_json(found);

@@ -88,18 +88,16 @@ Json run(const Settings& s) {
 
 }  // namespace
 
-Command add_calibrate(CLI::App& program) {
+Command add_calibrate(const io::Command& program) {
   const auto s = std::make_shared<Settings>();
-  CLI::App* app = program.add_subcommand("calibrate", "counts how often a fit's 95 % intervals hold the truth");
-  s->source.add(*app, "vehicle to start each fit from");
-  app->add_option("--truth", s->truth, "vehicle whose noisy maps are fitted")->required();
-  app->add_option("--seeds", s->seeds, "fits, each of noise of its own")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  app->add_option("--inputs", s->inputs, "table of inputs to fit; without it, 37 about hover");
-  app->add_option("--held-out-inputs", s->held_out, "table of inputs to judge each fit on");
+  io::Command app = program.command("calibrate", "counts how often a fit's 95 % intervals hold the truth");
+  s->source.add(app, "vehicle to start each fit from");
+  app.option("--truth", s->truth, "vehicle whose noisy maps are fitted").required();
+  app.option("--seeds", s->seeds, "fits, each of noise of its own").range(1, 100000).shows_default();
+  app.option("--inputs", s->inputs, "table of inputs to fit; without it, 37 about hover");
+  app.option("--held-out-inputs", s->held_out, "table of inputs to judge each fit on");
   s->fit.starts = 1;
-  s->fit.add(*app);
+  s->fit.add(app);
   return {app, [s] { return run(*s); }};
 }
 

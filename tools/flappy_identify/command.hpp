@@ -1,9 +1,10 @@
 // The subcommands of flappy-identify, one file each.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <nlohmann/json.hpp>
+
+#include "io/command_line.hpp"
 
 namespace flappy::identify {
 
@@ -11,15 +12,15 @@ using Json = nlohmann::ordered_json;
 
 /// A subcommand, and what it does once its options are parsed: prints, writes its files, returns what --json asks for.
 struct Command {
-  CLI::App* app;
+  io::Command app;
   std::function<Json()> run;
 };
 
-Command add_forces(CLI::App& program);
-Command add_simulate_forces(CLI::App& program);
-Command add_calibrate(CLI::App& program);
-Command add_compare_map(CLI::App& program);
-Command add_kinematics(CLI::App& program);
-Command add_transitions(CLI::App& program);
+Command add_forces(const io::Command& program);
+Command add_simulate_forces(const io::Command& program);
+Command add_calibrate(const io::Command& program);
+Command add_compare_map(const io::Command& program);
+Command add_kinematics(const io::Command& program);
+Command add_transitions(const io::Command& program);
 
 }  // namespace flappy::identify

@@ -9,17 +9,16 @@
 
 namespace flappy::identify {
 
-Command add_compare_map(CLI::App& program) {
+Command add_compare_map(const io::Command& program) {
   struct Settings {
     MapSource source;
     std::string published = io::config_path("identify/published_map.toml");
   };
   const auto s = std::make_shared<Settings>();
   s->source.moment_point = "com";
-  CLI::App* app =
-      program.add_subcommand("compare-map", "a vehicle's force map beside that published for the real robot");
-  s->source.add(*app, "vehicle to simulate");
-  app->add_option("--published", s->published, "slopes and offsets of the real robot")->capture_default_str();
+  io::Command app = program.command("compare-map", "a vehicle's force map beside that published for the real robot");
+  s->source.add(app, "vehicle to simulate");
+  app.option("--published", s->published, "slopes and offsets of the real robot").shows_default();
   return {app, [s] {
             const model::Vehicle vehicle = s->source.read_vehicle();
             const LinearMap published = read_published_map(s->published);

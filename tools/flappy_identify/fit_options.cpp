@@ -5,17 +5,19 @@
 
 namespace flappy::identify {
 
-void FitSettings::add(CLI::App& app) {
+void FitSettings::add(const io::Command& app) {
   config = io::config_path("identify/forces.toml");
-  app.add_option("--config", config, "parameters and their bounds")->capture_default_str();
-  app.add_option("--parameters", parameters, "fit these of the configuration alone, as a,b,c")->delimiter(',');
-  app.add_option("--method", method, "gn: Gauss-Newton from several starts; ga: genetic algorithm; cmaes: CMA-ES")
-      ->check(CLI::IsMember({"gn", "ga", "cmaes"}))
-      ->capture_default_str();
-  app.add_option("--starts", starts, "of gn: the vehicle as it is, then random ones")->check(CLI::Range(1, 1000));
-  app.add_option("--population", population, "of ga and cmaes")->check(CLI::Range(8, 100000))->capture_default_str();
-  app.add_option("--generations", generations, "of ga and cmaes")->check(CLI::Range(1, 100000))->capture_default_str();
-  app.add_option("--fit-seed", seed, "of random starts and populations")->check(seeds())->capture_default_str();
+  app.option("--config", config, "parameters and their bounds").shows_default();
+  app.option("--parameters", parameters, "fit these of the configuration alone, as a,b,c").separated_by(',');
+  app.option("--method", method, "gn: Gauss-Newton from several starts; ga: genetic algorithm; cmaes: CMA-ES")
+      .one_of({"gn", "ga", "cmaes"})
+      .shows_default();
+  app.option("--starts", starts, "of gn: the vehicle as it is, then random ones").range(1, 1000);
+  app.option("--population", population, "of ga and cmaes").range(8, 100000).shows_default();
+  app.option("--generations", generations, "of ga and cmaes").range(1, 100000).shows_default();
+  app.option("--fit-seed", seed, "of random starts and populations")
+      .range(std::uint64_t{0}, kLargestSeed)
+      .shows_default();
 }
 
 FitConfig FitSettings::read_config(const model::Vehicle& vehicle) const {

@@ -1,11 +1,11 @@
 // Options of a fit, for the subcommands that make one.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
 #include "identify/force_fit.hpp"
+#include "io/command_line.hpp"
 
 namespace flappy::identify {
 
@@ -16,7 +16,7 @@ struct FitSettings {
   int starts = 3;
   std::uint64_t seed = 1;
 
-  void add(CLI::App& app);
+  void add(const io::Command& app);
   FitConfig read_config(const model::Vehicle& vehicle) const;
   FitOptions options(const MapOptions& map) const;
 };

@@ -219,17 +219,17 @@ Json run(const Settings& s) {
 
 }  // namespace
 
-Command add_forces(CLI::App& program) {
+Command add_forces(const io::Command& program) {
   const auto s = std::make_shared<Settings>();
-  CLI::App* app = program.add_subcommand("forces", "fits a vehicle to a measured force map");
-  app->add_option("measured", s->measured, "table of inputs and mean wrenches")->required();
-  s->source.add(*app, "vehicle to start from");
-  app->add_option("--out", s->out, "vehicle file to write")->required();
-  CLI::Option* table = app->add_option("--held-out", s->held_out, "another table, judged and not fitted");
-  app->add_option("--hold-out", s->hold_out, "keep this many rows, evenly spread, from the fit")
-      ->check(CLI::Range(0, 1'000'000))
-      ->excludes(table);
-  s->fit.add(*app);
+  io::Command app = program.command("forces", "fits a vehicle to a measured force map");
+  app.option("measured", s->measured, "table of inputs and mean wrenches").required();
+  s->source.add(app, "vehicle to start from");
+  app.option("--out", s->out, "vehicle file to write").required();
+  io::Option table = app.option("--held-out", s->held_out, "another table, judged and not fitted");
+  app.option("--hold-out", s->hold_out, "keep this many rows, evenly spread, from the fit")
+      .range(0, 1'000'000)
+      .excludes(table);
+  s->fit.add(app);
   return {app, [s] { return run(*s); }};
 }
 

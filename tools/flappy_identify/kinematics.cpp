@@ -18,7 +18,7 @@ struct Settings {
   MapSource source;
   std::string measured, csv, svg;
   sim::Input input;
-  CLI::Option* amplitude = nullptr;
+  io::Option amplitude = nullptr;
   double from_s = -std::numeric_limits<double>::infinity(), to_s = std::numeric_limits<double>::infinity();
 };
 
@@ -34,9 +34,9 @@ Json run(const Settings& s) {
     if (!out.empty()) io::check_output(out, {s.measured, s.source.vehicle});
   WingSamples samples = read_wing_samples(s.measured);
   cut(samples, s.from_s, s.to_s);
-  if (s.amplitude->count() == 0 && !samples.input)
+  if (s.amplitude.given() == false && !samples.input)
     throw io::InputError(samples.name + ": amplitude_V: column is missing; accepted: this column, or --amplitude");
-  const bool given = s.amplitude->count() > 0;
+  const bool given = s.amplitude.given();
   const sim::Input input = given ? s.input : *samples.input;
   check_limits(input, vehicle.driver, given ? "command line" : samples.name);
   const WingComparison c = compare_wings(vehicle, input, samples, s.source.options(vehicle));
@@ -64,19 +64,19 @@ Json run(const Settings& s) {
 
 }  // namespace
 
-Command add_kinematics(CLI::App& program) {
+Command add_kinematics(const io::Command& program) {
   const auto s = std::make_shared<Settings>();
-  CLI::App* app = program.add_subcommand("kinematics", "measured strokes and rotations beside simulated ones");
-  app->add_option("measured", s->measured, "table of wing angles, as a flight log's wings.csv")->required();
-  s->source.add(*app, "vehicle to simulate, welded");
-  s->amplitude = app->add_option("--amplitude", s->input.amplitude_V, "input in V, in place of the table's columns");
-  app->add_option("--difference", s->input.difference_V, "in V")->needs(s->amplitude);
-  app->add_option("--bias", s->input.bias_V, "in V")->needs(s->amplitude);
-  app->add_option("--split-cycle", s->input.split_cycle, "fraction of a beat")->needs(s->amplitude);
-  app->add_option("--from-s", s->from_s, "leave out samples before");
-  app->add_option("--to-s", s->to_s, "leave out samples after");
-  app->add_option("--csv", s->csv, "both curves over the beat");
-  app->add_option("--svg", s->svg, "figure of both, by gnuplot");
+  io::Command app = program.command("kinematics", "measured strokes and rotations beside simulated ones");
+  app.option("measured", s->measured, "table of wing angles, as a flight log's wings.csv").required();
+  s->source.add(app, "vehicle to simulate, welded");
+  s->amplitude = app.option("--amplitude", s->input.amplitude_V, "input in V, in place of the table's columns");
+  app.option("--difference", s->input.difference_V, "in V").needs(s->amplitude);
+  app.option("--bias", s->input.bias_V, "in V").needs(s->amplitude);
+  app.option("--split-cycle", s->input.split_cycle, "fraction of a beat").needs(s->amplitude);
+  app.option("--from-s", s->from_s, "leave out samples before");
+  app.option("--to-s", s->to_s, "leave out samples after");
+  app.option("--csv", s->csv, "both curves over the beat");
+  app.option("--svg", s->svg, "figure of both, by gnuplot");
   return {app, [s] { return run(*s); }};
 }
 

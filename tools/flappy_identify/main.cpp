@@ -9,9 +9,9 @@ int main(int argc, char** argv) {
       identify::add_forces(program.app()),     identify::add_simulate_forces(program.app()),
       identify::add_calibrate(program.app()),  identify::add_compare_map(program.app()),
       identify::add_kinematics(program.app()), identify::add_transitions(program.app())};
-  program.app().require_subcommand(1);
+  program.app().expect_commands(1, 1);
   return program.run(argc, argv, [&] {
     for (const identify::Command& command : commands)
-      if (command.app->parsed()) program.write_json(command.run());
+      if (command.app.given()) program.write_json(command.run());
   });
 }

@@ -9,13 +9,12 @@
 
 namespace flappy::identify {
 
-void MapSource::add(CLI::App& app, const std::string& vehicle_help) {
-  app.add_option("--vehicle", vehicle, vehicle_help)->required();
-  app.add_option("--moment-point", moment_point,
-                 "torques are about this point: x,y,z in B from the torso origin in metres, or com")
-      ->capture_default_str();
-  app.add_option("--threads", threads, "0: one for each processor; results do not depend on it")
-      ->check(CLI::Range(0, 1024));
+void MapSource::add(const io::Command& app, const std::string& vehicle_help) {
+  app.option("--vehicle", vehicle, vehicle_help).required();
+  app.option("--moment-point", moment_point,
+             "torques are about this point: x,y,z in B from the torso origin in metres, or com")
+      .shows_default();
+  app.option("--threads", threads, "0: one for each processor; results do not depend on it").range(0, 1024);
 }
 
 model::Vehicle MapSource::read_vehicle() const { return model::read_vehicle_for_steps(vehicle, kStep_s); }
@@ -36,7 +35,5 @@ MapOptions MapSource::options(const model::Vehicle& v) const {
                          "\" is no point; accepted: x,y,z, three numbers of metres from -1 to 1, or com");
   return o;
 }
-
-CLI::Range seeds() { return {std::uint64_t{0}, std::uint64_t{INT64_MAX}}; }
 
 }  // namespace flappy::identify

@@ -8,20 +8,19 @@
 
 namespace flappy::identify {
 
-Command add_simulate_forces(CLI::App& program) {
+Command add_simulate_forces(const io::Command& program) {
   struct Settings {
     MapSource source;
     std::string out, inputs, noise = "nano17";
     std::uint64_t seed = 1;
   };
   const auto s = std::make_shared<Settings>();
-  CLI::App* app =
-      program.add_subcommand("simulate-forces", "writes the force map a laboratory would measure of a vehicle");
-  s->source.add(*app, "vehicle to measure");
-  app->add_option("--out", s->out, "table to write")->required();
-  app->add_option("--inputs", s->inputs, "table of inputs; without it, 37 about hover");
-  app->add_option("--seed", s->seed, "of the noise")->check(seeds())->capture_default_str();
-  app->add_option("--noise", s->noise, "sensor: nano17 or none")->check(CLI::IsMember({"nano17", "none"}));
+  io::Command app = program.command("simulate-forces", "writes the force map a laboratory would measure of a vehicle");
+  s->source.add(app, "vehicle to measure");
+  app.option("--out", s->out, "table to write").required();
+  app.option("--inputs", s->inputs, "table of inputs; without it, 37 about hover");
+  app.option("--seed", s->seed, "of the noise").range(std::uint64_t{0}, kLargestSeed).shows_default();
+  app.option("--noise", s->noise, "sensor: nano17 or none").one_of({"nano17", "none"});
   return {app, [s] {
             const model::Vehicle vehicle = s->source.read_vehicle();
             const std::vector<sim::Input> inputs =

@@ -122,23 +122,22 @@ Json run(const Request& request) {
 
 }  // namespace
 
-Command add_transitions(CLI::App& program) {
-  CLI::App* sub =
-      program.add_subcommand("transitions", "replays recorded voltages from recorded states, one and two beats");
+Command add_transitions(const io::Command& program) {
+  io::Command sub = program.command("transitions", "replays recorded voltages from recorded states, one and two beats");
   const auto request = std::make_shared<Request>();
-  sub->add_option("flight", request->flights, "folders of flight logs")->required();
-  sub->add_option("--vehicle", request->vehicle, "vehicle file; otherwise that of the log, in its folder or beside it");
-  CLI::Option* samples = sub->add_option("--samples", request->options.samples, "samples to start from, evenly chosen")
-                             ->check(CLI::Range(1, 10'000'000))
-                             ->capture_default_str();
-  sub->add_option("--every", request->options.every, "start from every so many samples instead")
-      ->check(CLI::Range(1, 10'000'000))
-      ->excludes(samples);
-  sub->add_option("--csv", request->csv, "write the distributions of all errors to this file");
-  sub->add_flag("--accept-surprise", request->options.accept_surprise,
-                "also flights whose motion capture and IMU disagree by more than 5 times their declared noise");
-  sub->add_flag("--truth", request->truth,
-                "states and wings from truth.csv of simulated flights: the floor without sensors");
+  sub.option("flight", request->flights, "folders of flight logs").required();
+  sub.option("--vehicle", request->vehicle, "vehicle file; otherwise that of the log, in its folder or beside it");
+  io::Option samples = sub.option("--samples", request->options.samples, "samples to start from, evenly chosen")
+                           .range(1, 10'000'000)
+                           .shows_default();
+  sub.option("--every", request->options.every, "start from every so many samples instead")
+      .range(1, 10'000'000)
+      .excludes(samples);
+  sub.option("--csv", request->csv, "write the distributions of all errors to this file");
+  sub.flag("--accept-surprise", request->options.accept_surprise,
+           "also flights whose motion capture and IMU disagree by more than 5 times their declared noise");
+  sub.flag("--truth", request->truth,
+           "states and wings from truth.csv of simulated flights: the floor without sensors");
   return {sub, [request] {
             request->options.source = request->truth ? Source::truth : Source::sensors;
             return run(*request);

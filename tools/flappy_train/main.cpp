@@ -109,22 +109,22 @@ int main(int argc, char** argv) {
   namespace fs = std::filesystem;
   io::Program program("flappy-train", "Trains a policy; leaves a run folder.",
                       {"instruction set " + sim::best_instruction_set()});
-  CLI::App& app = program.app();
+  const io::Command& app = program.app();
   std::string config_name, out, resume, from, init, seeds;
   std::vector<std::string> overrides;
   int threads = 0;
-  app.add_option("config", config_name, "what to train: configs/train/*.toml");
-  CLI::Option* placed =
-      app.add_option("--out", out, "run folder, or folder of runs with --seeds (runs/ and the configuration's name)");
-  CLI::Option* resumed =
-      app.add_option("--resume", resume, "run folder to go on with, from its newest checkpoint")->excludes(placed);
-  app.add_option("--seeds", seeds, "several runs: 0-4; writes their learning curve")->excludes(resumed);
-  app.add_option("--from", from, "another checkpoint of that folder")->needs(resumed);
-  app.add_option("--init", init, "actor, or run folder whose best one, to start with")->excludes(resumed);
-  app.add_option("--threads", threads, "0: all")->check(CLI::Range(0, 1024));
-  app.add_option("--set", overrides, "override a key: learn.updates=1000, task.reward.goal=1")
-      ->allow_extra_args(false)
-      ->excludes(resumed);
+  app.option("config", config_name, "what to train: configs/train/*.toml");
+  io::Option placed =
+      app.option("--out", out, "run folder, or folder of runs with --seeds (runs/ and the configuration's name)");
+  io::Option resumed =
+      app.option("--resume", resume, "run folder to go on with, from its newest checkpoint").excludes(placed);
+  app.option("--seeds", seeds, "several runs: 0-4; writes their learning curve").excludes(resumed);
+  app.option("--from", from, "another checkpoint of that folder").needs(resumed);
+  app.option("--init", init, "actor, or run folder whose best one, to start with").excludes(resumed);
+  app.option("--threads", threads, "0: all").range(0, 1024);
+  app.option("--set", overrides, "override a key: learn.updates=1000, task.reward.goal=1")
+      .one_at_a_time()
+      .excludes(resumed);
   return program.run(argc, argv, [&] {
     if (config_name.empty() == resume.empty())
       throw io::InputError("flappy-train: what to train is not clear; accepted: a configuration, or --resume RUN");

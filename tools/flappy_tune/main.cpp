@@ -25,9 +25,9 @@ int main(int argc, char** argv) {
   io::Program program("flappy-tune", "Tunes the gains of a controller by an evolution strategy (CMA-ES).", {});
   std::string config_name, out;
   std::vector<std::string> overrides;
-  program.app().add_option("config", config_name, "what to vary and how to judge: configs/tune/*.toml")->required();
-  program.app().add_option("out", out, "controller file to write")->required();
-  program.app().add_option("--set", overrides, "override a key: generations=10")->allow_extra_args(false);
+  program.app().option("config", config_name, "what to vary and how to judge: configs/tune/*.toml").required();
+  program.app().option("out", out, "controller file to write").required();
+  program.app().option("--set", overrides, "override a key: generations=10").one_at_a_time();
   return program.run(argc, argv, [&] {
     const rollout::TuneConfig config = rollout::read_tune_config(config_name, overrides);
     io::check_output(out, {config_name});

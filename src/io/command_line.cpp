@@ -1,0 +1,74 @@
+#include "io/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+namespace flappy::io {
+
+Option Option::required() const {
+  option_->required();
+  return *this;
+}
+Option Option::range(int low, int high) const {
+  option_->check(CLI::Range(low, high));
+  return *this;
+}
+Option Option::range(std::uint64_t low, std::uint64_t high) const {
+  option_->check(CLI::Range(low, high));
+  return *this;
+}
+Option Option::range(double low, double high) const {
+  option_->check(CLI::Range(low, high));
+  return *this;
+}
+Option Option::one_of(const std::vector<std::string>& accepted) const {
+  option_->check(CLI::IsMember(accepted));
+  return *this;
+}
+Option Option::shows_default() const {
+  option_->capture_default_str();
+  return *this;
+}
+Option Option::needs(Option other) const {
+  option_->needs(other.option_);
+  return *this;
+}
+Option Option::excludes(Option other) const {
+  option_->excludes(other.option_);
+  return *this;
+}
+Option Option::one_at_a_time() const {
+  option_->allow_extra_args(false);
+  return *this;
+}
+Option Option::separated_by(char separator) const {
+  option_->delimiter(separator);
+  return *this;
+}
+bool Option::given() const { return option_->count() > 0; }
+
+template <class T>
+Option Command::option(const std::string& name, T& value, const std::string& help) const {
+  return Option(app_->add_option(name, value, help));
+}
+template Option Command::option(const std::string&, int&, const std::string&) const;
+template Option Command::option(const std::string&, std::uint64_t&, const std::string&) const;
+template Option Command::option(const std::string&, double&, const std::string&) const;
+template Option Command::option(const std::string&, std::string&, const std::string&) const;
+template Option Command::option(const std::string&, std::filesystem::path&, const std::string&) const;
+template Option Command::option(const std::string&, std::vector<std::string>&, const std::string&) const;
+template Option Command::option(const std::string&, std::vector<std::filesystem::path>&, const std::string&) const;
+
+Option Command::flag(const std::string& name, bool& value, const std::string& help) const {
+  return Option(app_->add_flag(name, value, help));
+}
+Command Command::command(const std::string& name, const std::string& help) const {
+  return Command(app_->add_subcommand(name, help));
+}
+Command Command::hidden_command(const std::string& name) const {
+  return Command(app_->add_subcommand(name)->group("")->allow_extras());
+}
+void Command::expect_commands(std::size_t least, std::size_t most) const { app_->require_subcommand(least, most); }
+bool Command::given() const { return app_->parsed(); }
+
+}  // namespace flappy::io
