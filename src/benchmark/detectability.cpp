@@ -117,7 +117,7 @@ double DetectabilityAnalysis::best_gain(const VectorXd& truth, blind::Effect hyp
   return best;
 }
 
-/// The effect itself as a hypothesis. Differences of carried flights are rough (gap/fit.hpp), the same way wherever they come
+/// The effect itself as a hypothesis. Differences of predicted flights are rough (gap/evidence/fit.hpp), the same way wherever they come
 /// from the same flights; so nothing is held against its own: the hypothesis is of any other size tried than the truth.
 double DetectabilityAnalysis::gain(blind::Effect truth, double size) const {
   const VectorXd d = truth_of(truth, size);

@@ -34,7 +34,7 @@ SampledRobot fly_sampled(Case c, const sim::Randomisation& randomisation, std::u
       sampled.flights.push_back(fly(c, sampled.flights.size()));
     if (!sampled.flights.back().crashed) {
       sampled.flown = std::move(c);
-      return drawn;
+      return sampled;
     }
     sampled.lost.push_back({sampled.flights.size(), sampled.flights.back().how});
   }

@@ -13,7 +13,7 @@
 #include "model/effects/registry.hpp"
 #include "refusal.hpp"
 
-namespace flappy::gap {
+namespace flappy::benchmark {
 namespace {
 
 namespace fs = std::filesystem;
@@ -47,7 +47,7 @@ class Benchmark : public testing::Test {
   static std::string name() { return testing::UnitTest::GetInstance()->current_test_info()->name(); }
 
   bool make(std::size_t at_most, const std::string& part = "singles") const {
-    benchmark::MakeCommand c;
+    MakeCommand c;
     c.out = root_ / "bench";
     c.vehicle = kConfigs + "vehicles/hummingbird_nominal.toml";
     c.randomise = kConfigs + "randomisation/published.toml";
@@ -64,14 +64,14 @@ class Benchmark : public testing::Test {
   }
 
   /// Says ground effect, whatever it is asked, unless it may not.
-  benchmark::ScoreCommand command() {
-    benchmark::ScoreCommand c;
+  ScoreCommand command() {
+    ScoreCommand c;
     c.folder = root_ / "bench";
     c.priors = kConfigs + "gap/priors.toml";
     c.threads = 2;
-    c.predictor = [this](const benchmark::Question& q) {
+    c.predictor = [this](const Question& q) {
       ++asked_;
-      benchmark::Prediction p;
+      Prediction p;
       p.refit = 1;
       const bool may = std::ranges::count(q.withheld, "ground_effect") == 0;
       p.kind = may ? "effect" : "unknown";
@@ -160,10 +160,10 @@ TEST_F(Benchmark, OpensLabelsOnceAllPredictionsAreSealed) {
 
 TEST_F(Benchmark, GoesOnWhereItWasStopped) {
   ASSERT_TRUE(make(2, "none"));
-  benchmark::ScoreCommand c = command();
-  const benchmark::Predictor whole = c.predictor;
+  ScoreCommand c = command();
+  const Predictor whole = c.predictor;
   c.threads = 1;
-  c.predictor = [&](const benchmark::Question& q) {
+  c.predictor = [&](const Question& q) {
     if (asked_ == 1) throw io::InputError("stopped");
     return whole(q);
   };
@@ -176,10 +176,10 @@ TEST_F(Benchmark, GoesOnWhereItWasStopped) {
 
 TEST_F(Benchmark, TakesNoPredictionOnceLabelsAreOpen) {
   ASSERT_TRUE(make(2));
-  benchmark::ScoreCommand c = command();
-  const benchmark::Predictor whole = c.predictor;
+  ScoreCommand c = command();
+  const Predictor whole = c.predictor;
   c.threads = 1;
-  c.predictor = [&](const benchmark::Question& q) {
+  c.predictor = [&](const Question& q) {
     if (asked_ == 2) throw io::InputError("stopped");  // in the fit of a true effect
     return whole(q);
   };
@@ -198,14 +198,14 @@ TEST_F(Benchmark, TakesNoPredictionOnceLabelsAreOpen) {
 }
 
 TEST_F(Benchmark, PlansEveryPart) {
-  const auto of = benchmark::read_detectability(root_ / "detectable.toml");
-  const std::vector<benchmark::PlannedCase> plan = benchmark::plan_cases(of, {});
+  const auto of = read_detectability(root_ / "detectable.toml");
+  const std::vector<PlannedCase> plan = plan_cases(of, {});
   std::size_t outside = 0;
   std::map<std::string, std::size_t> count;
   std::set<std::size_t> numbers;
-  std::map<std::uint64_t, std::vector<const benchmark::PlannedCase*>> by_seed;
+  std::map<std::uint64_t, std::vector<const PlannedCase*>> by_seed;
   std::size_t in_order = 0;
-  for (const benchmark::PlannedCase& c : plan) {
+  for (const PlannedCase& c : plan) {
     ++count[c.part];
     numbers.insert(c.number);
     by_seed[c.seed].push_back(&c);
@@ -249,15 +249,15 @@ TEST_F(Benchmark, PlansEveryPart) {
   // a robot flies once, but with and without current
   for (const auto& [seed, cases] : by_seed)
     EXPECT_EQ(cases.size(), cases[0]->part.starts_with("singles") ? 2U : 1U) << seed;
-  benchmark::PlanOptions reported;
+  PlanOptions reported;
   reported.reported = true;
-  for (const benchmark::PlannedCase& c : plan_cases(of, reported)) EXPECT_GE(c.seed, 700001U);
+  for (const PlannedCase& c : plan_cases(of, reported)) EXPECT_GE(c.seed, 700001U);
   // what a part holds does not depend on what else is made
-  benchmark::PlanOptions pairs;
+  PlanOptions pairs;
   pairs.parts = {"pairs"};
   std::set<std::string> alone, among;
-  for (const benchmark::PlannedCase& c : plan_cases(of, pairs)) alone.insert(c.effects[0].id + std::to_string(c.seed));
-  for (const benchmark::PlannedCase& c : plan)
+  for (const PlannedCase& c : plan_cases(of, pairs)) alone.insert(c.effects[0].id + std::to_string(c.seed));
+  for (const PlannedCase& c : plan)
     if (c.part == "pairs") among.insert(c.effects[0].id + std::to_string(c.seed));
   EXPECT_EQ(alone, among);
 }
@@ -265,13 +265,12 @@ TEST_F(Benchmark, PlansEveryPart) {
 TEST_F(Benchmark, RefusesATableOfSizesThatIsNone) {
   const fs::path file = root_ / "detectable.toml";
   io::write_atomically(file, detectability() + "[no_such_effect]\ndetectable = 1\n");
-  EXPECT_NE(test::refusal([&] { benchmark::read_detectability(file); }).find("no_such_effect"), std::string::npos);
+  EXPECT_NE(test::refusal([&] { read_detectability(file); }).find("no_such_effect"), std::string::npos);
   std::string text = detectability();
   text.replace(text.find("detectable = 0.2"), 16, "detectable = 2.1");
   io::write_atomically(file, text);
-  EXPECT_NE(test::refusal([&] { benchmark::read_detectability(file); }).find("twice that is beyond size 4"),
-            std::string::npos);
+  EXPECT_NE(test::refusal([&] { read_detectability(file); }).find("twice that is beyond size 4"), std::string::npos);
 }
 
 }  // namespace
-}  // namespace flappy::gap
+}  // namespace flappy::benchmark

@@ -11,7 +11,8 @@
 #include "model/effects/registry.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::blind {
+namespace flappy::benchmark {
+using namespace blind;
 namespace {
 
 using Eigen::Index;
@@ -53,15 +54,13 @@ TEST(DetectabilityAnalysis, ExpectsWhatDrawsGive) {
     sum += gain, squares += gain * gain;
   }
   const double mean = sum / kDraws, error = std::sqrt((squares / kDraws - mean * mean) / kDraws);
-  EXPECT_NEAR(benchmark::expected_gain(information, truth, hypothesis, precision), mean, 4 * error);
+  EXPECT_NEAR(expected_gain(information, truth, hypothesis, precision), mean, 4 * error);
   EXPECT_GT(mean, 20 * error) << "nothing was tested";
 }
 
 TEST(DetectabilityAnalysis, FindsTheSizeAndTheRivals) {
-  std::array<benchmark::DetectabilityAnalysis::Columns, kBlindEffects> effects;
-  const auto give = [&](Effect e) -> benchmark::DetectabilityAnalysis::Columns& {
-    return effects[static_cast<std::size_t>(e)];
-  };
+  std::array<DetectabilityAnalysis::Columns, kBlindEffects> effects;
+  const auto give = [&](Effect e) -> DetectabilityAnalysis::Columns& { return effects[static_cast<std::size_t>(e)]; };
   give(Effect::added_mass) = {{1, 2}, {0, 1}, {}};
   give(Effect::body_drag) = {{1}, {2}, {3}};
   give(Effect::tether) = {{1}, {4}, {}};
@@ -72,7 +71,7 @@ TEST(DetectabilityAnalysis, FindsTheSizeAndTheRivals) {
   rows << 1, 3, 1, 1, 0, 0, 0,  //
       0, 0, 1, -1, 0, 0, 0,     //
       0, 0, 0, 0, 1, 1, 0.9;
-  const benchmark::DetectabilityAnalysis analysis(effects, 300 * rows.transpose() * rows);
+  const DetectabilityAnalysis analysis(effects, 300 * rows.transpose() * rows);
   // the truth is straight of the next larger size tried, 1 or 3 along x; the hypothesis, of the other one, m, with prior
   // precision of its coefficient size^2/4
   const auto expected = [](double size) {
@@ -104,14 +103,14 @@ Case flown(const std::vector<BlindEffect>& effects) {
   return c;
 }
 
-gap::PredictedFlight carried(const Case& c, std::size_t flight) {
+gap::PredictedFlight predicted(const Case& c, std::size_t flight) {
   RobotFlight f = fly(c, flight);
   EXPECT_FALSE(f.crashed) << f.how;
   return gap::PredictedFlight(gap::Recording("flight", std::move(f.log), c.vehicle));
 }
 
 /// Rms over beats of what is left of the steady turn and force, [channel].
-std::array<double, 6> left(const gap::PredictedFlight& flight, const benchmark::Perturbation& perturbation) {
+std::array<double, 6> left(const gap::PredictedFlight& flight, const Perturbation& perturbation) {
   const gap::Rows rows = predict_perturbed(flight.recording(), perturbation, 0);
   std::array<double, 6> rms{};
   double n = 0;
@@ -127,7 +126,7 @@ std::array<double, 6> left(const gap::PredictedFlight& flight, const benchmark::
   return rms;
 }
 
-// A robot carried along its own flight leaves noise. With n samples of dt in a beat T, hats of a beat to either side: of the
+// A robot that predicts its own flight leaves noise. With n samples of dt in a beat T, hats of a beat to either side: of the
 // accelerometer 0.5 sqrt(2/3 / n) = 0.11 m/s^2 at 500 Hz, of the gyro differenced 0.05 sqrt(2 dt/T) / T = 0.6 rad/s^2; what
 // drifts in them, and what the record gets wrong of the torso's motion, adds half of that. Without the effect that it flew
 // with, what is left is several times as much.
@@ -136,7 +135,7 @@ TEST(ResetPrediction, KnowsItsOwnFlight) {
                                                   {{"wind", 2}},            // its gusts come as they came
                                                   {{"battery_sag", 4}}}) {  // empty by as much as the trim took
     const Case c = flown(effects);
-    const gap::PredictedFlight flight = carried(c, 0);
+    const gap::PredictedFlight flight = predicted(c, 0);
     const auto with = left(flight, {c.vehicle, c.sizes, c.seed}), without = left(flight, {c.vehicle, {}, c.seed});
     double worst = 0;
     for (std::size_t s = 0; s < 6; ++s) {
@@ -149,20 +148,20 @@ TEST(ResetPrediction, KnowsItsOwnFlight) {
 
 TEST(ResetPrediction, LagsByWholeSteps) {
   const Case c = flown({});
-  gap::Recording late = carried(c, 0).recording();
-  const gap::Rows expected = benchmark::predict_perturbed(late, {c.vehicle, {}, c.seed, 1}, 0);
+  gap::Recording late = predicted(c, 0).recording();
+  const gap::Rows expected = predict_perturbed(late, {c.vehicle, {}, c.seed, 1}, 0);
   for (std::vector<double>* v : {&late.left_V, &late.right_V}) {
     v->insert(v->begin(), v->front());
     v->pop_back();
   }
-  EXPECT_EQ(benchmark::predict_perturbed(late, {c.vehicle, {}, c.seed, 0}, 0), expected);
+  EXPECT_EQ(predict_perturbed(late, {c.vehicle, {}, c.seed, 0}, 0), expected);
 }
 
 TEST(Subject, SensorsDoNotChangeTheFlight) {
   const RobotFlight plain = fly(flown({}), 0);
   std::vector<BlindEffect> all;
   for (std::size_t e = 0; e < kBlindEffects; ++e)
-    if (benchmark::acts_on_sensors(static_cast<Effect>(e))) all.push_back({effect_names()[e], 2});
+    if (acts_on_sensors(static_cast<Effect>(e))) all.push_back({effect_names()[e], 2});
   const RobotFlight f = fly(flown(all), 0);
   EXPECT_EQ(f.log.command, plain.log.command);
   EXPECT_NE(f.log.imu, plain.log.imu);
@@ -174,7 +173,7 @@ TEST(Subject, SensorsDoNotChangeTheFlight) {
 // j/(1 + j), and less beside others: less than the little that every vehicle has says nothing.
 TEST(Subject, LessThanEveryVehicleHasSaysNothing) {
   const Case c = flown({});
-  const benchmark::Subject subject(c, benchmark::fly_all(c, 2), 2);
+  const Subject subject(c, fly_all(c, 2), 2);
   const std::vector<gap::BasisCoefficients> background = subject.background();
   std::size_t sizes = 0;
   for (const model::EffectEntry& e : model::effects()) sizes += static_cast<std::size_t>(e.info.sizes);
@@ -203,8 +202,7 @@ TEST(Subject, LessThanEveryVehicleHasSaysNothing) {
 TEST(TrueValues, FindsWhatWasPutIn) {
   const auto uncertain =
       sim::read_randomisation(test::nominal(), io::Config::load(test::source_path("configs/gap/priors.toml")).root());
-  const auto values =
-      benchmark::true_values(flown({}), {{"mocap_tilt", 2}, {"mocap_delay", 1}, {"com_offset", 2}}, uncertain, 2);
+  const auto values = true_values(flown({}), {{"mocap_tilt", 2}, {"mocap_delay", 1}, {"com_offset", 2}}, uncertain, 2);
   const auto at = [&](const char* name) {
     const auto found = values.find(name);
     if (found == values.end() || !found->second) ADD_FAILURE() << name;
@@ -217,4 +215,4 @@ TEST(TrueValues, FindsWhatWasPutIn) {
 }
 
 }  // namespace
-}  // namespace flappy::blind
+}  // namespace flappy::benchmark

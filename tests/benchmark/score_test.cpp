@@ -7,13 +7,13 @@
 
 #include "benchmark/predict/baselines.hpp"
 
-namespace flappy::gap {
+namespace flappy::benchmark {
 namespace {
 
 using Names = std::vector<std::string>;
 
-benchmark::FittedSet fitted(Names effects, double probability, std::optional<double> left = {}, double gain_sd = 0) {
-  benchmark::FittedSet s;
+FittedSet fitted(Names effects, double probability, std::optional<double> left = {}, double gain_sd = 0) {
+  FittedSet s;
   s.effects = std::move(effects);
   s.probability = probability;
   s.left = left;
@@ -22,9 +22,9 @@ benchmark::FittedSet fitted(Names effects, double probability, std::optional<dou
 }
 
 /// A verdict with the sets that stand behind it.
-benchmark::ScoredCase judged(const std::string& part, Names truth, const std::string& kind, Names named,
-                             double probability, std::vector<benchmark::FittedSet> sets = {}) {
-  benchmark::ScoredCase c;
+ScoredCase judged(const std::string& part, Names truth, const std::string& kind, Names named, double probability,
+                  std::vector<FittedSet> sets = {}) {
+  ScoredCase c;
   c.truth.part = part;
   c.truth.effects = std::move(truth);
   c.prediction.kind = kind;
@@ -34,38 +34,37 @@ benchmark::ScoredCase judged(const std::string& part, Names truth, const std::st
   return c;
 }
 
-const benchmark::ScoreLine& line_of(const std::vector<benchmark::ScoreLine>& lines, const std::string& key) {
-  for (const benchmark::ScoreLine& l : lines)
+const ScoreLine& line_of(const std::vector<ScoreLine>& lines, const std::string& key) {
+  for (const ScoreLine& l : lines)
     if (l.key == key) return l;
   throw std::out_of_range(key);
 }
 
-benchmark::Score main_score(const std::vector<benchmark::ScoredCase>& cases, const std::string& key) {
+ScoreValue main_score(const std::vector<ScoredCase>& cases, const std::string& key) {
   return line_of(score(cases).main, key).score;
 }
 
 TEST(Proportion, HasWilsonsInterval) {
   // Wilson 1927 by hand: 8 of 10, z = 1.959964: centre (0.8 + z^2/20)/(1 + z^2/10) = 0.71674, half 0.22658
-  const benchmark::Score s = benchmark::proportion(8, 10);
+  const ScoreValue s = proportion(8, 10);
   EXPECT_DOUBLE_EQ(*s.value, 0.8);
   EXPECT_NEAR(s.low, 0.4902, 1e-4);
   EXPECT_NEAR(s.high, 0.9433, 1e-4);
   EXPECT_EQ(s.count, 10U);
-  EXPECT_FALSE(benchmark::proportion(0, 0).value);
-  EXPECT_NEAR(benchmark::proportion(0, 5).low, 0, 1e-12);
-  EXPECT_NEAR(benchmark::proportion(5, 5).high, 1, 1e-12);
+  EXPECT_FALSE(proportion(0, 0).value);
+  EXPECT_NEAR(proportion(0, 5).low, 0, 1e-12);
+  EXPECT_NEAR(proportion(5, 5).high, 1, 1e-12);
 }
 
 TEST(Resampled, IntervalOfAMeanIsThatOfTheNormalLaw) {
   // 400 cases, half 0 and half 1: the mean's sd is 0.025, of 2,000 resamples a quantile is good to 0.003
   std::vector<double> values(400);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<double>(i % 2);
-  const benchmark::Score s =
-      benchmark::resampled(values.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
-        double sum = 0;
-        for (const std::size_t i : which) sum += values[i];
-        return sum / static_cast<double>(which.size());
-      });
+  const ScoreValue s = resampled(values.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
+    double sum = 0;
+    for (const std::size_t i : which) sum += values[i];
+    return sum / static_cast<double>(which.size());
+  });
   EXPECT_DOUBLE_EQ(*s.value, 0.5);
   EXPECT_NEAR(s.low, 0.5 - 1.96 * 0.025, 0.006);
   EXPECT_NEAR(s.high, 0.5 + 1.96 * 0.025, 0.006);
@@ -73,41 +72,41 @@ TEST(Resampled, IntervalOfAMeanIsThatOfTheNormalLaw) {
 
 TEST(CalibrationError, CountsBinsOfEqualCount) {
   // 20 claims, two in each bin, given in no order: all at 0.9 but the two lowest
-  std::vector<benchmark::Claim> claims;
+  std::vector<Claim> claims;
   for (int i = 0; i < 18; ++i) claims.push_back({0.9, true});
   claims.push_back({0.5, false});
   claims.push_back({0.3, false});
   // lowest bin |0.4 - 0| x 2, nine bins |0.9 - 1| x 2: (0.8 + 1.8)/20
   EXPECT_NEAR(calibration_error(claims), 0.13, 1e-12);
   // within a bin errors cancel: 0.8 claimed, 4 of 5 right
-  std::vector<benchmark::Claim> fair;
+  std::vector<Claim> fair;
   for (int i = 0; i < 50; ++i) fair.push_back({0.8, i % 5 != 0});
   EXPECT_NEAR(calibration_error(fair), 0, 1e-12);
-  EXPECT_DOUBLE_EQ(benchmark::calibration_error({}), 0);
+  EXPECT_DOUBLE_EQ(calibration_error({}), 0);
 }
 
 TEST(CalibrationError, OfACalibratedPredictorIsThatOfChance) {
   // One claim in each of 10 bins, p = 1/2: every bin is off by 1/2, whatever comes.
-  EXPECT_DOUBLE_EQ(calibrated_error_95(std::vector<benchmark::Claim>(10, {0.5, false})), 0.5);
-  EXPECT_DOUBLE_EQ(calibrated_error_95(std::vector<benchmark::Claim>(30, {1, false})), 0);
+  EXPECT_DOUBLE_EQ(calibrated_error_95(std::vector<Claim>(10, {0.5, false})), 0.5);
+  EXPECT_DOUBLE_EQ(calibrated_error_95(std::vector<Claim>(30, {1, false})), 0);
   // 10 bins of 100 at 1/2: mean of ten |N(0, 0.05)|: 0.0399, sd 0.05 x 0.603/sqrt(10) = 0.0095, 95th percentile 0.0556
-  EXPECT_NEAR(calibrated_error_95(std::vector<benchmark::Claim>(1000, {0.5, true})), 0.0556, 0.002);
+  EXPECT_NEAR(calibrated_error_95(std::vector<Claim>(1000, {0.5, true})), 0.0556, 0.002);
 }
 
-TEST(ScoreValue, RightEffectFirstIsJudgedWhereRivalsAreSeparable) {
-  std::vector<benchmark::ScoredCase> cases = {
+TEST(Score, RightEffectFirstIsJudgedWhereRivalsAreSeparable) {
+  std::vector<ScoredCase> cases = {
       judged("singles", {"tether"}, "effect", {"tether"}, 0.9, {fitted({"tether"}, 0.9)}),
       judged("singles", {"tether"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9), fitted({"tether"}, 0.1)}),
       judged("singles", {"tether"}, "group", {"wind", "tether"}, 0.9, {fitted({"wind"}, 0.5), fitted({"tether"}, 0.4)}),
       judged("singles", {"tether"}, "effect", {"tether", "wind"}, 0.9, {fitted({"tether", "wind"}, 0.9)}),
       judged("singles", {"tether"}, "effect", {"body_drag"}, 0.9, {fitted({"body_drag"}, 0.9)})};
   cases.back().truth.separable = false;
-  const benchmark::Score first = main_score(cases, "top1_mocap_imu");
+  const ScoreValue first = main_score(cases, "top1_mocap_imu");
   EXPECT_EQ(first.count, 4U);
   EXPECT_DOUBLE_EQ(*first.value, 0.25);
   EXPECT_FALSE(main_score(cases, "top1_current").value);
   // tether and wind are of one group
-  const benchmark::Score group = main_score(cases, "group_top1");
+  const ScoreValue group = main_score(cases, "group_top1");
   EXPECT_EQ(group.count, 5U);
   EXPECT_DOUBLE_EQ(*group.value, 0.6);
   EXPECT_DOUBLE_EQ(*main_score(cases, "top3").value, 0.6);
@@ -117,9 +116,9 @@ TEST(ScoreValue, RightEffectFirstIsJudgedWhereRivalsAreSeparable) {
   EXPECT_DOUBLE_EQ(*main_score(cases, "top1_current").value, 1);
 }
 
-TEST(ScoreValue, AmongThreeCountsEveryAnswer) {
-  benchmark::ScoredCase c = judged("singles", {"tether"}, "unknown", {}, 0.4,
-                                   {fitted({"wind"}, 0.2), fitted({"tether"}, 0.1), fitted({"com_offset"}, 0.05)});
+TEST(Score, AmongThreeCountsEveryAnswer) {
+  ScoredCase c = judged("singles", {"tether"}, "unknown", {}, 0.4,
+                        {fitted({"wind"}, 0.2), fitted({"tether"}, 0.1), fitted({"com_offset"}, 0.05)});
   c.prediction.unknown = 0.4;
   c.prediction.parameters = 0.05;
   EXPECT_DOUBLE_EQ(*main_score({c}, "top3").value, 1) << "unknown, wind, tether";
@@ -127,21 +126,20 @@ TEST(ScoreValue, AmongThreeCountsEveryAnswer) {
   EXPECT_DOUBLE_EQ(*main_score({c}, "top3").value, 0) << "unknown, wind, none, tether";
 }
 
-TEST(ScoreValue, FalseAlarmsAndWithheldTruths) {
-  const std::vector<benchmark::ScoredCase> cases = {
-      judged("none", {}, "none", {}, 0.9),
-      judged("none", {}, "parameters", {}, 0.9),
-      judged("parameters", {}, "parameters", {}, 0.9),
-      judged("parameters", {}, "unknown", {}, 0.9),
-      judged("parameters", {}, "effect", {"wind"}, 0.6),
-      judged("withheld", {"wind"}, "unknown", {}, 0.9),
-      judged("withheld", {"wind"}, "effect", {"body_drag"}, 0.89),
-      judged("withheld", {"wind"}, "group", {"body_drag", "com_offset"}, 0.95),
-      judged("withheld", {"wind"}, "parameters", {}, 0.95)};
+TEST(Score, FalseAlarmsAndWithheldTruths) {
+  const std::vector<ScoredCase> cases = {judged("none", {}, "none", {}, 0.9),
+                                         judged("none", {}, "parameters", {}, 0.9),
+                                         judged("parameters", {}, "parameters", {}, 0.9),
+                                         judged("parameters", {}, "unknown", {}, 0.9),
+                                         judged("parameters", {}, "effect", {"wind"}, 0.6),
+                                         judged("withheld", {"wind"}, "unknown", {}, 0.9),
+                                         judged("withheld", {"wind"}, "effect", {"body_drag"}, 0.89),
+                                         judged("withheld", {"wind"}, "group", {"body_drag", "com_offset"}, 0.95),
+                                         judged("withheld", {"wind"}, "parameters", {}, 0.95)};
   EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm").value, 0.4);
   EXPECT_DOUBLE_EQ(*main_score(cases, "withheld_unknown").value, 0.25);
   EXPECT_DOUBLE_EQ(*main_score(cases, "withheld_confidently_wrong").value, 0.25);
-  const benchmark::Scores s = score(cases);
+  const Scores s = score(cases);
   EXPECT_FALSE(*line_of(s.main, "false_alarm").meets_must);
   EXPECT_FALSE(*line_of(s.main, "withheld_unknown").meets_must);
   // nine claims, a bin each: right are cases 0, 1, 2 and 5
@@ -149,9 +147,9 @@ TEST(ScoreValue, FalseAlarmsAndWithheldTruths) {
   EXPECT_NEAR(*main_score(cases, "ece").value, error, 1e-12);
 }
 
-TEST(ScoreValue, ClosureIsMeasuredAgainstTheTrueEffect) {
-  benchmark::ScoredCase c = judged("singles", {"tether"}, "effect", {"wind"}, 0.9,
-                                   {fitted({"wind"}, 0.9, 0.7, 0.01), fitted({"tether"}, 0.1, 0.5, 0.01)});
+TEST(Score, ClosureIsMeasuredAgainstTheTrueEffect) {
+  ScoredCase c = judged("singles", {"tether"}, "effect", {"wind"}, 0.9,
+                        {fitted({"wind"}, 0.9, 0.7, 0.01), fitted({"tether"}, 0.1, 0.5, 0.01)});
   c.prediction.refit = 1.0;
   EXPECT_NEAR(*closure(c), 0.6, 1e-12);
   c.prediction.kind = "unknown";
@@ -163,13 +161,13 @@ TEST(ScoreValue, ClosureIsMeasuredAgainstTheTrueEffect) {
   c.prediction.sets.pop_back();
   EXPECT_TRUE(needs_true_fit(c));
   EXPECT_FALSE(closure(c));
-  benchmark::Prediction fit;
+  Prediction fit;
   fit.refit = 1.0;
   fit.sets = {fitted({"tether"}, 0.5, 0.6, 0.01)};
   c.true_fit = fit;
   EXPECT_NEAR(*closure(c), 0.75, 1e-12);
   // median of 0.75, 0.75 and 0
-  benchmark::ScoredCase none = c;
+  ScoredCase none = c;
   none.prediction.kind = "parameters";
   EXPECT_NEAR(*main_score({c, none, c}, "closure_median").value, 0.75, 1e-12);
   c.prediction.kind = "data";
@@ -178,8 +176,8 @@ TEST(ScoreValue, ClosureIsMeasuredAgainstTheTrueEffect) {
   EXPECT_FALSE(needs_true_fit(c));
 }
 
-TEST(ScoreValue, IntervalsCountWhereTheVerdictNamesTheTruth) {
-  benchmark::ScoredCase c = judged("singles", {"wind"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9)});
+TEST(Score, IntervalsCountWhereTheVerdictNamesTheTruth) {
+  ScoredCase c = judged("singles", {"wind"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9)});
   c.prediction.sets[0].values = {{"wind.x_m_s", {0.3, 0.2, 0.4}}, {"wind.y_m_s", {0, -0.1, 0.1}}};
   c.truth.true_values = {{"wind.x_m_s", 0.35}, {"wind.y_m_s", 0.2}, {"wind.z_m_s", 0}};
   EXPECT_EQ(main_score({c}, "interval_coverage").count, 2U);
@@ -190,23 +188,23 @@ TEST(ScoreValue, IntervalsCountWhereTheVerdictNamesTheTruth) {
   EXPECT_FALSE(main_score({c}, "interval_coverage").value);
 }
 
-TEST(ScoreValue, BarsHaveTheirSides) {
-  benchmark::ScoredCase c = judged("singles", {"wind"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9)});
-  EXPECT_TRUE(*line_of(benchmark::score({c}).main, "group_top1").meets_must);
-  EXPECT_TRUE(*line_of(benchmark::score({judged("none", {}, "none", {}, 0.9)}).main, "false_alarm").meets_must);
+TEST(Score, BarsHaveTheirSides) {
+  ScoredCase c = judged("singles", {"wind"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9)});
+  EXPECT_TRUE(*line_of(score({c}).main, "group_top1").meets_must);
+  EXPECT_TRUE(*line_of(score({judged("none", {}, "none", {}, 0.9)}).main, "false_alarm").meets_must);
   // of ten intervals nine hold the truth, then all: 0.80 to 0.97 is asked
   for (int i = 0; i < 10; ++i) {
     const std::string name = "wind." + std::to_string(i);
     c.prediction.sets[0].values[name] = {0.3, 0.2, 0.4};
     c.truth.true_values[name] = i == 0 ? 0.5 : 0.35;
   }
-  EXPECT_TRUE(*line_of(benchmark::score({c}).main, "interval_coverage").meets_must);
+  EXPECT_TRUE(*line_of(score({c}).main, "interval_coverage").meets_must);
   c.truth.true_values["wind.0"] = 0.35;
-  EXPECT_FALSE(*line_of(benchmark::score({c}).main, "interval_coverage").meets_must);
+  EXPECT_FALSE(*line_of(score({c}).main, "interval_coverage").meets_must);
 }
 
-TEST(ScoreValue, PairsAreScoredByTheirNames) {
-  const std::vector<benchmark::ScoredCase> cases = {
+TEST(Score, PairsAreScoredByTheirNames) {
+  const std::vector<ScoredCase> cases = {
       judged("pairs", {"wind", "com_offset"}, "effect", {"com_offset", "wind"}, 0.9),
       judged("pairs", {"wind", "com_offset"}, "effect", {"wind"}, 0.9),
       judged("pairs", {"wind", "com_offset"}, "effect", {"tether", "body_drag"}, 0.9),
@@ -217,14 +215,14 @@ TEST(ScoreValue, PairsAreScoredByTheirNames) {
   EXPECT_NEAR(*main_score(cases, "pairs_f1").value, 2 * 4.0 / 16, 1e-12);
 }
 
-TEST(ScoreValue, HoverAbstains) {
-  const std::vector<benchmark::ScoredCase> cases = {judged("hover", {"tether"}, "group", {"tether", "wind"}, 0.9),
-                                                    judged("hover", {"tether"}, "effect", {"tether"}, 0.49),
-                                                    judged("hover", {"tether"}, "effect", {"tether"}, 0.6),
-                                                    judged("hover", {"tether"}, "parameters", {}, 0.9)};
+TEST(Score, HoverAbstains) {
+  const std::vector<ScoredCase> cases = {judged("hover", {"tether"}, "group", {"tether", "wind"}, 0.9),
+                                         judged("hover", {"tether"}, "effect", {"tether"}, 0.49),
+                                         judged("hover", {"tether"}, "effect", {"tether"}, 0.6),
+                                         judged("hover", {"tether"}, "parameters", {}, 0.9)};
   EXPECT_DOUBLE_EQ(*main_score(cases, "hover_abstain").value, 0.5);
   EXPECT_DOUBLE_EQ(*main_score(cases, "hover_proposes").value, 0);
-  std::vector<benchmark::ScoredCase> proposing = cases;
+  std::vector<ScoredCase> proposing = cases;
   proposing[0].prediction.next = {"wind", "tether"};
   proposing[1].prediction.next = {"wind", "com_offset"};  // neither is the truth
   proposing[2].prediction.next = {"wind", "tether"};      // does not abstain
@@ -232,12 +230,12 @@ TEST(ScoreValue, HoverAbstains) {
   EXPECT_FALSE(main_score(cases, "ece").value) << "hover is no rich excitation";
 }
 
-TEST(ScoreValue, BaselinesStandInTheSameLines) {
-  benchmark::ScoredCase c = judged("singles", {"tether"}, "effect", {"tether"}, 0.9);
+TEST(Score, BaselinesStandInTheSameLines) {
+  ScoredCase c = judged("singles", {"tether"}, "effect", {"tether"}, 0.9);
   c.prediction.baselines["stlsq"] = {{"wind", "tether"}, {"wind", "tether"}};
-  benchmark::ScoredCase none = judged("none", {}, "none", {}, 0.9);
+  ScoredCase none = judged("none", {}, "none", {}, 0.9);
   none.prediction.baselines["stlsq"] = {{}, {}};
-  const benchmark::Scores s = benchmark::score({c, none});
+  const Scores s = score({c, none});
   EXPECT_DOUBLE_EQ(*line_of(s.main, "top1_mocap_imu").baselines.at("stlsq").value, 0);
   EXPECT_DOUBLE_EQ(*line_of(s.main, "group_top1").baselines.at("stlsq").value, 1);
   EXPECT_DOUBLE_EQ(*line_of(s.main, "top3").baselines.at("stlsq").value, 1);
@@ -248,8 +246,8 @@ TEST(ScoreValue, BaselinesStandInTheSameLines) {
 // ---- sparse regression
 
 /// Two flights of 500 rows: residual 0.5 x column 1 + 2 x column 0 + noise of sd 0.2; column 2 and 3 have nothing in it.
-benchmark::Regression mixture() {
-  benchmark::Regression r{{"", "tether", "wind", "com_offset"}, {}, {}};
+Regression mixture() {
+  Regression r{{"", "tether", "wind", "com_offset"}, {}, {}};
   std::uint64_t state = 7;
   const auto draw = [&] {  // uniform of variance 1
     state = state * 6364136223846793005U + 1442695040888963407U;
@@ -269,7 +267,7 @@ benchmark::Regression mixture() {
 
 TEST(Stlsq, KeepsWhatContributes) {
   // coefficients are good to 0.2/sqrt(500) = 0.009: the truth stands at 0.5, the others far below 0.05
-  benchmark::Regression r = mixture();
+  Regression r = mixture();
   EXPECT_EQ(stlsq(r).named, Names{"tether"});
   r.effects[1] = "";
   EXPECT_EQ(stlsq(r).named, Names{}) << "a parameter has no name";
@@ -285,9 +283,9 @@ TEST(Stlsq, NeverThresholdsAParameter) {
     rows(i, 1) = 0.9 * rows(i, 0) + (i < 2 ? other : -other);
     rows(i, 2) = -0.009 * rows(i, 0) + 0.0105 * rows(i, 1);
   }
-  EXPECT_EQ(benchmark::stlsq({{"", "wind"}, {rows.transpose() * rows}, {4}}).named, Names{"wind"});
-  EXPECT_EQ(benchmark::stlsq({{"tether", "wind"}, {rows.transpose() * rows}, {4}}).named, Names{});
+  EXPECT_EQ(stlsq({{"", "wind"}, {rows.transpose() * rows}, {4}}).named, Names{"wind"});
+  EXPECT_EQ(stlsq({{"tether", "wind"}, {rows.transpose() * rows}, {4}}).named, Names{});
 }
 
 }  // namespace
-}  // namespace flappy::gap
+}  // namespace flappy::benchmark

@@ -11,7 +11,7 @@
 
 #include "io/files.hpp"
 
-namespace flappy::flight {
+namespace flappy::flightlog {
 namespace {
 
 namespace fs = std::filesystem;
@@ -363,4 +363,4 @@ TEST_F(FlightLogFolder, RefusesWhatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace flappy::flight
+}  // namespace flappy::flightlog

@@ -13,9 +13,10 @@
 #include "rollout/fly_fixture.hpp"
 #include "rollout/recorder.hpp"
 
-namespace flappy::flight {
+namespace flappy::flightlog {
 namespace {
 
+using flight::Folder, flight::kHover, flight::kPi, flight::message;
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
@@ -385,4 +386,4 @@ TEST(MotorVoltages, FollowTheBattery) {
 }
 
 }  // namespace
-}  // namespace flappy::flight
+}  // namespace flappy::flightlog

@@ -20,7 +20,7 @@ constexpr int kRounds = 10;
 /// Against columns that are alike, of their own sums.
 constexpr double kRidge = 1e-6;
 
-/// Sums of squares of a signature by group, in units of the noise, and rows that were counted.
+/// Sums of squares of residuals by group, in units of the noise, and rows that were counted.
 struct Energy {
   std::vector<double> sum = std::vector<double>(gap::kGroups, 0), rows = std::vector<double>(gap::kGroups, 0);
   double rms(std::size_t g) const { return rows[g] > 0 ? std::sqrt(sum[g] / rows[g]) : 0; }

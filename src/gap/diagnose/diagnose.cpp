@@ -64,15 +64,15 @@ class Diagnoser {
       singles.push_back(vanished(a) ? leave_open(s, columns) : std::move(a));
     }
     std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::log_evidence);
-    // further effects beside the best
+    // further effects jointly with the best
     if (!singles.empty() && singles.front().fitted() && singles.front().log_evidence > parameters) {
       ScoredHypothesis best = singles.front();
       for (int n = 2; n <= options_.most_effects; ++n) {
-        if (!progress(0.7 + 0.1 * n, "looking beside " + best.effects.back())) break;
-        const auto beside = screen(evidence_, fitter_, best.fit, size_columns(best.effects, best.fit));
-        if (beside.empty() || beside.front().gain < rule_.gain.further_screened_nats) break;
+        if (!progress(0.7 + 0.1 * n, "fitting another jointly with " + best.effects.back())) break;
+        const auto further = screen(evidence_, fitter_, best.fit, size_columns(best.effects, best.fit));
+        if (further.empty() || further.front().gain < rule_.gain.further_screened_nats) break;
         std::vector<Screened> set = screened_of(best);
-        set.push_back(beside.front());
+        set.push_back(further.front());
         ScoredHypothesis more = fit_effects(set);
         if (vanished(more) || more.log_evidence < best.log_evidence) break;
         singles.push_back(more);
@@ -83,8 +83,8 @@ class Diagnoser {
     const auto best = std::ranges::max_element(singles, {}, &ScoredHypothesis::log_evidence);
     if (best != singles.end() && best->fitted()) {
       const double log_prior = std::log(rule_.prior.unknown / static_cast<double>(model::effects().size()));
-      ScoredHypothesis beside = explain_freely(Hypothesis(uncertain_, best->effects), best->fit.point, log_prior);
-      if (!beside.terms.empty() && beside.log_evidence > unknown.log_evidence) unknown = std::move(beside);
+      ScoredHypothesis freer = explain_freely(Hypothesis(uncertain_, best->effects), best->fit.point, log_prior);
+      if (!freer.terms.empty() && freer.log_evidence > unknown.log_evidence) unknown = std::move(freer);
       unknown.log_evidence -= std::max(0.0, best->log_evidence - parameters - rule_.unknown.large_effect_nats);
     }
     d.hypotheses.push_back(std::move(unknown));
@@ -242,10 +242,10 @@ class Diagnoser {
   }
 
   /// What every size would change beside a fit.
-  std::vector<SizeColumn> size_columns(const std::vector<std::string>& beside, const Fit& fit) const {
+  std::vector<SizeColumn> size_columns(const std::vector<std::string>& jointly_with, const Fit& fit) const {
     std::vector<SizeColumn> columns;
     std::vector<Candidate> candidates;
-    for (SizeStep& s : size_steps(uncertain_, beside, fit.point.at, options_.withheld)) {
+    for (SizeStep& s : size_steps(uncertain_, jointly_with, fit.point.at, options_.withheld)) {
       columns.push_back({s.effect, s.unknown, {}});
       candidates.push_back(std::move(s.candidate));
     }

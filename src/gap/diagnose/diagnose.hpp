@@ -30,8 +30,8 @@ struct ScoredHypothesis {
   std::vector<std::string> effects;
   double log_evidence = 0;  ///< of all flights
   double probability = 0;
-  std::vector<Term> terms;          ///< of an unknown cause
-  std::vector<std::string> beside;  ///< of an unknown cause: effects that its terms are beside
+  std::vector<Term> terms;                ///< of an unknown cause
+  std::vector<std::string> jointly_with;  ///< of an unknown cause: effects that its terms act jointly with
   /// Of effects and parameters. An effect that would gain nothing is weighed as far as a linear model sees: no residual, and
   /// its size is what flights that tell nothing of it leave probable.
   Fit fit;

@@ -88,10 +88,10 @@ void write_tables(const std::filesystem::path& folder, const Report& r) {
   }
   io::write_atomically(folder / "candidates.csv", candidates);
 
-  std::string terms = "beside,channel,harmonic,function,times_usual,gain_nats\n";
+  std::string terms = "jointly_with,channel,harmonic,function,times_usual,gain_nats\n";
   for (const Unexplained& u : r.unexplained)
-    terms += io::joined(r.beside, "+") + "," + u.channel + "," + u.harmonic + "," + u.function + "," + digits(u.times) +
-             "," + digits(u.gain) + "\n";
+    terms += io::joined(r.jointly_with, "+") + "," + u.channel + "," + u.harmonic + "," + u.function + "," +
+             digits(u.times) + "," + digits(u.gain) + "\n";
   io::write_atomically(folder / "unexplained.csv", terms);
 }
 

@@ -1,6 +1,6 @@
 // Which flight to fly next: the manoeuvre that best tells apart the hypotheses that are left.
 //
-// Every manoeuvre is flown by the most probable vehicle in our own simulator; its log is then carried by every rival. With
+// Every manoeuvre is flown by the most probable vehicle in our own simulator; its log is then predicted by every rival. With
 // Delta the difference of what two rivals A and B predict, where the flights so far leave each of them,
 //   nats(A, B) = 1/2 Delta^T K^-1 Delta      K: noise as declared, what every model of a wing gets wrong (evidence.hpp), what
 //                                            the equations of their effects get wrong, and what is uncertain of B still

@@ -56,8 +56,8 @@ struct Report {
   Conclusion conclusion;
   std::vector<Reported> candidates;  ///< effects, the most probable first; then the kinds without one
   std::vector<Unexplained> unexplained;
-  std::vector<std::string> beside;  ///< effects that are in force beside what is unexplained
-  std::vector<Moved> moved;         ///< parameters beside the concluded effects, the farthest first
+  std::vector<std::string> jointly_with;  ///< effects that are in force beside what is unexplained
+  std::vector<Moved> moved;               ///< parameters beside the concluded effects, the farthest first
   std::vector<GapLocation> places;
   std::optional<double> nominal, refit, effect;  ///< E; the effect: of the best candidate with one
   double noise_floor = 0;

@@ -82,7 +82,7 @@ std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const std:
   for (const model::EffectEntry& e : model::effects()) {
     const std::string id = e.info.id;
     if (std::ranges::count(jointly_with, id) || std::ranges::count(withheld, id)) continue;
-    std::vector<std::string> set = beside;
+    std::vector<std::string> set = jointly_with;
     set.push_back(id);
     const Hypothesis h(uncertain, set);
     const Index first = at.size();

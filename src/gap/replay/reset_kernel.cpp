@@ -23,7 +23,7 @@ FLAPPY_INLINE void store(const Vec3<V>& v, double (*rows)[sim::kLanes<double>], 
   v.z.store(rows[2] + first);
 }
 
-void carry_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
+void reset_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
                  const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept) {
   const V per_interval(1 / interval_s);
   const Vec3<V> imu{V(imu_position_m[0]), V(imu_position_m[1]), V(imu_position_m[2])};
@@ -62,7 +62,7 @@ void carry_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& 
 }  // namespace
 
 extern const ResetBlock reset_block_kernel;
-const ResetBlock reset_block_kernel = carry_block;
+const ResetBlock reset_block_kernel = reset_block;
 
 }  // namespace FLAPPY_ISA
 }  // namespace flappy::gap

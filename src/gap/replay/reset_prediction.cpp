@@ -170,7 +170,7 @@ Rows PredictedFlight::declared_noise(std::uint64_t seed) const {
   for (std::size_t k = 0; k < recording_.intervals(); ++k) {
     double* s = &samples[k * kSignals];
     for (int i = 0; i < 3; ++i) {
-      // the carried rate holds the noise of the sample before
+      // the reset rate holds the noise of the sample before
       const double rate = h.imu.gyro_noise_rad_s * normal(random);
       s[kTorqueX + i] = (rate - before[i]) / recording_.interval_s(k);
       before[i] = rate;
@@ -199,7 +199,7 @@ bool PredictedFlight::covers(std::size_t beat, int channel) const {
 
 std::vector<Rows> PredictedFlight::predict(const std::vector<const Candidate*>& candidates) const {
   const Recording& r = recording_;
-  const ResetBlock reset = *carry_block_kernels[sim::place_of("")];
+  const ResetBlock reset = *reset_block_kernels[sim::place_of("")];
   sim::Batch<double> batch(kVehicles, candidates.front()->vehicle, {kPredictionStep_s, 1, r.world, {}});
   if (r.log.power) sim::storage_of(batch).keep_effects(0);  // the meter needs their rows
   std::vector<ShiftedVoltage> shifted;

@@ -1,4 +1,4 @@
-// The parts of a diagnosis on simulated flights: what carrying, rows, noise and fit find where the truth is known.
+// The parts of a diagnosis on simulated flights: what reset predictions, rows, noise and fit find where the truth is known.
 #include "gap/diagnose/diagnose.hpp"
 
 #include <gtest/gtest.h>
@@ -72,7 +72,7 @@ TEST(BeatRows, ProjectAConstantAndItsHarmonics) {
   for (int c = 0; c < kCoefficients; ++c) EXPECT_NEAR(r[c], expected[c], 5e-3) << c;
 }
 
-TEST(Carried, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
+TEST(ResetPrediction, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
   const std::vector<PredictedFlight> flights = flown(
       "hummingbird_nominal", {"log.power.battery_nominal_V=18", "log.power.rate_hz=500", "log.power.latency_s=0.001",
                               "log.power.voltage_noise_V=0.02", "log.power.current_noise_A=0.01"});
