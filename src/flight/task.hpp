@@ -111,7 +111,8 @@ struct Spread {
 /// Where episodes start.
 struct StartRange {
   sim::Start kind = sim::Start::flying;
-  bool settled = false;  ///< in hover, as a snapshot has it: position and heading are sampled, the rest is the snapshot's
+  bool settled =
+      false;  ///< in hover, as a snapshot has it: position and heading are sampled, the rest is the snapshot's
   Spread position_m[3], rotation_rad[3], velocity_m_s[3], body_rate_rad_s[3];
   double x_low_m = -1e9, x_high_m = 1e9;  ///< x is clamped to it
 };

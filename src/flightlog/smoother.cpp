@@ -6,6 +6,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "flightlog/readings.hpp"
 #include "flightlog/rotation.hpp"
 
 namespace flappy::flightlog {
@@ -50,12 +51,6 @@ double low_pass_share(const ImuHeader& h) {
   double low = 1e-4, high = 1;
   for (int i = 0; i < 60; ++i) (passes((low + high) / 2) > std::numbers::sqrt2 / 2 ? high : low) = (low + high) / 2;
   return (low + high) / 2;
-}
-
-/// Index of the last of `t_s` not after a time; 0 before the first.
-std::size_t index_before(const std::vector<double>& t_s, double at_s) {
-  const auto after = std::ranges::upper_bound(t_s, at_s);
-  return after == t_s.begin() ? 0 : static_cast<std::size_t>(after - t_s.begin()) - 1;
 }
 
 }  // namespace
@@ -124,8 +119,7 @@ void Smoother::read_imu(const FlightLog& log) {
   };
   Vector3d rate_before, force_before;
   for (std::size_t i = 0; i < n; ++i) {
-    const Vector3d rate(s.gyro_x_rad_s[i], s.gyro_y_rad_s[i], s.gyro_z_rad_s[i]);
-    const Vector3d force(s.accel_x_m_s2[i], s.accel_y_m_s2[i], s.accel_z_m_s2[i]);
+    const auto [rate, force] = imu_reading(s, i);
     const double centre_s = s.t_s[i] - late_s;
     const bool begins = i == 0 || !follows(i);
     if (i > 0 && begins)
@@ -142,24 +136,16 @@ void Smoother::read_imu(const FlightLog& log) {
 }
 
 auto Smoother::read_poses(const FlightLog& log) const -> std::vector<Pose> {
-  const MocapStream& m = log.mocap;
   std::vector<Pose> poses;
-  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
-    const double t_s = m.t_s[i] - log.header.mocap.latency_s;
-    const auto same = [&](const Column& c) { return c[i] == c[i - 1]; };
-    const bool repeated =
-        i > 0 && same(m.x_m) && same(m.y_m) && same(m.z_m) && same(m.qw) && same(m.qx) && same(m.qy) && same(m.qz);
-    if (t_s < bounds_s_.front() || t_s >= bounds_s_.back() - kSame_s ||
-        (repeated && log.header.mocap.position_noise_m > 0))
-      continue;
-    poses.push_back({t_s, {m.x_m[i], m.y_m[i], m.z_m[i]}, Quaterniond(m.qw[i], m.qx[i], m.qy[i], m.qz[i])});
-  }
+  for (const PoseReading& p : pose_readings(log))
+    if (p.t_s >= bounds_s_.front() && p.t_s < bounds_s_.back() - kSame_s)
+      poses.push_back({p.t_s, p.position_m, p.attitude()});
   return poses;
 }
 
 void Smoother::lay_nodes(const std::vector<Pose>& poses) {
   std::size_t next_pose = 0;
-  for (std::size_t k = index_before(bounds_s_, poses.front().t_s); next_pose < poses.size(); ++k) {
+  for (std::size_t k = last_not_after(bounds_s_, poses.front().t_s); next_pose < poses.size(); ++k) {
     if (next_pose > 0 && bounds_s_[k] > nodes_.back().t_s + kSame_s) nodes_.push_back({bounds_s_[k], k, {}});
     for (; next_pose < poses.size() && poses[next_pose].t_s < bounds_s_[k + 1] - kSame_s; ++next_pose) {
       const double t_s = poses[next_pose].t_s;
@@ -324,13 +310,13 @@ std::size_t Smoother::node_before(double t_s) const {
 }
 
 double Smoother::imu_bound_s(double t_s) const {
-  const std::size_t k = index_before(bounds_s_, t_s);
+  const std::size_t k = last_not_after(bounds_s_, t_s);
   return k + 1 < bounds_s_.size() && bounds_s_[k + 1] - t_s < t_s - bounds_s_[k] ? bounds_s_[k + 1] : bounds_s_[k];
 }
 
 Vector3d Smoother::mean(const MeanSpline& signal, double from_s, double to_s) const {
   Vector3d sum = Vector3d::Zero();
-  for (std::size_t k = index_before(bounds_s_, from_s); k + 1 < bounds_s_.size() && bounds_s_[k] < to_s; ++k) {
+  for (std::size_t k = last_not_after(bounds_s_, from_s); k + 1 < bounds_s_.size() && bounds_s_[k] < to_s; ++k) {
     const double length = bounds_s_[k + 1] - bounds_s_[k];
     const double u = std::max(0.0, (from_s - bounds_s_[k]) / length), v = std::min(1.0, (to_s - bounds_s_[k]) / length);
     if (v > u) sum += length * signal.integral(k, u, v);
@@ -348,9 +334,9 @@ TorsoMotion Smoother::at(double t_s) const {
 
 bool Smoother::covers(double from_s, double to_s) const {
   if (from_s < begin_s() || to_s > end_s()) return false;
-  for (std::size_t k = index_before(bounds_s_, from_s); k < gap_.size() && bounds_s_[k] < to_s; ++k)
+  for (std::size_t k = last_not_after(bounds_s_, from_s); k < gap_.size() && bounds_s_[k] < to_s; ++k)
     if (gap_[k]) return false;
-  for (std::size_t i = index_before(pose_s_, from_s); i + 1 < pose_s_.size() && pose_s_[i] < to_s; ++i)
+  for (std::size_t i = last_not_after(pose_s_, from_s); i + 1 < pose_s_.size() && pose_s_[i] < to_s; ++i)
     if (pose_s_[i + 1] - pose_s_[i] > longest_unseen_s_) return false;
   return true;
 }
@@ -363,7 +349,7 @@ sim::VoltageScript motor_voltages(const FlightLog& log) {
   const double late_s = log.header.power->latency_s, nominal_V = log.header.power->battery_nominal_V;
   for (std::size_t i = 0; i < script.t_s.size(); ++i) {
     const double at_s = script.t_s[i] + late_s;
-    const std::size_t k = std::min(index_before(t, at_s), t.size() - 2);
+    const std::size_t k = std::min(last_not_after(t, at_s), t.size() - 2);
     const double share = std::clamp((at_s - t[k]) / (t[k + 1] - t[k]), 0.0, 1.0);
     const Column& v = log.power->battery_V;
     const double scale = (v[k] + share * (v[k + 1] - v[k])) / nominal_V;
@@ -375,7 +361,7 @@ sim::VoltageScript motor_voltages(const FlightLog& log) {
 
 std::array<double, 2> strokes_at(const WingsStream& wings, double rate_hz, double t_s) {
   const Column& t = wings.t_s;
-  const std::size_t k = index_before(t, t_s);
+  const std::size_t k = last_not_after(t, t_s);
   if (k < 1 || k + 2 >= t.size() || t[k + 2] - t[k - 1] > 3.5 / rate_hz) return {std::nan(""), std::nan("")};
   std::array<double, 2> stroke = {0, 0};
   for (std::size_t i = k - 1; i <= k + 2; ++i) {

@@ -209,8 +209,7 @@ TEST(SensorEffects, WarmUpFromTheStart) {
 }
 
 template <class T>
-Fleet<T> hover(std::size_t count, const std::string& set, bool beside,
-               const gap::EffectValues& effects = kAll) {
+Fleet<T> hover(std::size_t count, const std::string& set, bool beside, const gap::EffectValues& effects = kAll) {
   rollout::FlyConfig c = read_fly_config(kHover);
   c.fleet.batch.instruction_set = set;
   c.fleet.batch.threads = 1;

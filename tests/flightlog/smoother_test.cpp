@@ -16,10 +16,10 @@
 namespace flappy::flightlog {
 namespace {
 
-using flight::Folder, flight::kHover, flight::kPi, flight::message;
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
+using flight::Folder, flight::kHover, flight::kPi, flight::message;
 
 constexpr double kBeat_Hz = 34;
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "flightlog/check/check_parts.hpp"
+#include "flightlog/readings.hpp"
 #include "flightlog/rotation.hpp"
 #include "io/statistics.hpp"
 
@@ -61,23 +62,17 @@ const std::vector<Matrix3d>& signed_permutations() {
 }
 
 SensorMotion::SensorMotion(const flightlog::FlightLog& log) {
-  const flightlog::MocapStream& m = log.mocap;
-  const flightlog::ImuStream& s = log.imu;
-  const double start_s = m.t_s.front() - log.header.mocap.latency_s;
-  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
-    const Vector3d position(m.x_m[i], m.y_m[i], m.z_m[i]);
-    const std::array<double, 4> quaternion = {m.qw[i], m.qx[i], m.qy[i], m.qz[i]};
-    const bool repeated = i > 1 && log.header.mocap.position_noise_m > 0 && position == position_m_.back() &&
-                          quaternion == quaternion_.back();
-    if (repeated) continue;
-    mocap_t_s_.push_back(m.t_s[i] - log.header.mocap.latency_s - start_s);
-    position_m_.push_back(position);
-    quaternion_.push_back(quaternion);
+  const double start_s = log.mocap.t_s.front() - log.header.mocap.latency_s;
+  for (const PoseReading& p : pose_readings(log)) {
+    mocap_t_s_.push_back(p.t_s - start_s);
+    position_m_.push_back(p.position_m);
+    quaternion_.push_back(p.quaternion);
   }
-  for (std::size_t i = 0; i < s.t_s.size(); ++i) {
-    imu_t_s_.push_back(s.t_s[i] - log.header.imu.latency_s - start_s);
-    gyro_rad_s_.emplace_back(s.gyro_x_rad_s[i], s.gyro_y_rad_s[i], s.gyro_z_rad_s[i]);
-    accel_m_s2_.emplace_back(s.accel_x_m_s2[i], s.accel_y_m_s2[i], s.accel_z_m_s2[i]);
+  for (std::size_t i = 0; i < log.imu.t_s.size(); ++i) {
+    const auto [rate, force] = imu_reading(log.imu, i);
+    imu_t_s_.push_back(log.imu.t_s[i] - log.header.imu.latency_s - start_s);
+    gyro_rad_s_.push_back(rate);
+    accel_m_s2_.push_back(force);
   }
   longest_mocap_s_ = longest_bridged(mocap_t_s_);
   longest_imu_s_ = longest_bridged(imu_t_s_);

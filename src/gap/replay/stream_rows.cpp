@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "flightlog/readings.hpp"
 #include "flightlog/rotation.hpp"
 
 namespace flappy::gap {
@@ -20,12 +21,6 @@ struct Reckoned {
   std::vector<Vector3d> position_m, velocity_m_s;
   std::vector<Quaterniond> attitude;
 };
-
-std::size_t before(const std::vector<double>& t_s, double at_s) {
-  const auto after = std::ranges::upper_bound(t_s, at_s);
-  const auto k = std::max<std::ptrdiff_t>(after - t_s.begin() - 1, 0);
-  return static_cast<std::size_t>(std::min(k, static_cast<std::ptrdiff_t>(t_s.size()) - 2));
-}
 
 /// `force`, `turn`: of each interval of the recording, as measured or of noise alone. Forces are turned into W by the
 /// smoothed attitude, which is better than the reckoned one.
@@ -87,8 +82,6 @@ std::vector<StreamRow> differences(const Recording& r, const std::vector<double>
 }  // namespace
 
 std::vector<StreamRow> stream_rows(const Recording& r) {
-  const flightlog::MocapStream& m = r.log.mocap;
-  const double late_s = r.log.header.mocap.latency_s;
   const Vector3d bias = r.smoother.gyro_bias_rad_s((r.begin_s + r.last_s) / 2);
   std::vector<Vector3d> turn;
   double from_s = r.begin_s;
@@ -99,17 +92,16 @@ std::vector<StreamRow> stream_rows(const Recording& r) {
   const Reckoned x = reckon(r, r.force_m_s2, turn, r.world.gravity_m_s2);
   const Vector3d arm(r.log.header.imu.position_m.data());
   std::vector<double> pose_s, samples;
-  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
-    const double t_s = m.t_s[i] - late_s;
+  for (const flightlog::PoseReading& seen : flightlog::pose_readings(r.log)) {
+    const double t_s = seen.t_s;
     if (t_s < x.t_s.front() || t_s >= x.t_s.back()) continue;
-    const std::size_t k = before(x.t_s, t_s);
+    const std::size_t k = flightlog::last_not_after(x.t_s, t_s);
     const double dt = t_s - x.t_s[k], share = dt / (x.t_s[k + 1] - x.t_s[k]);
     const Vector3d a = (x.velocity_m_s[k + 1] - x.velocity_m_s[k]) / (x.t_s[k + 1] - x.t_s[k]);
     const Quaterniond reckoned = x.attitude[k].slerp(share, x.attitude[k + 1]);
-    const Quaterniond seen(m.qw[i], m.qx[i], m.qy[i], m.qz[i]);
-    const Vector3d path = Vector3d(m.x_m[i], m.y_m[i], m.z_m[i]) + r.smoother.at(t_s).attitude * arm -
+    const Vector3d path = seen.position_m + r.smoother.at(t_s).attitude * arm -
                           (x.position_m[k] + dt * x.velocity_m_s[k] + dt * dt / 2 * a);
-    const Vector3d off = flightlog::logarithm(seen * reckoned.conjugate());
+    const Vector3d off = flightlog::logarithm(seen.attitude() * reckoned.conjugate());
     pose_s.push_back(t_s);
     samples.insert(samples.end(), {path.x(), path.y(), path.z(), off.x(), off.y(), off.z()});
   }
@@ -134,10 +126,10 @@ std::vector<StreamRow> stream_noise(const Recording& r, std::uint64_t seed) {
     t_s.push_back(r.end_s[k]);
   }
   std::vector<double> pose_s, samples;
-  for (const double seen_s : r.log.mocap.t_s) {
-    const double at_s = seen_s - h.mocap.latency_s;
+  for (const flightlog::PoseReading& seen : flightlog::pose_readings(r.log)) {
+    const double at_s = seen.t_s;
     if (at_s < t_s.front() || at_s >= t_s.back()) continue;
-    const std::size_t k = before(t_s, at_s);
+    const std::size_t k = flightlog::last_not_after(t_s, at_s);
     const Vector3d p = noise(h.mocap.position_noise_m) - path[k], q = noise(h.mocap.attitude_noise_rad) - angle[k];
     pose_s.push_back(at_s);
     samples.insert(samples.end(), {p.x(), p.y(), p.z(), q.x(), q.y(), q.z()});

@@ -1,0 +1,34 @@
+// What motion capture and IMU of a log read, as vectors: the one place that takes a log's columns for motion.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <vector>
+
+#include "flightlog/flight_log.hpp"
+
+namespace flappy::flightlog {
+
+/// A pose of motion capture at the instant at which it was so: t_s of the log less the declared latency.
+struct PoseReading {
+  double t_s;
+  Eigen::Vector3d position_m;
+  std::array<double, 4> quaternion;  ///< as logged, declared w, x, y, z
+  Eigen::Quaterniond attitude() const { return {quaternion[0], quaternion[1], quaternion[2], quaternion[3]}; }
+};
+/// Of the log, without lost ones: where noise is declared, these repeat the pose before.
+std::vector<PoseReading> pose_readings(const FlightLog& log);
+
+/// A sample of the IMU, in B.
+struct ImuReading {
+  Eigen::Vector3d rate_rad_s, force_m_s2;
+};
+inline ImuReading imu_reading(const ImuStream& s, std::size_t i) {
+  return {{s.gyro_x_rad_s[i], s.gyro_y_rad_s[i], s.gyro_z_rad_s[i]},
+          {s.accel_x_m_s2[i], s.accel_y_m_s2[i], s.accel_z_m_s2[i]}};
+}
+
+/// Index of the last of increasing `times` not after a time; 0 before the first.
+std::size_t last_not_after(const std::vector<double>& times, double t_s);
+
+}  // namespace flappy::flightlog
