@@ -13,6 +13,9 @@
 namespace flappy::flight {
 namespace {
 
+using flightlog::Column, flightlog::FlightLog, flightlog::ImuStream, flightlog::MocapStream;
+using rollout::FlyConfig, rollout::read_fly_config;
+
 const gap::EffectValues kAll = {
     {"gyro_bias", {{"x_rad_s", 0.05}, {"y_rad_s", -0.3}, {"z_rad_s", 0.1}, {"warm_up_s", 0.5}}},
     {"accelerometer_misalignment", {{"x_rad", 0.3}, {"y_rad", -0.2}, {"z_rad", 0.3}}},
@@ -82,7 +85,7 @@ TEST(SensorEffects, AreUndoneByTheDiagnosis) {
 TEST(SensorEffects, CarryTheMarkerOnTheTrueAttitude) {
   const gap::EffectValues offset = {*kAll.find("marker_offset")};
   const std::string blurred = "sensors.mocap.attitude_noise_rad=0.1", sharp = "sensors.mocap.attitude_noise_rad=1e-12";
-  const FlightLog seen = open_loop(offset, {blurred}), same = open_loop(offset, {sharp});
+  const flightlog::FlightLog seen = open_loop(offset, {blurred}), same = open_loop(offset, {sharp});
   EXPECT_GT(farthest(seen.mocap.qx, same.mocap.qx), 0.1);
   EXPECT_EQ(seen.mocap.x_m, same.mocap.x_m);
   EXPECT_EQ(seen.mocap.y_m, same.mocap.y_m);
@@ -104,7 +107,8 @@ TEST(SensorEffects, RectifyTheVibrationOfTheBeatBefore) {
   const FlyConfig c = read_fly_config(source_path("configs/fly/open_loop.toml"));
   const auto per_hold =
       static_cast<std::uint32_t>(std::llround(c.vehicle.driver.flapping_Hz * c.vehicle.driver.hold_s * 0x1p32));
-  for (Column ImuStream::*axis : {&ImuStream::accel_x_m_s2, &ImuStream::accel_y_m_s2, &ImuStream::accel_z_m_s2}) {
+  for (flightlog::Column ImuStream::*axis :
+       {&ImuStream::accel_x_m_s2, &ImuStream::accel_y_m_s2, &ImuStream::accel_z_m_s2}) {
     const Column &f = plain.imu.*axis, &y = seen.imu.*axis;
     double bias = 0, largest = 0, mean_of_bias = 0;
     std::vector<double> beat;
@@ -144,9 +148,10 @@ void expect_poses_of(const FlightLog& seen, const FlightLog& fine, double latenc
     if (t_s < 1e-4) continue;  // the first of `fine`
     const auto k = static_cast<std::size_t>(std::lround(t_s / 1e-4)) - 1;
     ASSERT_NEAR(n.t_s[k] - latency_s, t_s, 1e-8);
-    for (Column MocapStream::*axis : {&MocapStream::x_m, &MocapStream::y_m, &MocapStream::z_m})
+    for (flightlog::Column MocapStream::*axis : {&MocapStream::x_m, &MocapStream::y_m, &MocapStream::z_m})
       position_m = std::max(position_m, std::abs((m.*axis)[i] - (n.*axis)[k]));
-    for (Column MocapStream::*axis : {&MocapStream::qw, &MocapStream::qx, &MocapStream::qy, &MocapStream::qz})
+    for (flightlog::Column MocapStream::*axis :
+         {&MocapStream::qw, &MocapStream::qx, &MocapStream::qy, &MocapStream::qz})
       attitude = std::max(attitude, std::abs((m.*axis)[i] - (n.*axis)[k]));
   }
   std::printf("%.3g %.3g\n", position_m, attitude);
@@ -161,7 +166,7 @@ TEST(SensorEffects, ShowPosesOfTheTimeBefore) {
   const double latency_s = plain.header.mocap.latency_s;
   for (const double delay_s : {0.0123, 0.02, -0.0071, -0.02}) {
     const gap::EffectValues late = {{"mocap_delay", {{"delay_s", delay_s}}}};
-    const FlightLog seen = open_loop(late, kQuiet);
+    const flightlog::FlightLog seen = open_loop(late, kQuiet);
     ASSERT_GT(seen.mocap.t_s.size() + 10, plain.mocap.t_s.size());
     for (std::size_t i = 0; i < seen.mocap.t_s.size(); ++i) ASSERT_EQ(seen.mocap.t_s[i], plain.mocap.t_s[i]);
     expect_poses_of(seen, fine, latency_s, delay_s);
@@ -175,7 +180,7 @@ TEST(SensorEffects, ShowPosesOfTheTimeBefore) {
 }
 
 TEST(SensorEffects, RefuseADelayThatCannotBe) {
-  FlyConfig c = read_fly_config(kHover);
+  rollout::FlyConfig c = rollout::read_fly_config(kHover);
   const auto refusal = [&](double delay_s) -> std::string {
     model::Vehicle v = c.vehicle;
     v.effects["mocap_delay"]["delay_s"] = delay_s;
@@ -210,7 +215,7 @@ TEST(SensorEffects, WarmUpFromTheStart) {
 
 template <class T>
 Fleet<T> hover(std::size_t count, const std::string& set, bool beside, const gap::EffectValues& effects = kAll) {
-  rollout::FlyConfig c = read_fly_config(kHover);
+  rollout::FlyConfig c = rollout::read_fly_config(kHover);
   c.fleet.batch.instruction_set = set;
   c.fleet.batch.threads = 1;
   Fleet<T> fleet(count, c.vehicle, c.fleet);

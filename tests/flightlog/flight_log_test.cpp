@@ -131,7 +131,11 @@ TEST(FlightLog, RefusesFaultyHeaders) {
   EXPECT_EQ(header("schema = 1", "schema = 2"),
             "log/flight.toml:1:10: schema: 2 is read by a newer flappy than this one; accepted: 1");
   EXPECT_EQ(header("schema = 1", "schema = 0"), "log/flight.toml:1:10: schema: 0 is read by no flappy; accepted: 1");
-  EXPECT_EQ(header("gravity_m_s2", "gravity"),
+  EXPECT_EQ(
+      header("gravity_m_s2", "gravity"),
+      "log/flight.toml:5:1: gravity: unknown key; accepted: ambient, flapping_Hz, gravity_m_s2, imu, mocap, power, "
+      "schema, vehicle, vehicle_sha256, wings");
+  EXPECT_EQ(header("gravity_m_s2 = 9.8", "# "),
             "log/flight.toml: gravity_m_s2: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(header("flapping_Hz = 34.0", "flapping_Hz = -34.0"),
             "log/flight.toml:4:15: flapping_Hz: -34 is out of range; accepted: a number above 0, at most 1000");

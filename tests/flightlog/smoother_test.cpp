@@ -110,7 +110,7 @@ class Sensors {
 
 /// Sensors of the paper, with the IMU away from the origin.
 flightlog::FlightHeader header(double imu_late_s) {
-  ImuSensor imu;
+  flight::ImuSensor imu;
   imu.rate_hz = 500;
   imu.latency_s = imu_late_s;
   imu.position_m = {0.012, -0.004, 0.02};
@@ -161,14 +161,14 @@ TEST(Smoother, OfPerfectSensorsIsTheMotion) {
 }
 
 TEST(Smoother, UndoesADeclaredLowPass) {
-  ImuSensor imu;
+  flight::ImuSensor imu;
   imu.rate_hz = 500;
   imu.low_pass_hz = 80;
   flightlog::FlightHeader h = header(0);
   const flightlog::ImuHeader slow = rollout::imu_header(imu);
   h.imu.bandwidth_hz = slow.bandwidth_hz;
   h.imu.latency_s = slow.latency_s;
-  const double share = low_pass_share(80, 0.002);
+  const double share = flight::low_pass_share(80, 0.002);
   const flightlog::FlightLog log = Sensors(1).log(h, 4, {}, false, 0, share);
   const Off off = largest_off(flightlog::Smoother(log, "flight"), 0.5, 3.5);
   EXPECT_LT(off.rate_rad_s, 0.05);  // 7 rad/s at 34 Hz would lose 8 %
@@ -315,7 +315,7 @@ TEST(Smoother, OfSimulatedFlightsHasHonestCovariances) {
   std::vector<double> rate_off;
   double bias_off = 0;
   for (const std::string name : {"0000", "0001", "0002", "0003"}) {
-    const fs::path flight = options.log_folder / name;
+    const std::filesystem::path flight = options.log_folder / name;
     const flightlog::Smoother smoother(flightlog::read_flight_log(flight), flight);
     const io::CsvTable truth = io::read_csv(flight / "truth.csv");
     const auto at = [&](std::size_t row, const char* a, const char* b, const char* c) {

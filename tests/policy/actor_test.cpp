@@ -164,7 +164,7 @@ TEST(Actor, HoldsItsActionAndGathersWhatItEarns) {
     fleet.step();
     gained += fleet.reward(0);
     for (std::size_t k = 0; k < kActions; ++k) ASSERT_NEAR(fleet.action(0)[k], acted[k], 1e-12) << tick;
-    ASSERT_NEAR(fleet.gain(0), gained, 1e-12) << tick;
+    ASSERT_NEAR(fleet.action_reward(0), gained, 1e-12) << tick;
     ASSERT_EQ(fleet.tick(1), tick < 7 ? tick + 1 : tick - 6);
   }
 }

@@ -234,11 +234,11 @@ int main(int argc, char** argv) {
       .one_at_a_time();  // or one given before it takes the config too
   app.expect_commands(0, 1);
   return program.run(argc, argv, [&] {
-    if (*batch) return program.write_json(bench::fly_batch(config, overrides));
-    if (*learner) return program.write_json(bench::learner(options));
+    if (batch.given()) return program.write_json(bench::fly_batch(config, overrides));
+    if (learner.given()) return program.write_json(bench::learner(options));
     const model::Vehicle v = model::read_vehicle(vehicle);
-    program.write_json(*convergence ? bench::convergence(v)
-                       : *busy      ? bench::busy(v, options)
-                                    : bench::speed(v, options));
+    program.write_json(convergence.given() ? bench::convergence(v)
+                       : busy.given()      ? bench::busy(v, options)
+                                           : bench::speed(v, options));
   });
 }

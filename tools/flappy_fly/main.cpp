@@ -159,7 +159,7 @@ int main(int argc, char** argv) {
   io::Option seeded =
       app.option("--seed", seed, "in place of flight.seed").range(std::uint64_t{0}, std::uint64_t{INT64_MAX});
   return program.run(argc, argv, [&] {
-    if (*seeded) overrides.push_back("flight.seed=" + std::to_string(seed));
+    if (seeded.given()) overrides.push_back("flight.seed=" + std::to_string(seed));
     const rollout::FlyConfig config = rollout::read_fly_config(config_name, overrides);
     options.log_folder = log;
     io::ProgressLine progress("flown");
