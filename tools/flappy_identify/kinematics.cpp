@@ -18,7 +18,7 @@ struct Settings {
   MapSource source;
   std::string measured, csv, svg;
   sim::Input input;
-  io::Option amplitude = nullptr;
+  io::Option amplitude;
   double from_s = -std::numeric_limits<double>::infinity(), to_s = std::numeric_limits<double>::infinity();
 };
 
