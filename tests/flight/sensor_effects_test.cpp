@@ -33,7 +33,7 @@ flightlog::FlightLog open_loop(const gap::EffectValues& effects, const std::vect
   for (const auto& [id, values] : effects)
     for (const auto& [name, value] : values)
       overrides.push_back("vehicle.effects." + id + "." + name + "=" + std::to_string(value));
-  rollout::fly(rollout::read_fly_config(source_path("configs/rollout::fly/open_loop.toml"), overrides),
+  rollout::fly(rollout::read_fly_config(source_path("configs/fly/open_loop.toml"), overrides),
                {.log_folder = folder / "log"});
   return flightlog::read_flight_log(folder / "log");
 }

@@ -63,7 +63,7 @@ TEST(FlyConfig, DrawsFromThePosteriorOfTheVehicle) {
   EXPECT_NEAR(c.vehicle_of(0).torso.mass_kg, 0.012, 6e-4);  // six of its sd
   EXPECT_EQ(c.vehicle_sha256, "");
   for (const auto& [file, text] : c.resolved) folder.write(file, text);
-  EXPECT_EQ(rollout::fly(rollout::read_fly_config(folder / "rollout::fly.toml"), {.count = 2}).hash,
+  EXPECT_EQ(rollout::fly(rollout::read_fly_config(folder / "fly.toml"), {.count = 2}).hash,
             rollout::fly(c, {.count = 2}).hash);
   EXPECT_EQ(refusal({"randomisation=posterior"}),
             "--set randomisation=posterior: randomisation: the vehicle has no [posterior]; accepted: a file of "
@@ -159,7 +159,7 @@ TEST(FlyConfig, ResolvedTextsFlyTheSame) {
         rollout::read_fly_config(source_path(std::string("configs/fly/") + name + ".toml"),
                                  {"flight.duration_s=0.1", "controller.attitude.yaw.p=0.1", "flight.seed=3"});
     for (const auto& [file, text] : c.resolved) folder.write(file, text);
-    EXPECT_EQ(rollout::fly(rollout::read_fly_config(folder / "rollout::fly.toml"), {.count = 2}).hash,
+    EXPECT_EQ(rollout::fly(rollout::read_fly_config(folder / "fly.toml"), {.count = 2}).hash,
               rollout::fly(c, {.count = 2}).hash)
         << name;
   }
