@@ -62,8 +62,7 @@ FinishedRun read_finished_run(const fs::path& folder) {
              "the one with SHA-256 " + sha256 + ", as " + end.string() + " says");
   });
 
-  const auto policy =
-      std::make_shared<const policy::Actor>(io::read_of_run(folder, [&] { return policy::read_actor(actor); }));
+  const auto policy = std::make_shared<const policy::Actor>(policy::read_actor(actor));
   const TrainConfig config =
       io::read_of_run(folder, [&] { return read_train_config(folder / "config" / "train.toml"); });
   if (config.sha256 != run.info.config_sha256)
