@@ -56,7 +56,7 @@ std::shared_ptr<const policy::Actor> actor(const Task& task) {
 FleetOptions options(const std::string& name) {
   const bool adaptive = name == "arc";
   Controller c;
-  c.kind = controller_kind(name);
+  c.kind = adaptive ? kind_of<ArcController>() : kind_of<PidController>();
   double gain = 0.5;
   for (ControllerField& f : fields(c)) {
     *f.value = std::min(std::max(gain, f.range.low + 0.01), f.range.high);
