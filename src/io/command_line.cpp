@@ -67,7 +67,7 @@ Command Command::command(const std::string& name, const std::string& help) const
   return Command(app_->add_subcommand(name, help));
 }
 Command Command::hidden_command(const std::string& name) const {
-  return Command(app_->add_subcommand(name)->group("")->allow_extras());
+  return Command(app_->add_subcommand(name)->group("")->allow_extras()->fallthrough(false));
 }
 void Command::expect_commands(std::size_t least, std::size_t most) const { app_->require_subcommand(least, most); }
 bool Command::given() const { return app_->parsed(); }
