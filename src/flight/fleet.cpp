@@ -433,6 +433,9 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
     for (int r = 0; r < kFlightRows<T>; ++r) h = sim::mixed(h, sim::bits_of(rows_of<T>(f)[r][lane]));
     for (const std::uint32_t word : {f.flapper[lane], f.flight[lane], f.tick[lane], f.segment[lane], f.ended[lane]})
       h = sim::mixed(h, word);
+    auto& body = sim::storage_of(storage_->batch);
+    body.for_states(i, body.effects_of_lane(i) & model::sensor_effects(),
+                    [&](T x) { h = sim::mixed(h, sim::bits_of(x)); });
     const auto add = [&, lane = lane](const std::vector<T>& rows_of_all, std::size_t size) {
       for (std::size_t k = static_cast<std::size_t>(lane); k < size; k += kLanes<T>)
         h = sim::mixed(h, sim::bits_of(rows_of_all[i / kLanes<T> * size + k]));

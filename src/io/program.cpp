@@ -22,7 +22,7 @@ std::string subcommands(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App* at = &app;
   while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
   std::vector<std::string> names;
-  for (const CLI::App* each : at->get_subcommands([](const CLI::App*) { return true; }))
+  for (const CLI::App* each : at->get_subcommands([](const CLI::App* each) { return !each->get_group().empty(); }))
     names.push_back(each->get_name());
   return "; accepted: " + joined(names);
 }

@@ -301,7 +301,8 @@ std::uint64_t Batch<T>::hash(std::size_t first, std::size_t last) const {
     for (const auto& row : block.state) h = mixed(h, bits_of(row[lane]));
     for (const auto& row : block.drive) h = mixed(h, bits_of(row[lane]));
     h = mixed(mixed(h, block.phase[lane]), block.status[lane]);
-    storage_->for_states(i, storage_->effects_of_lane(i), [&](T number) { h = mixed(h, bits_of(number)); });
+    storage_->for_states(i, storage_->effects_of_lane(i) & ~model::sensor_effects(),
+                         [&](T number) { h = mixed(h, bits_of(number)); });
     all = mixed(all, h);
   }
   return all;

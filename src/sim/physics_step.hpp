@@ -180,13 +180,15 @@ FLAPPY_INLINE void read_meter(const Surroundings<T>& s, const Sides<Hinges<T>>& 
 
 /// What a motor draws in a step beyond what it would have at the driver's voltage `given_V` without effects: V i h, at the rate at the
 /// step's end, as that is the one that turns the wing; exactly 0 where effects leave the motor alone. `slip_rad_s`: its play's rate.
+/// Lanes without effects have no figures.
 template <class T>
-FLAPPY_INLINE T extra_work_J(const Hinges<T>& h, const SideFigures<T>& f, const T& given_V, const T& rate_rad_s,
-                             const T& slip_rad_s, const T& step_s) {
-  const auto work = [&](const T& volt, const T& rate) { return T(volt * T(volt - f.back_emf_V_s * rate)); };
-  const T share = f.resistance_ohm / h.resistance_ohm;
-  return T(step_s / f.resistance_ohm) *
-         T(share * work(h.voltage_V, T(rate_rad_s + slip_rad_s)) - work(given_V, rate_rad_s));
+FLAPPY_INLINE T extra_work_J(const SideParameters<T>& p, const Hinges<T>& h, const SideFigures<T>& f, const T& given_V,
+                             const T& rate_rad_s, const T& slip_rad_s, const T& step_s) {
+  const auto power_W = [&](const T& volt, const T& rate) {
+    return T(volt * T(p.conductance_S * volt - p.emf_current_A_s * rate));
+  };
+  const T share = where(h.resistance_ohm == f.resistance_ohm, T(1), T(f.resistance_ohm / h.resistance_ohm));
+  return step_s * T(share * power_W(h.voltage_V, T(rate_rad_s + slip_rad_s)) - power_W(given_V, rate_rad_s));
 }
 
 /// Stage by stage, in the order of effect.hpp.
@@ -375,9 +377,10 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
   feel(p, x, pose, acting.air, force.z, k.step, held);
   if constexpr (with_effects) {
     const auto& [left, right] = acting.s.figures;
-    *effects.more_J +=
-        extra_work_J(acting.hinges.left, left, voltages.left_V, x.left.stroke_rate_rad_s, slip_left, k.step) +
-        extra_work_J(acting.hinges.right, right, voltages.right_V, x.right.stroke_rate_rad_s, slip_right, k.step);
+    *effects.more_J += extra_work_J(vehicle.left, acting.hinges.left, left, voltages.left_V, x.left.stroke_rate_rad_s,
+                                    slip_left, k.step) +
+                       extra_work_J(vehicle.right, acting.hinges.right, right, voltages.right_V,
+                                    x.right.stroke_rate_rad_s, slip_right, k.step);
     remember(effects, acting);
   }
 }

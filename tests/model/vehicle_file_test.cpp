@@ -364,8 +364,8 @@ TEST_F(VehicleFile, RefusesAnInertiaOfNoBody) {
 }
 
 TEST_F(VehicleFile, RefusesWhatIsNoVehicle) {
-  EXPECT_EQ(edited("", "schema = 1", "schema = ^2"), "^: schema: 2 is out of range; accepted: an integer from 1 to 1");
-  EXPECT_EQ(edited("", "schema = 1\n", ""), "^: schema: is missing; accepted: an integer from 1 to 1");
+  EXPECT_EQ(edited("", "schema = 1", "schema = ^2"), "^: schema: 2 is read by a newer flappy than this one; accepted: 1");
+  EXPECT_EQ(edited("", "schema = 1\n", ""), "^: schema: is missing; accepted: 1");
   EXPECT_EQ(edited("", "name = \"hummingbird_nominal\"", ""), "^: name: is missing; accepted: a string");
   EXPECT_EQ(edited("[left.motor]", "resistance_ohm = 12.4", "resistance_ohm = ^\"12.4\""),
             "^: left.motor.resistance_ohm: is a string; accepted: a number from 0.001 to 10000");

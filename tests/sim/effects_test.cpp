@@ -328,7 +328,7 @@ TEST(Energy, OfOthersIsLeftAlone) {
   beside.set_vehicle(1, all);
   begin(alone), begin(beside);
   alone.step(1000), beside.step(1000);
-  for (const std::size_t i : {0, 1, 2}) EXPECT_EQ(alone.energy_J(i) == beside.energy_J(i), i != 1) << i;
+  for (const std::size_t i : {0, 1, 2}) EXPECT_EQ(alone.energy_J(i) == beside.energy_J(i), i != 1) << i << ' ' << std::hexfloat << alone.energy_J(i) << ' ' << beside.energy_J(i);
 }
 
 }  // namespace

@@ -51,6 +51,16 @@ const std::vector<EffectEntry>& effects() {
   return all;
 }
 
+std::uint64_t sensor_effects() {
+  static const std::uint64_t set = [] {
+    std::uint64_t bits = 0;
+    for (std::size_t e = 0; e < effects().size(); ++e)
+      if (effects()[e].info.stage == Stage::sensor) bits |= std::uint64_t{1} << e;
+    return bits;
+  }();
+  return set;
+}
+
 int effect_index(const char* id) {
   for (std::size_t i = 0; i < effects().size(); ++i)
     if (std::strcmp(effects()[i].info.id, id) == 0) return static_cast<int>(i);

@@ -96,6 +96,8 @@ struct EffectEntry {
 
 /// The registry by index, which is also the bit of an effect in a block's set.
 const std::vector<EffectEntry>& effects();
+/// Bits of those that act on sensors alone.
+std::uint64_t sensor_effects();
 /// Index of `id`, or -1.
 int effect_index(const char* id);
 /// What an effect is grouped with (EffectInfo::group): its group's name, or its own where it has none.
