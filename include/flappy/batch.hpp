@@ -43,6 +43,7 @@ struct BatchOptions {
   int threads = 0;  ///< 0: one for each processor
   World world;
   std::string instruction_set;  ///< "scalar", "x86-64-v2", "-v3", "-v4"; empty: the best this processor has
+  bool meters_energy = false;   ///< for energy_J()
 };
 
 /// The best instruction set of this processor that the library was built for.
@@ -76,7 +77,7 @@ class Batch {
   FlapperState state(std::size_t i) const;
   std::uint32_t status(std::size_t i) const;
   HeldImpulse held_impulse(std::size_t i) const;
-  /// What both motors drew since the reset, V i in every step; what they give back counts.
+  /// What both motors drew since the reset, V i in every step; what they give back counts. std::logic_error unless it is metered.
   double energy_J(std::size_t i) const;
   /// What holds flapper `i` now: a standing one flies once its wings have carried it.
   Start support(std::size_t i) const;

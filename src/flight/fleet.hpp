@@ -49,6 +49,7 @@ struct Snapshot {
   std::vector<T> body, flight;  ///< rows of Block and FlightBlock
   std::uint64_t effects = 0;    ///< in force
   std::vector<T> effect_rows, effect_states;
+  std::vector<T> motors;  ///< conductance and back-EMF's current of left and right, where energy is metered
   std::uint32_t phase, phase_per_update;
   Target target;  ///< where it was meant to be
 };

@@ -59,8 +59,6 @@ SideParameters<double> derive_side(const Side& s, double air_density, double ste
   p.stroke_friction_Nm = m.efficiency * N * m.friction_Nm + s.stroke.friction_Nm;
   p.rotor_kg_m2 = m.efficiency * N * N * m.rotor_inertia_kg_m2 - rotor_spin(m);
   p.voltage_limit_V = m.voltage_limit_V;
-  p.conductance_S = 1 / m.resistance_ohm;
-  p.emf_current_A_s = N * K / m.resistance_ohm;
   p.spring_positive_Nm_rad = s.spring.stiffness_positive_Nm_rad;
   p.spring_negative_Nm_rad = s.spring.stiffness_negative_Nm_rad;
   p.spring_rest_rad = s.spring.rest_angle_rad;

@@ -25,7 +25,6 @@ struct SideParameters {
   T stroke_friction_Nm;         // motor and joint
   T rotor_kg_m2;                // eta N^2 J, less S (motor.hpp)
   T voltage_limit_V;
-  T conductance_S, emf_current_A_s;  // 1 / R, and N K / R per stroke rate: what the motor draws
   T spring_positive_Nm_rad, spring_negative_Nm_rad, spring_rest_rad;
   T stroke_lower_rad, stroke_upper_rad;
   T rotation_lower_rad, rotation_upper_rad;

@@ -85,6 +85,7 @@ Evaluation fly_all(FlyConfig config, const EvaluationOptions& options, Hovers<T>
                    Detail detail, const std::function<bool(double)>& keep_going) {
   const auto start = std::chrono::steady_clock::now();
   if (!agent.actor && agent.policy == nullptr) leave_alone(config.fleet.task);
+  config.fleet.batch.meters_energy = true;
   config.actor = agent.actor;
   const double hover_s = config.fleet.task.start.settled ? kHover_s : 0;
   const double hover_ticks = hover_s * config.fleet.control_hz;

@@ -228,6 +228,7 @@ struct Recorder<T>::Storage {
     in_force.states = metered.effect_states.data();
     in_force.voltages_V = voltages_V;
     in_force.meter = meter;
+    in_force.motors = nullptr;  // the step was metered when it was flown
     sim::StepPlan plan = body.plan();
     plan.steps_per_update = 1;
     body.kernel(metered.block, in_force, plan, 0, 1, nullptr);

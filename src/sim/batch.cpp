@@ -26,6 +26,17 @@ Vec3<double> com_minus_origin_velocity(const Parameters<double>& p, const State<
   return model::rotation_matrix(x.attitude) * (model::cross(x.body_rate_rad_s, whole.com) + whole.com_rate);
 }
 
+/// 1 / R and N K / R, left and right.
+template <class T>
+std::vector<T> motor_rows(const model::Vehicle& v) {
+  std::vector<T> rows;
+  for (const model::Motor& m : {v.left.motor, v.right.motor}) {
+    rows.push_back(static_cast<T>(1 / m.resistance_ohm));
+    rows.push_back(static_cast<T>(m.gear_ratio * m.torque_constant_Nm_A / m.resistance_ohm));
+  }
+  return rows;
+}
+
 }  // namespace
 
 template <class T>
@@ -37,6 +48,26 @@ void Batch<T>::Storage::put_vehicle(Block<T>& block, int lane, const model::Vehi
   put(drive, block.drive, lane);
   block.phase_per_update[lane] =
       static_cast<std::uint32_t>(std::llround(v.driver.flapping_Hz * v.driver.hold_s * 0x1p32));
+}
+
+template <class T>
+std::vector<T> Batch<T>::Storage::get_motors(std::size_t i) const {
+  std::vector<T> rows;
+  for (int r = 0; r < 4 && !motors.empty(); ++r) rows.push_back(motors[i / kLanes<T>].rows[r][i % kLanes<T>]);
+  return rows;
+}
+
+template <class T>
+void Batch<T>::Storage::put_motors(std::size_t i, const std::vector<T>& rows) {
+  if (motors.empty()) return;
+  if (rows.empty()) throw std::logic_error("a snapshot from where no energy is metered");
+  MotorRows<T>& to = motors[i / kLanes<T>];
+  for (std::size_t r = 0; r < 4; ++r) to.rows[r][i % kLanes<T>] = rows[r];
+}
+
+template <class T>
+void Batch<T>::Storage::clear_energy(std::size_t i) {
+  if (!motors.empty()) motors[i / kLanes<T>].energy_J[i % kLanes<T>] = 0;
 }
 
 /// A lane without an effect that its block has gets the sizes at which the effect vanishes.
@@ -167,6 +198,8 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
     put(x, block.state, lane);
   }
   for (Block<T>& b : s.blocks) b = block;
+  if (options.meters_energy) s.motors.resize(s.blocks.size());
+  for (std::size_t i = 0; i < count; ++i) s.put_motors(i, motor_rows<T>(vehicle));
   for (std::size_t i = 0; i < count && !vehicle.effects.empty(); ++i) s.put_effects(i, vehicle);
 }
 
@@ -189,6 +222,7 @@ void Batch<T>::set_vehicle(std::size_t i, const model::Vehicle& vehicle) {
   const auto [block, lane] = storage_->at(i);
   storage_->put_vehicle(block, lane, vehicle);
   storage_->put_effects(i, vehicle);
+  storage_->put_motors(i, motor_rows<T>(vehicle));
 }
 
 /// Puts flapper `i` where `state` is, held as `start` says, and clears its status: all else stays.
@@ -218,7 +252,7 @@ void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   drive.voltages = {0, 0};
   put(drive, block.drive, lane);
   block.phase[lane] = 0;
-  block.energy_J[lane] = 0;
+  storage_->clear_energy(i);
   storage_->for_states(i, ~std::uint64_t{0}, [](T& number) { number = 0; });
 }
 
@@ -268,8 +302,9 @@ HeldImpulse Batch<T>::held_impulse(std::size_t i) const {
 
 template <class T>
 double Batch<T>::energy_J(std::size_t i) const {
-  const auto [block, lane] = storage_->at(i);
-  return block.energy_J[lane];
+  const int lane = storage_->at(i).lane;
+  if (storage_->motors.empty()) throw std::logic_error("a batch without BatchOptions::meters_energy has no energy");
+  return storage_->motors[i / kLanes<T>].energy_J[lane];
 }
 
 template <class T>

@@ -44,7 +44,6 @@ struct alignas(64) Block {
   std::uint32_t phase[kLanes<T>];  // of the wing beat: fraction x 2^32
   std::uint32_t phase_per_update[kLanes<T>];
   std::uint32_t status[kLanes<T>];
-  double energy_J[kLanes<T>];  // electrical, of both motors since a reset; no part of what moves
 };
 
 }  // namespace flappy::sim

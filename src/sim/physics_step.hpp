@@ -26,10 +26,11 @@ struct ActiveEffects {
   int stride = 0;
   const Wall* walls = nullptr;
   std::size_t wall_count = 0;
-  Parameters<T>* own = nullptr;  // begins as those of the block
-  T* more_J = nullptr;           // than what the motors would draw at the driver's voltage, as wings of the base model
-  Element<T>* meter = nullptr;   // of the first lane
-  T rows[kEffectRows];           // parameters, then figures
+  Parameters<T>* own = nullptr;        // begins as those of the block
+  Element<T>* meter = nullptr;         // of the first lane
+  const Element<T>* motors = nullptr;  // rows of MotorRows, where energy is metered
+  T* energy_J = nullptr;               // what motors drew beyond what the driver's voltage has them
+  T rows[kEffectRows];                 // parameters, then figures
 
   const Sides<SideFigures<T>>& figures() const {
     return *reinterpret_cast<const Sides<SideFigures<T>>*>(rows + kEffectParameterRows);
@@ -180,14 +181,16 @@ FLAPPY_INLINE void read_meter(const Surroundings<T>& s, const Sides<Hinges<T>>& 
 
 /// What a motor draws in a step beyond what it would have at the driver's voltage `given_V` without effects: V i h, at the rate at the
 /// step's end, as that is the one that turns the wing; exactly 0 where effects leave the motor alone. `slip_rad_s`: its play's rate.
-/// Lanes without effects have no figures.
-template <class T>
-FLAPPY_INLINE T extra_work_J(const SideParameters<T>& p, const Hinges<T>& h, const SideFigures<T>& f, const T& given_V,
-                             const T& rate_rad_s, const T& slip_rad_s, const T& step_s) {
+template <int side, class T>
+FLAPPY_INLINE T extra_work_J(const ActiveEffects<T>& effects, const Hinges<T>& h, const T& given_V, const T& rate_rad_s,
+                             const T& slip_rad_s, const T& step_s) {
+  const Element<T>* rows = effects.motors + (side > 0 ? 0 : 2) * effects.stride;
+  const T conductance_S = T::load(rows), emf_current_A_s = T::load(rows + effects.stride);
   const auto power_W = [&](const T& volt, const T& rate) {
-    return T(volt * T(p.conductance_S * volt - p.emf_current_A_s * rate));
+    return T(volt * T(conductance_S * volt - emf_current_A_s * rate));
   };
-  const T share = where(h.resistance_ohm == f.resistance_ohm, T(1), T(f.resistance_ohm / h.resistance_ohm));
+  const T& cold_ohm = of_side<side>(effects.figures()).resistance_ohm;
+  const T share = where(h.resistance_ohm == cold_ohm, T(1), T(cold_ohm / h.resistance_ohm));
   return step_s * T(share * power_W(h.voltage_V, T(rate_rad_s + slip_rad_s)) - power_W(given_V, rate_rad_s));
 }
 
@@ -376,11 +379,11 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
   x.attitude = rotated(x.attitude, k.half_step * x.body_rate_rad_s);
   feel(p, x, pose, acting.air, force.z, k.step, held);
   if constexpr (with_effects) {
-    const auto& [left, right] = acting.s.figures;
-    *effects.more_J += extra_work_J(vehicle.left, acting.hinges.left, left, voltages.left_V, x.left.stroke_rate_rad_s,
-                                    slip_left, k.step) +
-                       extra_work_J(vehicle.right, acting.hinges.right, right, voltages.right_V,
-                                    x.right.stroke_rate_rad_s, slip_right, k.step);
+    if (effects.motors != nullptr)
+      *effects.energy_J +=
+          extra_work_J<+1>(effects, acting.hinges.left, voltages.left_V, x.left.stroke_rate_rad_s, slip_left, k.step) +
+          extra_work_J<-1>(effects, acting.hinges.right, voltages.right_V, x.right.stroke_rate_rad_s, slip_right,
+                           k.step);
     remember(effects, acting);
   }
 }

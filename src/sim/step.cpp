@@ -111,23 +111,34 @@ FLAPPY_INLINE State<L> where(typename L::Mask m, State<L> yes, const State<L>& n
 /// What motors draw while the driver holds its voltage: V i over the steps is, as a stroke advances by h psi' of its end,
 ///   sum of V (V - K N psi')/R h = V (V T - K N (psi_end - psi_begin))/R
 /// without a look at the steps between.
-template <class L>
+template <class T, class L>
 class EnergyMeter {
  public:
-  explicit EnergyMeter(const State<L>& x) : left_rad_(x.left.stroke_rad), right_rad_(x.right.stroke_rad) {}
+  EnergyMeter(MotorRows<T>* motors, int first, const State<L>& x)
+      : motors_(motors), first_(first), left_rad_(x.left.stroke_rad), right_rad_(x.right.stroke_rad) {}
   /// After `seconds` at these voltages.
-  FLAPPY_INLINE void read(const Parameters<L>& p, const State<L>& x, const Voltages<L>& u, const L& seconds) {
-    const auto work = [&](const SideParameters<L>& side, const L& volt, const L& turned_rad) {
-      return L(volt * L(side.conductance_S * L(volt * seconds) - side.emf_current_A_s * turned_rad));
+  FLAPPY_INLINE void read(const State<L>& x, const Voltages<L>& u, double seconds) {
+    if (motors_ == nullptr) return;
+    const auto work = [&](int side, const L& volt, const L& turned_rad) {
+      const L conductance_S = L::load(motors_->rows[2 * side] + first_),
+              emf = L::load(motors_->rows[2 * side + 1] + first_);
+      return L(volt * L(conductance_S * L(volt * L(seconds)) - emf * turned_rad));
     };
-    energy_J += work(p.left, u.left_V, L(x.left.stroke_rad - left_rad_)) +
-                work(p.right, u.right_V, L(x.right.stroke_rad - right_rad_));
+    energy_J +=
+        work(0, u.left_V, L(x.left.stroke_rad - left_rad_)) + work(1, u.right_V, L(x.right.stroke_rad - right_rad_));
     left_rad_ = x.left.stroke_rad;
     right_rad_ = x.right.stroke_rad;
+  }
+  /// Of lanes that do not move it is no number that means anything.
+  FLAPPY_INLINE void add(const typename L::Mask& moves) const {
+    for (int i = 0; motors_ != nullptr && i < kWidth<T>; ++i)
+      if (moves.raw[i]) motors_->energy_J[first_ + i] += static_cast<double>(energy_J.raw[i]);
   }
   L energy_J{0.0};
 
  private:
+  MotorRows<T>* motors_;
+  int first_;
   L left_rad_, right_rad_;
 };
 
@@ -150,14 +161,13 @@ class Prefetch {
 
 /// Back from the centre of mass to the torso; contact, plausibility, rows.
 template <class T, class L>
-FLAPPY_INLINE void finish(State<L> x, const Vec3<L>& com_m, const Voltages<L>& voltages, const L& energy_J,
+FLAPPY_INLINE void finish(State<L> x, const Vec3<L>& com_m, const Voltages<L>& voltages, const EnergyMeter<T, L>& meter,
                           const Parameters<L>& p, const StepPlan& plan, Block<T>& block, int first) {
   x.position_m = where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
   look_around(x, p, plan, block, first);
   const typename L::Mask moves = freeze_implausible(x, block, first);
   store_rows(where(moves, x, load_rows<State<L>>(block.state, first)), block.state, first);
-  for (int i = 0; i < kWidth<T>; ++i)
-    if (moves.raw[i]) block.energy_J[first + i] += static_cast<double>(energy_J.raw[i]);
+  meter.add(moves);
   auto drive = load_rows<Drive<L>>(block.drive, first);
   drive.voltages = voltages;
   store_rows(drive, block.drive, first);
@@ -182,10 +192,10 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     const auto& p = view_rows<Parameters<L>>(block.parameters, first);
     auto x = load_rows<State<L>>(block.state, first);
     Voltages<L> voltages = load_rows<Drive<L>>(block.drive, first).voltages;
-    EnergyMeter<L> meter(x);
+    EnergyMeter<T, L> meter(in_force.motors, first, x);
     int held = 0;  // steps since the meter was read
     const auto measure = [&] {
-      meter.read(p, x, voltages, L(held * plan.step_s));
+      meter.read(x, voltages, held * plan.step_s);
       held = 0;
     };
     ActiveEffects<L> effects;
@@ -193,7 +203,8 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     if constexpr (with_effects) {
       own = p;
       effects.own = &own;
-      effects.more_J = &meter.energy_J;
+      if (in_force.motors != nullptr) effects.motors = in_force.motors->rows[0] + first;
+      effects.energy_J = &meter.energy_J;
       effects.set = in_force.set;
       effects.kept = in_force.kept;
       effects.states = in_force.states + first;
@@ -220,7 +231,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
       if (with_effects && effects.meter != nullptr) effects.meter += kMeterRows * kLanes<T>;
     }
     measure();
-    finish(x, com_m, voltages, meter.energy_J, p, plan, block, first);
+    finish(x, com_m, voltages, meter, p, plan, block, first);
     if constexpr (with_effects) forget_frozen(in_force, block, first);
   }
 }

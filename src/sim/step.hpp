@@ -15,6 +15,13 @@ struct StepPlan {
   std::size_t wall_count;
 };
 
+/// What the motors of a block draw.
+template <class T>
+struct alignas(64) MotorRows {
+  T rows[4][kLanes<T>];        // of left, then right: 1 / R, and N K / R, the back-EMF's current per stroke rate
+  double energy_J[kLanes<T>];  // of both, since a reset; no part of what moves
+};
+
 /// Effects in force in a block, and their parameters: rows as in the registry, kLanes wide.
 template <class T>
 struct BlockEffects {
@@ -26,6 +33,8 @@ struct BlockEffects {
   const T* voltages_V = nullptr;
   /// Where every step is to write what its motors drew, kMeterRows rows, if anywhere. Needs `rows`, whatever the set.
   T* meter = nullptr;
+  /// Where energy is metered, if it is.
+  MotorRows<T>* motors = nullptr;
 };
 
 /// Rows of a meter: the source's voltage as a share of its nominal one, currents of the left and of the right motor, A.

@@ -52,6 +52,7 @@ struct Batch<T>::Storage {
   std::vector<T> effect_rows;                // [block][row][lane]
   std::uint64_t effects_kept = 0;            // effects that some vehicle has named, whose memory is
   std::vector<T> effect_states;              // [block][row][lane]
+  std::vector<MotorRows<T>> motors;          // of each block, where energy is metered
 
   struct Place {
     Block<T>& block;
@@ -72,9 +73,12 @@ struct Batch<T>::Storage {
             world.walls.size()};
   }
   BlockEffects<T> effects_of(std::size_t b) {
-    if (block_effects.empty()) return {};
-    return {block_effects[b], &effect_rows[b * model::kEffectRows * kLanes<T>], effects_kept,
-            effect_states.data() + b * state_size()};
+    BlockEffects<T> all;
+    if (!block_effects.empty())
+      all = {block_effects[b], &effect_rows[b * model::kEffectRows * kLanes<T>], effects_kept,
+             effect_states.data() + b * state_size()};
+    if (!motors.empty()) all.motors = &motors[b];
+    return all;
   }
   /// Numbers of a block that effects remember.
   std::size_t state_size() const { return static_cast<std::size_t>(model::state_rows(effects_kept)) * kLanes<T>; }
@@ -92,6 +96,10 @@ struct Batch<T>::Storage {
   const Block<T>* block_after(std::size_t b) const { return b + 1 < blocks.size() ? &blocks[b + 1] : nullptr; }
 
   void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v);
+  /// What a meter of flapper `i` needs to know of its motors, to be put to a flapper of any batch.
+  std::vector<T> get_motors(std::size_t i) const;
+  void put_motors(std::size_t i, const std::vector<T>& rows);
+  void clear_energy(std::size_t i);
   void put_effects(std::size_t i, const model::Vehicle& v);
   void put_effect_rows(std::size_t i, const model::Vehicle& v);
   /// The effects of flapper `i` with their parameters and what they remember, to be put to a flapper of any batch.

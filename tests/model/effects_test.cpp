@@ -362,14 +362,12 @@ struct Stand {
     const Parameters<One> p = in_lane(derive(airless, h));
     Parameters<One> own = p;
     effects.own = &own;
-    effects.more_J = &more_J;
     sim::physics_step<true>(p, x, {One(left_V), One(right_V)}, com_m, effects,
                             {One(h), One(h / 2), One(1 / h), One(gravity), One(0), One(10)});
   }
 
   Vehicle airless;
   sim::ActiveEffects<One> effects;
-  One more_J{0.0};
   State<One> x{};
   Vec3<One> com_m{};
   double h = kStep, gravity = 0;

@@ -364,7 +364,8 @@ TEST_F(VehicleFile, RefusesAnInertiaOfNoBody) {
 }
 
 TEST_F(VehicleFile, RefusesWhatIsNoVehicle) {
-  EXPECT_EQ(edited("", "schema = 1", "schema = ^2"), "^: schema: 2 is read by a newer flappy than this one; accepted: 1");
+  EXPECT_EQ(edited("", "schema = 1", "schema = ^2"),
+            "^: schema: 2 is read by a newer flappy than this one; accepted: 1");
   EXPECT_EQ(edited("", "schema = 1\n", ""), "^: schema: is missing; accepted: 1");
   EXPECT_EQ(edited("", "name = \"hummingbird_nominal\"", ""), "^: name: is missing; accepted: a string");
   EXPECT_EQ(edited("[left.motor]", "resistance_ohm = 12.4", "resistance_ohm = ^\"12.4\""),

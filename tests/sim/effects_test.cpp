@@ -34,6 +34,7 @@ model::Vehicle with(const EffectEntry& e, double scale) {
 BatchOptions room() {
   BatchOptions o;
   o.threads = 1;
+  o.meters_energy = true;
   o.world.ground_z_m = 0;
   o.world.ceiling_z_m = 0.35;
   o.world.walls = {{0.5, 0, -1, 0}, {0, -0.2, 0, 1}};
@@ -320,6 +321,17 @@ TEST(Energy, IsOfWhatReachesTheMotors) {
   EXPECT_LT(hot.metered_J, 0.95 * hot.summed_J);
 }
 
+TEST(Energy, IsMeteredWhereAskedFor) {
+  Batch<float> with(1, test::identified(), room()), without(1, test::identified(), {});
+  EXPECT_THROW(without.energy_J(0), std::logic_error);
+  BatchOptions o = room();
+  o.meters_energy = false;
+  Batch<float> plain(1, test::identified(), o);
+  begin(with), begin(plain);
+  with.step(1000), plain.step(1000);
+  EXPECT_EQ(with.hash(), plain.hash());
+}
+
 // Effects change what their own flappers draw: that of others stays, to the bit.
 TEST(Energy, OfOthersIsLeftAlone) {
   model::Vehicle all = test::identified();
@@ -328,7 +340,9 @@ TEST(Energy, OfOthersIsLeftAlone) {
   beside.set_vehicle(1, all);
   begin(alone), begin(beside);
   alone.step(1000), beside.step(1000);
-  for (const std::size_t i : {0, 1, 2}) EXPECT_EQ(alone.energy_J(i) == beside.energy_J(i), i != 1) << i << ' ' << std::hexfloat << alone.energy_J(i) << ' ' << beside.energy_J(i);
+  for (const std::size_t i : {0, 1, 2})
+    EXPECT_EQ(alone.energy_J(i) == beside.energy_J(i), i != 1)
+        << i << ' ' << std::hexfloat << alone.energy_J(i) << ' ' << beside.energy_J(i);
 }
 
 }  // namespace

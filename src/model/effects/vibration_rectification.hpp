@@ -2,7 +2,7 @@
 //   bias = K_2 (mean over a beat of (f - mean f)^2)
 // [1] IEEE Std 1293-2018, Linear, single-axis, nongyroscopic accelerometers: the second-order coefficient K_2. 1e-3 s^2/m is
 //     that of consumer parts (10 mg/g^2 / 9.81 m/s^2).
-// The simulated sensor takes the mean over the wing beat before, which begins and ends where the phase does; none in the first.
+// The simulated sensor takes the mean over the wing beat before, which ends where the fraction of the phase wraps; none in the first.
 #pragma once
 
 #include "model/effects/effect.hpp"
