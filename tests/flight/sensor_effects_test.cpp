@@ -92,7 +92,12 @@ TEST(SensorEffects, CarryTheMarkerOnTheTrueAttitude) {
   EXPECT_EQ(seen.mocap.z_m, same.mocap.z_m);
 }
 
-const std::vector<std::string> kQuiet = {"sensors.mocap.position_noise_m=1e-12",
+/// Without noise, in the air at once and not for long.
+const std::vector<std::string> kQuiet = {"flight.duration_s=0.5",
+                                         "constant_input.amplitude_V=12.5",
+                                         "task.start.kind=flying",
+                                         "world.ground_z_m=-9",
+                                         "sensors.mocap.position_noise_m=1e-12",
                                          "sensors.mocap.attitude_noise_rad=1e-12",
                                          "sensors.imu.accel_noise_m_s2=1e-12"};
 
@@ -112,11 +117,12 @@ TEST(SensorEffects, RectifyTheVibrationOfTheBeatBefore) {
     const Column &f = plain.imu.*axis, &y = seen.imu.*axis;
     double bias = 0, largest = 0, mean_of_bias = 0;
     std::vector<double> beat;
-    std::uint32_t last = 0;
+    std::int32_t last = 0;  // wraps half-way through the phase
     ASSERT_EQ(f.size(), y.size());
     for (std::size_t i = 0; i < f.size(); ++i) {
       const double t_s = plain.imu.t_s[i] - c.fleet.sensors.imu.latency_s;
-      const auto phase = static_cast<std::uint32_t>(std::lround(t_s / c.vehicle.driver.hold_s)) * per_hold;
+      const auto updates = static_cast<std::uint32_t>(std::lround(t_s / c.vehicle.driver.hold_s));
+      const auto phase = static_cast<std::int32_t>(updates * per_hold);
       if (phase < last) {
         double mean = 0, square = 0;
         for (const double x : beat) mean += x / static_cast<double>(beat.size());
@@ -154,9 +160,9 @@ void expect_poses_of(const FlightLog& seen, const FlightLog& fine, double latenc
          {&MocapStream::qw, &MocapStream::qx, &MocapStream::qy, &MocapStream::qz})
       attitude = std::max(attitude, std::abs((m.*axis)[i] - (n.*axis)[k]));
   }
-  std::printf("%.3g %.3g\n", position_m, attitude);
-  EXPECT_LT(position_m, 1e-6);
-  EXPECT_LT(attitude, 1e-5);
+  // a jump of v within a period of h, as of wings that meet their stops, is cut by v h / 8: up to 0.05 m/s, 3 rad/s
+  EXPECT_LT(position_m, 1.2e-5);
+  EXPECT_LT(attitude, 4e-4);
 }
 
 TEST(SensorEffects, ShowPosesOfTheTimeBefore) {
@@ -173,10 +179,10 @@ TEST(SensorEffects, ShowPosesOfTheTimeBefore) {
     EXPECT_NEAR(gap::without(late, seen).header.mocap.latency_s, latency_s + delay_s, 1e-15);
     EXPECT_EQ(seen.imu.gyro_x_rad_s, plain.imu.gyro_x_rad_s);
   }
-  // one that would show what was before the flight shows its start
+  // one that would show what was before the flight shows its start, at 0; the next is of 1 ms after it
   const FlightLog late = open_loop({*kAll.find("mocap_delay")}, kQuiet);
-  EXPECT_EQ(late.mocap.x_m[0], late.mocap.x_m[1]);
-  EXPECT_NE(late.mocap.z_m[10], late.mocap.z_m[11]);
+  EXPECT_NEAR(late.mocap.z_m[0], 0, 1e-11);
+  EXPECT_LT(late.mocap.z_m[1], -1e-6);
 }
 
 TEST(SensorEffects, RefuseADelayThatCannotBe) {
