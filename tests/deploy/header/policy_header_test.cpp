@@ -8,6 +8,7 @@
 #include <random>
 
 #include "deploy/header/policy_vectors.hpp"
+#include "full.hpp"
 #include "io/run_program.hpp"
 #include "policy/policy.hpp"
 #include "policy/torch_script.hpp"
@@ -173,7 +174,8 @@ std::string mutations(const std::vector<std::pair<std::string, std::string>>& ar
 
 TEST(PolicyHeader, CatchesEveryFlippedBit) {
   const Folder folder;
-  const rollout::FlyConfig config = escape({32, 32}, Activation::relu);
+  const int width = test::full() ? 32 : 8;
+  const rollout::FlyConfig config = escape({width, width}, Activation::relu);
   const policy::PolicyNetwork network = network_of(config);
   const policy::PolicyVectors flown = roll_out(config, 0, 8);
   const std::vector<std::pair<std::string, std::string>> common = {{"flappy_policy_mean", "FLAPPY_POLICY_OBS"},
