@@ -1,4 +1,4 @@
-// Effects of sensors, done to samples that are taken: the forms of src/model/effects, which src/gap/sensor_effects.hpp undoes.
+// Effects of sensors, done to samples that are taken: the forms of src/model/effects, which src/gap/replay/sensor_correction.hpp undoes.
 //
 //   accelerometer_misalignment  force turned by e
 //   vibration_rectification     force + gain (mean square about the mean over the beat before), on every axis, of that force
