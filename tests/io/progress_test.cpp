@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -34,11 +35,14 @@ class Screen {
     if (master_ >= 0) close(master_);
   }
   std::string written() {
-    char text[4096];
-    ssize_t size = 0;
-    if (master_ >= 0) size = read(master_, text, sizeof text);
-    else size = pread(fileno(stream.get()), text, sizeof text, 0);
-    return {text, static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
+    std::string all(4096, ' ');
+    ssize_t size = 0, more = 0;
+    if (master_ < 0) size = pread(fileno(stream.get()), all.data(), all.size(), 0);
+    // the kernel hands a terminal's output on piece by piece, soon
+    for (pollfd ready{master_, POLLIN, 0}; master_ >= 0 && poll(&ready, 1, 100) > 0; size += more)
+      if (more = read(master_, &all[static_cast<std::size_t>(size)], 1024); more <= 0) break;
+    all.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+    return all;
   }
 
   File stream;

@@ -12,8 +12,8 @@
 
 #include "deploy/header/controller_library.hpp"
 #include "deploy/proof/board.hpp"
-#include "full.hpp"
 #include "flight/flight_block.hpp"
+#include "full.hpp"
 #include "rollout/rollout.hpp"
 
 namespace flappy::deploy {
