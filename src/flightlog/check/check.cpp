@@ -10,9 +10,6 @@
 namespace flappy::flightlog {
 namespace {
 
-using flightlog::Column;
-using flightlog::FlightLog;
-
 void check_stream(const StreamStatistics& s, double flapping_Hz, Findings& findings) {
   const auto warn = [&](const std::string& text) { findings.push_back({s.name, Verdict::warning, text, {}}); };
   if (!s.declared_hz) return;

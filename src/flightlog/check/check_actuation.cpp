@@ -9,9 +9,6 @@
 namespace flappy::flightlog {
 namespace {
 
-using flightlog::Column;
-using flightlog::FlightLog;
-
 constexpr double kTurn = 2 * std::numbers::pi;
 
 /// Two crystals and a median of interpolated crossings agree far better; 2 % is another frequency.

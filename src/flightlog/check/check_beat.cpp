@@ -8,7 +8,6 @@
 namespace flappy::flightlog {
 namespace {
 
-using flightlog::Column;
 using Phasor = std::complex<double>;
 
 constexpr int kBeats = 4;  ///< of a phasor; a beat that is off by an eighth turns half round meanwhile

@@ -9,9 +9,6 @@
 namespace flappy::flightlog {
 namespace {
 
-using flightlog::Column;
-using flightlog::FlightLog;
-
 /// The least share of a stream that is to be there, and the most by which its rate may be another than declared.
 constexpr double kLeastShare = 0.5, kRateTolerance = 0.2;
 
