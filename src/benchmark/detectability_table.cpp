@@ -89,7 +89,7 @@ std::vector<EffectDetectability> weigh(const std::vector<Development>& vehicles,
         const auto rival = static_cast<blind::Effect>(r);
         if (r == e || !in_catalogue(rival)) continue;
         if (io::median(over_vehicles(
-                [&](const benchmark::DetectabilityAnalysis& o) { return o.gain_over(effect, at, rival); })) < kNats)
+                [&](const DetectabilityAnalysis& o) { return o.gain_over(effect, at, rival); })) < kNats)
           rivals->push_back(blind::effect_names()[r]);
       }
   }

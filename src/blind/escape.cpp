@@ -45,7 +45,7 @@ class Escaper {
   Inputs steer(double t_s, double beat, const Torso& torso) {
     const flight::Estimate<double> seen = view_.see(torso);
     const bool begun = t_s > -kControl_s / 2;
-    if (begun && tick_ > 0) judge(torso, seen, t_s);
+    if (begun && tick_ > 0) note_outcome(torso, seen, t_s);
     const flight::Pid<double> before = pid_;
     model::WingBeat<double> u = flight::PidController::update(rules_.controller, pid_, seen, begun ? goal_ : start_);
     if (begun) {
@@ -78,7 +78,7 @@ class Escaper {
   }
 
   /// On the true state, but for the hand-back where that is the estimate's.
-  void judge(const Torso& torso, const flight::Estimate<double>& seen, double t_s) {
+  void note_outcome(const Torso& torso, const flight::Estimate<double>& seen, double t_s) {
     const flight::TaskConstants<double>& k = rules_.constants;
     flight::Estimate<double> truth{};
     truth.position_m = vec3(torso.position_m);

@@ -20,7 +20,7 @@ constexpr double kSpinUpBeats = 3;
 constexpr double kStrokeShare = 0.1;
 constexpr double kLeastChords = 5;
 /// Innovations of the smoother, over what the declared noise predicts, in standard deviations.
-constexpr double kLargestSurprise = 5;
+constexpr double kLargestInnovation = 5;
 /// Commands that come later than this many of their usual intervals were lost.
 constexpr double kLongestHold = 5;
 
@@ -229,13 +229,13 @@ void Transitions::add(const std::filesystem::path& folder, const flightlog::Flig
   const auto refuse = [&](const std::string& what) { throw io::InputError(folder.string() + ": " + what); };
   auto flight = std::make_unique<Flight>(folder, log, vehicle, options_.source);
   const flightlog::Smoother& t = flight->track;
-  const double surprise = std::sqrt(
+  const double innovation = std::sqrt(
       std::max({t.angle_normalised_innovation(), t.position_normalised_innovation(), t.bias_normalised_innovation()}));
-  if (!(surprise <= kLargestSurprise) && !options_.accept_surprise)
-    refuse("motion capture and IMU disagree, or are biased, by " + io::shortest_digits(std::round(10 * surprise) / 10) +
-           " times their declared noise; accepted: at most " + io::shortest_digits(kLargestSurprise) +
-           ", or any by --accept-surprise; flappy-gap check says more");
-  normalised_innovation_ = std::max(normalised_innovation_, surprise);
+  if (!(innovation <= kLargestInnovation) && !options_.accept_innovation)
+    refuse("motion capture and IMU disagree, or are biased, by " + io::shortest_digits(std::round(10 * innovation) / 10) +
+           " times their declared noise; accepted: at most " + io::shortest_digits(kLargestInnovation) +
+           ", or any by --accept-innovation; flappy-gap check says more");
+  normalised_innovation_ = std::max(normalised_innovation_, innovation);
   flight->choose_starts();
   if (flight->starts_s.empty()) {
     if (flight->low > 0) refuse("no sample is higher than five mean chords above the ground; accepted: free flight");
@@ -251,7 +251,7 @@ void Transitions::add(const std::filesystem::path& folder, const flightlog::Flig
 
 TransitionReport Transitions::run() const {
   TransitionReport report;
-  report.surprise = normalised_innovation_;
+  report.normalised_innovation = normalised_innovation_;
   if (!flights_.empty()) report.beats_s = flights_.front()->window_s();
   std::size_t available = 0;
   for (const auto& f : flights_) {

@@ -3,6 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 
+#include "io/files.hpp"
+
 namespace flappy::io {
 
 Option Option::required() const {
@@ -65,6 +67,9 @@ Option Command::flag(const std::string& name, bool& value, const std::string& he
 }
 Command Command::command(const std::string& name, const std::string& help) const {
   return Command(app_->add_subcommand(name, help));
+}
+void Command::renamed_flag(const std::string& name, const std::string& now) const {
+  app_->add_flag_callback(name, [=] { throw InputError(name + ": has another name now; accepted: " + now); })->group("");
 }
 Command Command::hidden_command(const std::string& name) const {
   return Command(app_->add_subcommand(name)->group("")->allow_extras()->fallthrough(false));

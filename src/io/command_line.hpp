@@ -50,6 +50,8 @@ class Command {
   Option option(const std::string& name, T& value, const std::string& help) const;
   /// "!--name" clears `value`.
   Option flag(const std::string& name, bool& value, const std::string& help) const;
+  /// A flag that --help does not show: where it is given, InputError says its new name.
+  void renamed_flag(const std::string& name, const std::string& now) const;
   Command command(const std::string& name, const std::string& help) const;
   /// A command that --help does not show, with any arguments: what a name of old is met with.
   Command hidden_command(const std::string& name) const;

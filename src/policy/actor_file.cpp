@@ -70,8 +70,8 @@ Actor read_actor(const std::filesystem::path& path) {
   count("observation", a.observation.size(), inputs);
   count("mean", a.mean.size(), inputs);
   count("scale", a.scale.size(), inputs);
-  count("action", a.action.size(), policy::kActions);
-  count("widths", static_cast<std::size_t>(a.widths.back()), policy::kActions);
+  count("action", a.action.size(), kActions);
+  count("widths", static_cast<std::size_t>(a.widths.back()), kActions);
   count("weights", a.weights.size(), weight_count(a.widths));
   for (const auto* numbers : {&a.mean, &a.scale, &a.weights})
     for (const double x : *numbers)

@@ -71,7 +71,7 @@ struct Problem {
     return c;
   }
   std::vector<double> fitness(const std::vector<double>& decision) const {
-    return {rollout::cost_of(*config, controller(decision))};
+    return {cost_of(*config, controller(decision))};
   }
   std::pair<std::vector<double>, std::vector<double>> get_bounds() const {
     return {std::vector<double>(config->vary.size(), -kReach), std::vector<double>(config->vary.size(), kReach)};

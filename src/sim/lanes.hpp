@@ -122,6 +122,9 @@ struct Lanes {
       else return Lanes((Raw)_mm256_fmadd_pd((__m256d)a.raw, (__m256d)b.raw, (__m256d)c.raw));
     }
 #endif
+    return fused_each(a, b, c);
+  }
+  static __attribute__((noinline)) Lanes fused_each(Lanes a, Lanes b, Lanes c) {
     if constexpr (sizeof(T) == 4) return each([&](int i) { return __builtin_fmaf(a.raw[i], b.raw[i], c.raw[i]); });
     else return each([&](int i) { return __builtin_fma(a.raw[i], b.raw[i], c.raw[i]); });
   }

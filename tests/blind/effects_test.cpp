@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "blind/robot_sensors.hpp"
@@ -148,6 +149,11 @@ TEST(BlindEffects, RefuseWhatTheyDoNotKnow) {
 TEST(BlindEffects, HaveNamesOfTheirOwn) {
   const auto& names = effect_names();
   EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), 40u);
+}
+
+/// The benchmark takes those before the first outside_... for the catalogue.
+TEST(BlindEffects, HaveThoseOutsideTheCatalogueLast) {
+  EXPECT_TRUE(std::ranges::is_partitioned(effect_names(), [](const auto& name) { return !name.starts_with("outside_"); }));
 }
 
 }  // namespace

@@ -164,17 +164,17 @@ TEST_F(TransitionsTest, RefusesWhatIsNoRecordOfAFreeFlight) {
   EXPECT_NE(refusal(log).find("share 0 poses"), std::string::npos) << refusal(log);
 }
 
-TEST_F(TransitionsTest, AcceptsSurpriseWhereAsked) {
+TEST_F(TransitionsTest, AcceptsALargeInnovationWhereAsked) {
   FlightLog log = logs()[0];
   for (double& a : log.imu.accel_z_m_s2) a += 3;
-  EXPECT_NE(refusal(log).find("; accepted: at most 5, or any by --accept-surprise; "), std::string::npos);
-  Transitions t({.accept_surprise = true});
+  EXPECT_NE(refusal(log).find("; accepted: at most 5, or any by --accept-innovation; "), std::string::npos);
+  Transitions t({.accept_innovation = true});
   t.add("flights/it", log, test::identified());
   t.add("flights/other", logs()[1], test::identified());
   const TransitionReport r = t.run();
   // over the 0.2 m/s^2 that a bias may be, on one axis of three; the smoother knows it to 0.02: 3 sd are 0.17, and it
   // pulls it by (0.02/0.2)^2 towards 0, another 0.09
-  EXPECT_NEAR(r.surprise, 3 / (0.2 * std::sqrt(3.0)), 0.26);
+  EXPECT_NEAR(r.normalised_innovation, 3 / (0.2 * std::sqrt(3.0)), 0.26);
   EXPECT_GT(r.samples, 100u);
 }
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <tuple>
 
-namespace flappy::oracle {
+namespace flappy::reference {
 namespace {
 
 using dart::dynamics::BodyNode;
@@ -149,4 +149,4 @@ const Loads& DartPeer::loads() const { return loads_; }
 
 Wrench DartPeer::wrench() const { return aerodynamic_wrench(vehicle_, start_, loads_); }
 
-}  // namespace flappy::oracle
+}  // namespace flappy::reference

@@ -6,7 +6,7 @@
 
 #include "peer.hpp"
 
-namespace flappy::oracle {
+namespace flappy::reference {
 
 struct DartSettings {
   /// DART's own stroke spring, as published; it is implicit, which damps the stroke.
@@ -41,4 +41,4 @@ class DartPeer {
   Loads loads_;
 };
 
-}  // namespace flappy::oracle
+}  // namespace flappy::reference

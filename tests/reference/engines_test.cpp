@@ -14,7 +14,7 @@
 #include "mujoco_peer.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::oracle {
+namespace flappy::reference {
 namespace {
 
 constexpr double kHold_s = 1e-3;
@@ -361,4 +361,4 @@ TEST(Impacts, AreThoseOfDart) {
 }
 
 }  // namespace
-}  // namespace flappy::oracle
+}  // namespace flappy::reference

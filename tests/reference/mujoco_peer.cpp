@@ -9,7 +9,7 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace flappy::oracle {
+namespace flappy::reference {
 namespace {
 
 // In MuJoCo's arrays: bodies are world, torso, then leading edge and wing of each side; hinges likewise.
@@ -154,4 +154,4 @@ void MujocoPeer::set_state(const PeerState& state) {
 
 double MujocoPeer::time_s() const { return data_->time; }
 
-}  // namespace flappy::oracle
+}  // namespace flappy::reference

@@ -9,7 +9,7 @@
 struct mjModel_;
 struct mjData_;
 
-namespace flappy::oracle {
+namespace flappy::reference {
 
 /// Defaults are the fastest with the same physics, and the stops of the reference trajectories.
 struct MujocoSettings {
@@ -47,4 +47,4 @@ class MujocoPeer {
   Loads loads_;
 };
 
-}  // namespace flappy::oracle
+}  // namespace flappy::reference

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace flappy::oracle {
+namespace flappy::reference {
 namespace {
 
 double sgn(double x) { return x > 0 ? 1.0 : x < 0 ? -1.0 : 0.0; }
@@ -142,4 +142,4 @@ Vec3 to_world(const Quat& q_WB, const Vec3& v_B) {
 
 Vec3 to_body(const Quat& q_WB, const Vec3& v_W) { return to_world({q_WB[0], -q_WB[1], -q_WB[2], -q_WB[3]}, v_W); }
 
-}  // namespace flappy::oracle
+}  // namespace flappy::reference

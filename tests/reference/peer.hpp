@@ -6,7 +6,7 @@
 
 #include "flappy/vehicle.hpp"
 
-namespace flappy::oracle {
+namespace flappy::reference {
 
 using Vec3 = std::array<double, 3>;
 using Quat = std::array<double, 4>;     ///< w, x, y, z
@@ -83,4 +83,4 @@ Wrench aerodynamic_wrench(const model::Vehicle& vehicle, const PeerState& state,
 Vec3 to_world(const Quat& q_WB, const Vec3& v_B);
 Vec3 to_body(const Quat& q_WB, const Vec3& v_W);
 
-}  // namespace flappy::oracle
+}  // namespace flappy::reference

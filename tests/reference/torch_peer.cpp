@@ -10,7 +10,7 @@ void sgemm_();  // of whichever BLAS the system gives LibTorch
 void openblas_set_num_threads(int) __attribute__((weak));
 }
 
-namespace flappy::oracle {
+namespace flappy::reference {
 namespace {
 
 using learn::LearnerOptions;
@@ -223,4 +223,4 @@ std::string TorchLearner::version() {
   return TORCH_VERSION + (known ? " with " + std::filesystem::canonical(blas.dli_fname).string() : std::string());
 }
 
-}  // namespace flappy::oracle
+}  // namespace flappy::reference

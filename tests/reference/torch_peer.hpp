@@ -1,4 +1,4 @@
-// The learner's update as a plain LibTorch loop: the oracle of the tests, and the peer of the benchmark.
+// The learner's update as a plain LibTorch loop: the reference of the tests, and the peer of the benchmark.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 #include "learn/lanes/learner.hpp"
 
-namespace flappy::oracle {
+namespace flappy::reference {
 
 class TorchLearner {
  public:
@@ -56,4 +56,4 @@ class TorchLearner {
   std::unique_ptr<Storage> storage_;
 };
 
-}  // namespace flappy::oracle
+}  // namespace flappy::reference

@@ -85,7 +85,7 @@ TEST(Mujoco, FliesTheSameUntilAWingMeetsItsStop) {
 TEST(Mujoco, FliesWithinItsReboundAfterwards) {
   // Its soft stop throws a wing back at 13.5 % of some 340 rad/s, which is 0.085 rad of rotation at
   // mid-stroke; 0.05 rad of pitch follow in 0.3 s, and with them the published 6 mm. That it is the stop
-  // alone, oracle_test.cpp shows.
+  // alone, engines_test.cpp shows.
   const Deviation d = deviation_from_mujoco(0, 1);
   EXPECT_LT(d.position_m, 6e-3);
   EXPECT_LT(d.attitude_rad, 0.055);

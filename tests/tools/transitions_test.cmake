@@ -17,7 +17,7 @@ expect_match("the first line" "${out}" "^2 flights, 100 samples replayed of 1198
 expect_match("the table" "${out}" "\n  pitch +2\\.[0-9]+ deg ")
 expect_match("the paper" "${out}" "\n  paper +after one beat under 5 %")
 expect_match("the windows" "${out}" "\none beat is 30.0 ms, two are 58.0: whole intervals of the IMU\n")
-set(keys samples=NUMBER diverged=NUMBER wall_s=NUMBER beat_s=NUMBER two_beats_s=NUMBER sensor_surprise=NUMBER
+set(keys samples=NUMBER diverged=NUMBER wall_s=NUMBER beat_s=NUMBER two_beats_s=NUMBER normalised_innovation=NUMBER
   error_1beat.unit=STRING absolute_1beat.unit=STRING)
 foreach(state IN ITEMS x_m y_m z_m roll_rad pitch_rad yaw_rad vx_m_s vy_m_s vz_m_s wx_rad_s wy_rad_s wz_rad_s)
   list(APPEND keys error_1beat.${state}=NUMBER error_2beats.${state}=NUMBER)
@@ -43,11 +43,12 @@ expect_refused("${WORK}/none/t.csv: cannot be written: No such file or directory
   transitions ${WORK}/gone --csv ${WORK}/none/t.csv)
 expect_refused("${WORK}/flights/../flights/0000/: is given twice; accepted: each flight once"
   transitions ${flights} ${WORK}/flights/../flights/0000/)
+expect_refused("--accept-surprise: has another name now; accepted: --accept-innovation" transitions ${WORK}/flights/0000 --accept-surprise)
 foreach(flight IN LISTS flights)  # or beside them
   file(RENAME ${flight}/hummingbird_identified.toml ${WORK}/flights/hummingbird_identified.toml)
 endforeach()
-run(transitions ${flights} --every 50 --accept-surprise)
-expect_match("the surprise" "${out}" "\nmotion capture and IMU disagree by up to 1\\.[0-9] times their declared noise\n")
+run(transitions ${flights} --every 50 --accept-innovation)
+expect_match("the normalised innovation" "${out}" "\nmotion capture and IMU disagree by up to 1\\.[0-9] times their declared noise\n")
 file(WRITE ${WORK}/flights/hummingbird_identified.toml "schema = 1\n")
 expect_refused("${WORK}/flights/0000/../hummingbird_identified.toml: is not the file that ${WORK}/flights/0000 was flown with (SHA-256); accepted: that file, or any by --vehicle"
   transitions ${flights})

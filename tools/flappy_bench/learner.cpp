@@ -57,7 +57,7 @@ double per_second(double seconds, double (*clock)(), const std::function<void()>
 class Torch {
  public:
   Torch(const LearnerOptions& o, const Replay& replay, const Learner<float>& start)
-      : replay_(replay), rows_(o.batch), peer_(o, replay, false, oracle::TorchLearner::start(start)) {}
+      : replay_(replay), rows_(o.batch), peer_(o, replay, false, reference::TorchLearner::start(start)) {}
   void update() {
     replay_.sample(0, count_++, 0, rows_);
     peer_.update(rows_, {}, kRate, kRate);
@@ -66,7 +66,7 @@ class Torch {
  private:
   const Replay& replay_;
   std::vector<std::uint32_t> rows_;
-  oracle::TorchLearner peer_;
+  reference::TorchLearner peer_;
   std::uint64_t count_ = 0;
 };
 #endif

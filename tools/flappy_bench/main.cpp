@@ -38,7 +38,7 @@ std::vector<std::string> facts() {
   list.push_back("DART " DART_VERSION);
 #endif
 #ifdef FLAPPY_HAVE_TORCH
-  list.push_back("LibTorch " + oracle::TorchLearner::version());
+  list.push_back("LibTorch " + reference::TorchLearner::version());
 #endif
   return list;
 }
@@ -173,7 +173,7 @@ Json learner(const SpeedOptions& options) {
   }
   std::printf("this core does %.0f G multiply-adds/s\n", peak / 1e9);
 #ifdef FLAPPY_HAVE_TORCH
-  if (options.peers) std::printf("LibTorch %s\n", oracle::TorchLearner::version().c_str());
+  if (options.peers) std::printf("LibTorch %s\n", reference::TorchLearner::version().c_str());
 #endif
   return {{"learner", list}, {"peak_multiply_adds_per_s", peak}, {"instruction_set", sim::best_instruction_set()}};
 }

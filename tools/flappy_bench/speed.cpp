@@ -135,13 +135,13 @@ SpeedReport measure_speed(const model::Vehicle& vehicle, const SpeedOptions& opt
     const double hz = vehicle.driver.flapping_Hz;
     candidates.push_back({"MuJoCo",
                           [&vehicle, &options, hz] {
-                            oracle::MujocoPeer peer(vehicle, {.step_s = kStep_s});
+                            reference::MujocoPeer peer(vehicle, {.step_s = kStep_s});
                             return peer_steps_per_s(peer, hz, options.seconds);
                           },
                           {}});
     candidates.push_back({"DART",
                           [&vehicle, &options, hz] {
-                            oracle::DartPeer peer(vehicle, {.step_s = kStep_s});
+                            reference::DartPeer peer(vehicle, {.step_s = kStep_s});
                             return peer_steps_per_s(peer, hz, options.seconds);
                           },
                           {}});

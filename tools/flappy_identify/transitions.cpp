@@ -52,8 +52,8 @@ void print(const Request& request, const TransitionReport& r, double wall_s) {
       "%zu flights, %zu samples replayed of %zu (%zu too low, %zu where streams are missing), %zu diverged; %.2f s\n",
       request.flights.size(), r.samples, r.recorded, r.low, r.not_covered, r.diverged, wall_s);
   if (r.diverged > 0) std::printf("those that diverged count as infinitely far off\n");
-  if (request.options.accept_surprise)
-    std::printf("motion capture and IMU disagree by up to %.1f times their declared noise\n", r.surprise);
+  if (request.options.accept_innovation)
+    std::printf("motion capture and IMU disagree by up to %.1f times their declared noise\n", r.normalised_innovation);
   std::printf("one beat is %.1f ms, two are %.1f: whole intervals of %s\n", 1e3 * r.beats_s[0], 1e3 * r.beats_s[1],
               request.options.source == Source::truth ? "truth.csv" : "the IMU");
   std::printf(request.options.source == Source::truth ? "from truth.csv: what is left is the vehicle's error alone\n"
@@ -106,7 +106,7 @@ Json run(const Request& request) {
           {"diverged", r.diverged},
           {"beat_s", r.beats_s[0]},
           {"two_beats_s", r.beats_s[1]},
-          {"sensor_surprise", r.surprise},
+          {"normalised_innovation", r.normalised_innovation},
           {"from_truth", request.options.source == Source::truth},
           {"range", by_state(r.range, kAbsolute)},
           {"error_1beat", by_state(r.quantile(1, 0.5, true), kShare)},
@@ -134,8 +134,9 @@ Command add_transitions(const io::Command& program) {
       .range(1, 10'000'000)
       .excludes(samples);
   sub.option("--csv", request->csv, "write the distributions of all errors to this file");
-  sub.flag("--accept-surprise", request->options.accept_surprise,
+  sub.flag("--accept-innovation", request->options.accept_innovation,
            "also flights whose motion capture and IMU disagree by more than 5 times their declared noise");
+  sub.renamed_flag("--accept-surprise", "--accept-innovation");
   sub.flag("--truth", request->truth,
            "states and wings from truth.csv of simulated flights: the floor without sensors");
   return {sub, [request] {

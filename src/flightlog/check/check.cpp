@@ -49,7 +49,7 @@ void check_repeats(const std::string& name, const std::vector<const Column*>& co
          {}});
 }
 
-void check_latencies(const flightlog::FlightHeader& h, Findings& findings) {
+void check_latencies(const FlightHeader& h, Findings& findings) {
   // Cameras and radio links take a hundredth of a second; a tenth is three beats of open loop, which nobody flies.
   constexpr double kLargest_s = 0.1;
   std::string wrong;
@@ -131,7 +131,7 @@ std::size_t CheckReport::count(Verdict verdict) const {
 }
 
 CheckReport check_flight(const FlightLog& log) {
-  const flightlog::FlightHeader& h = log.header;
+  const FlightHeader& h = log.header;
   CheckReport report;
   const auto add = [&](const char* name, const Column& t_s, std::optional<double> declared_hz) {
     report.streams.push_back(stream_statistics(name, t_s, declared_hz));
@@ -142,10 +142,10 @@ CheckReport check_flight(const FlightLog& log) {
   add("imu", log.imu.t_s, h.imu.rate_hz);
   if (log.power) add("power", log.power->t_s, h.power->rate_hz);
   if (log.wings) add("wings", log.wings->t_s, h.wings->rate_hz);
-  const flightlog::MocapStream& m = log.mocap;
+  const MocapStream& m = log.mocap;
   check_repeats("mocap", {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz}, h.mocap.position_noise_m,
                 report.findings);
-  const flightlog::ImuStream& i = log.imu;
+  const ImuStream& i = log.imu;
   check_repeats("imu",
                 {&i.gyro_x_rad_s, &i.gyro_y_rad_s, &i.gyro_z_rad_s, &i.accel_x_m_s2, &i.accel_y_m_s2, &i.accel_z_m_s2},
                 h.imu.gyro_noise_rad_s, report.findings);

@@ -41,6 +41,6 @@ struct CheckReport {
   std::size_t count(Verdict verdict) const;
 };
 
-CheckReport check_flight(const flightlog::FlightLog& log);
+CheckReport check_flight(const FlightLog& log);
 
 }  // namespace flappy::flightlog

@@ -73,7 +73,7 @@ void check_frequency(const FlightLog& log, Findings& findings) {
 }
 
 void check_phase(const FlightLog& log, Findings& findings) {
-  const flightlog::CommandStream& u = log.command;
+  const CommandStream& u = log.command;
   if (!u.phase_rad) return;
   const std::string name = "wing-beat phase";
   const double interval = median_interval(u.t_s), f = log.header.flapping_Hz;
@@ -114,9 +114,9 @@ void check_phase(const FlightLog& log, Findings& findings) {
 }
 
 void check_inputs(const FlightLog& log, Findings& findings) {
-  const flightlog::CommandStream& u = log.command;
+  const CommandStream& u = log.command;
   if (!u.inputs) return;
-  const flightlog::BeatInputs& in = *u.inputs;
+  const BeatInputs& in = *u.inputs;
   double beyond = 0, worst = 0, worst_t_s = 0;
   std::size_t first = u.t_s.size();
   for (std::size_t i = 0; i < u.t_s.size(); ++i) {
@@ -151,8 +151,8 @@ void check_inputs(const FlightLog& log, Findings& findings) {
 }  // namespace
 
 void check_space(const FlightLog& log, Findings& findings) {
-  const flightlog::LogAmbient& a = log.header.ambient;
-  const flightlog::MocapStream& m = log.mocap;
+  const LogAmbient& a = log.header.ambient;
+  const MocapStream& m = log.mocap;
   const double slack = 0.005 + 6 * log.header.mocap.position_noise_m;  // markers are set by hand; 6 sd: one in 1e9
   std::vector<std::string> crossed;
   const auto look = [&](const std::string& what, const std::string& cause, const auto& height) {
@@ -173,7 +173,7 @@ void check_space(const FlightLog& log, Findings& findings) {
   look("above the ceiling", "another origin, z not up, or not in metres",
        [&](std::size_t i) { return a.ceiling_z_m - m.z_m[i]; });
   for (std::size_t w = 0; w < a.walls.size(); ++w) {
-    const flightlog::LogWall& wall = a.walls[w];
+    const LogWall& wall = a.walls[w];
     look("behind wall " + std::to_string(w), "another origin, its normal reversed, or not in metres",
          [&](std::size_t i) { return (m.x_m[i] - wall.x_m) * wall.normal_x + (m.y_m[i] - wall.y_m) * wall.normal_y; });
   }
@@ -188,8 +188,8 @@ void check_command(const FlightLog& log, Findings& findings) {
 
 void check_power(const FlightLog& log, Findings& findings) {
   if (!log.power) return;
-  const flightlog::PowerStream& p = *log.power;
-  const flightlog::PowerHeader& h = *log.header.power;
+  const PowerStream& p = *log.power;
+  const PowerHeader& h = *log.header.power;
   const double battery = io::upper_median(p.battery_V);
   const std::string seen = format("%.3g V in the middle, %.3g V nominal", battery, h.battery_nominal_V);
   // A lithium cell of nominally 3.7 V holds 3.0 to 4.2 V.
@@ -232,7 +232,7 @@ void check_power(const FlightLog& log, Findings& findings) {
 
 void check_wings(const FlightLog& log, Findings& findings) {
   if (!log.wings) return;
-  const flightlog::WingsStream& w = *log.wings;
+  const WingsStream& w = *log.wings;
   const bool driven = rms(log.command.left_voltage_V) > 1;
   const auto look = [&](const std::string& name, const Column& angles) {
     const double a = amplitude(angles), noise = log.header.wings->noise_rad;

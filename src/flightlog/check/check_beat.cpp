@@ -70,8 +70,8 @@ Finding compare(const std::string& name, const Column& t_s, const std::vector<co
 
 }  // namespace
 
-void check_beat(const flightlog::FlightLog& log, Findings& findings) {
-  const flightlog::CommandStream& u = log.command;
+void check_beat(const FlightLog& log, Findings& findings) {
+  const CommandStream& u = log.command;
   const auto driven = beat_frequency(u.t_s, u.left_voltage_V);
   const double turn_rad_s = driven ? 2 * std::numbers::pi * *driven : 0;
   const PhasorTurn volts = driven ? turn_of(u.t_s, {&u.left_voltage_V, &u.right_voltage_V}, turn_rad_s) : PhasorTurn{};
@@ -81,7 +81,7 @@ void check_beat(const flightlog::FlightLog& log, Findings& findings) {
     else findings.push_back(compare(name, t_s, columns, turn_rad_s, volts.rad_s));
   };
   // Gyro and accelerometer shake by some rad/s and m/s^2 alike; units that are wrong leave their phases right.
-  const flightlog::ImuStream& s = log.imu;
+  const ImuStream& s = log.imu;
   look("imu beat", s.t_s,
        {&s.gyro_x_rad_s, &s.gyro_y_rad_s, &s.gyro_z_rad_s, &s.accel_x_m_s2, &s.accel_y_m_s2, &s.accel_z_m_s2});
   if (log.power) look("power beat", log.power->t_s, {&log.power->left_current_A, &log.power->right_current_A});

@@ -7,8 +7,8 @@
 
 namespace flappy::flightlog {
 
-void check_motion(const flightlog::FlightLog& log, Findings& findings) {
-  const flightlog::FlightHeader& h = log.header;
+void check_motion(const FlightLog& log, Findings& findings) {
+  const FlightHeader& h = log.header;
   // Whole beats, in which what the beat shakes averages out; about 50 ms, and two samples of mocap or more.
   const double window_s =
       std::max(std::round(0.05 * h.flapping_Hz), std::ceil(2.5 / h.mocap.rate_hz * h.flapping_Hz)) / h.flapping_Hz;

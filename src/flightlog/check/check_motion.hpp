@@ -14,7 +14,7 @@ inline constexpr double kDegree = std::numbers::pi / 180;
 inline constexpr char kAxes[] = "xyz";
 
 struct Context {
-  const flightlog::FlightLog& log;
+  const FlightLog& log;
   Findings& findings;
   SensorMotion motion;
   std::vector<BeatWindow> windows;

@@ -23,23 +23,23 @@ using Findings = std::vector<Finding>;
 std::size_t index_before(const std::vector<double>& times, double t);
 
 /// The line of a stream's file at a time since its first sample.
-std::size_t line_at(const flightlog::Column& t_s, double after_s);
+std::size_t line_at(const Column& t_s, double after_s);
 
-StreamStatistics stream_statistics(const std::string& name, const flightlog::Column& t_s,
+StreamStatistics stream_statistics(const std::string& name, const Column& t_s,
                                    std::optional<double> declared_hz);
 
 /// Rate of rises through the mean, from the median of the time between them; nothing with fewer than five.
-std::optional<double> beat_frequency(const flightlog::Column& t_s, const flightlog::Column& values);
+std::optional<double> beat_frequency(const Column& t_s, const Column& values);
 
 /// Gyro, attitude, accelerometer, position and their clocks.
-void check_motion(const flightlog::FlightLog& log, Findings& findings);
+void check_motion(const FlightLog& log, Findings& findings);
 /// Positions against the ground, the ceiling and the walls.
-void check_space(const flightlog::FlightLog& log, Findings& findings);
+void check_space(const FlightLog& log, Findings& findings);
 /// The beat of the other streams against that of the voltages: their clocks.
-void check_beat(const flightlog::FlightLog& log, Findings& findings);
+void check_beat(const FlightLog& log, Findings& findings);
 /// Voltages against the frequency, inputs and phase of the beat.
-void check_command(const flightlog::FlightLog& log, Findings& findings);
-void check_power(const flightlog::FlightLog& log, Findings& findings);
-void check_wings(const flightlog::FlightLog& log, Findings& findings);
+void check_command(const FlightLog& log, Findings& findings);
+void check_power(const FlightLog& log, Findings& findings);
+void check_wings(const FlightLog& log, Findings& findings);
 
 }  // namespace flappy::flightlog

@@ -53,7 +53,7 @@ std::optional<LagEstimate> refine_from(const Context& c, const std::vector<BeatW
 
 /// Whether the gyro's clock could be told against mocap's; leaves lag and frame.
 bool check_clock(Context& c) {
-  const flightlog::ImuHeader& imu = c.log.header.imu;
+  const ImuHeader& imu = c.log.header.imu;
   const auto not_tested = [&](const std::string& why) {
     c.add_finding("clock", Verdict::not_tested, why);
     return false;

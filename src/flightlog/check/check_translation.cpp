@@ -100,7 +100,7 @@ std::optional<Matrix3d> check_gravity(Context& c) {
 void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
   const auto not_tested = [&](const std::string& why) { c.add_finding("position scale", Verdict::not_tested, why); };
   if (!correction) return not_tested("needs an accelerometer that is understood");
-  const flightlog::FlightHeader& h = c.log.header;
+  const FlightHeader& h = c.log.header;
   // Second differences of the position over T against the acceleration weighted with a triangle of 2 T.
   const double span_s = std::max(std::round(0.2 * h.flapping_Hz), 1.0) / h.flapping_Hz;
   const std::vector<double>& t = c.motion.imu_t_s();
@@ -166,7 +166,7 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
 }
 
 void check_speed(Context& c) {
-  const flightlog::MocapStream& m = c.log.mocap;
+  const MocapStream& m = c.log.mocap;
   std::vector<double> speeds;
   const double usual_s = 1 / stream_statistics("", m.t_s, std::nullopt).rate_hz;
   for (std::size_t i = 1; i < m.t_s.size(); ++i) {

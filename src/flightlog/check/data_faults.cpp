@@ -32,9 +32,9 @@ double command_rate_hz(const Column& t_s) {
 
 /// Voltages, motion capture and IMU, which every diagnosis needs, then the others.
 std::vector<DeclaredStream> streams_of(const FlightLog& log) {
-  const flightlog::MocapStream& m = log.mocap;
-  const flightlog::ImuStream& s = log.imu;
-  const flightlog::FlightHeader& h = log.header;
+  const MocapStream& m = log.mocap;
+  const ImuStream& s = log.imu;
+  const FlightHeader& h = log.header;
   std::vector<DeclaredStream> list = {{kCommand, &log.command.t_s, command_rate_hz(log.command.t_s), {}},
                                       {kMocap, &m.t_s, h.mocap.rate_hz, {}},
                                       {kImu, &s.t_s, h.imu.rate_hz, {}}};

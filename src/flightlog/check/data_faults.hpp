@@ -22,9 +22,9 @@ struct DataFault {
 /// At most one for each file, the one that explains the others; none where the log can be diagnosed. `report`: of the
 /// log; `folder` stands for the place in `file`. Effects of sensors within their priors are none, but for
 /// a vibration rectification of several times its typical size: the mean force is bent as by another attitude.
-std::vector<DataFault> data_faults(const flightlog::FlightLog& log, const CheckReport& report,
+std::vector<DataFault> data_faults(const FlightLog& log, const CheckReport& report,
                                    const std::filesystem::path& folder);
-inline std::vector<DataFault> data_faults(const flightlog::FlightLog& log, const std::filesystem::path& folder) {
+inline std::vector<DataFault> data_faults(const FlightLog& log, const std::filesystem::path& folder) {
   return data_faults(log, check_flight(log), folder);
 }
 

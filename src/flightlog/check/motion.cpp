@@ -61,7 +61,7 @@ const std::vector<Matrix3d>& signed_permutations() {
   return all;
 }
 
-SensorMotion::SensorMotion(const flightlog::FlightLog& log) {
+SensorMotion::SensorMotion(const FlightLog& log) {
   const double start_s = log.mocap.t_s.front() - log.header.mocap.latency_s;
   for (const PoseReading& p : pose_readings(log)) {
     mocap_t_s_.push_back(p.t_s - start_s);
@@ -138,10 +138,10 @@ std::optional<Vector3d> SensorMotion::mean_turn(double begin_s, double end_s) co
     const double to_s = std::min(end_s, imu_t_s_[k + 1]), dt = to_s - from_s;
     const Vector3d first = gyro_at(k, from_s), last = gyro_at(k, to_s);
     // of a rate on a line, coning within the interval included: Savage, J. Guidance, Control and Dynamics 21 (1998)
-    turn = turn * flightlog::exponential((first + last) * (dt / 2) + first.cross(last) * (dt * dt / 12));
+    turn = turn * exponential((first + last) * (dt / 2) + first.cross(last) * (dt * dt / 12));
     from_s = to_s;
   }
-  return flightlog::logarithm(turn) / (end_s - begin_s);
+  return logarithm(turn) / (end_s - begin_s);
 }
 
 double SensorMotion::roughness_rad() const {
@@ -151,7 +151,7 @@ double SensorMotion::roughness_rad() const {
     if (std::max(before, after) > longest_mocap_s_) continue;
     const Quaterniond between =
         attitude(i - 1, Order::wxyz).slerp(before / (before + after), attitude(i + 1, Order::wxyz));
-    squares += flightlog::logarithm(between.conjugate() * attitude(i, Order::wxyz)).squaredNorm() / 3;
+    squares += logarithm(between.conjugate() * attitude(i, Order::wxyz)).squaredNorm() / 3;
     ++count;
   }
   return count > 0 ? std::sqrt(squares / count) : 0;
@@ -169,7 +169,7 @@ std::vector<BeatWindow> make_windows(const SensorMotion& motion, double length_s
       whole &= end.has_value();
       if (end)
         w.rate_rad_s[static_cast<std::size_t>(order)] =
-            flightlog::logarithm(motion.attitude(i, order).conjugate() * *end) / length_s;
+            logarithm(motion.attitude(i, order).conjugate() * *end) / length_s;
     }
     if (whole) windows.push_back(w);
     const std::size_t last = index_before(t, end_s);

@@ -27,7 +27,7 @@ const std::vector<Matrix3d>& signed_permutations();
 /// one before is none.
 class SensorMotion {
  public:
-  explicit SensorMotion(const flightlog::FlightLog& log);
+  explicit SensorMotion(const FlightLog& log);
 
   const std::vector<double>& mocap_t_s() const { return mocap_t_s_; }
   const std::vector<double>& imu_t_s() const { return imu_t_s_; }

@@ -12,7 +12,7 @@
 namespace flappy::learn {
 namespace {
 
-using oracle::TorchLearner;
+using reference::TorchLearner;
 
 struct Case {
   const char* name;

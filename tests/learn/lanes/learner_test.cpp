@@ -1,4 +1,4 @@
-// The learner's promises that need no oracle. Its gradients and updates: autograd_test. Its bits: determinism.
+// The learner's promises that need no reference. Its gradients and updates: autograd_test. Its bits: determinism.
 #include "learn/lanes/learner.hpp"
 
 #include <gtest/gtest.h>
