@@ -88,8 +88,8 @@ std::vector<EffectDetectability> weigh(const std::vector<Development>& vehicles,
       for (std::size_t r = 0; r < blind::kBlindEffects; ++r) {
         const auto rival = static_cast<blind::Effect>(r);
         if (r == e || !in_catalogue(rival)) continue;
-        if (io::median(over_vehicles(
-                [&](const DetectabilityAnalysis& o) { return o.gain_over(effect, at, rival); })) < kNats)
+        if (io::median(over_vehicles([&](const DetectabilityAnalysis& o) { return o.gain_over(effect, at, rival); })) <
+            kNats)
           rivals->push_back(blind::effect_names()[r]);
       }
   }

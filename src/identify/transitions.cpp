@@ -232,9 +232,9 @@ void Transitions::add(const std::filesystem::path& folder, const flightlog::Flig
   const double innovation = std::sqrt(
       std::max({t.angle_normalised_innovation(), t.position_normalised_innovation(), t.bias_normalised_innovation()}));
   if (!(innovation <= kLargestInnovation) && !options_.accept_innovation)
-    refuse("motion capture and IMU disagree, or are biased, by " + io::shortest_digits(std::round(10 * innovation) / 10) +
-           " times their declared noise; accepted: at most " + io::shortest_digits(kLargestInnovation) +
-           ", or any by --accept-innovation; flappy-gap check says more");
+    refuse("motion capture and IMU disagree, or are biased, by " +
+           io::shortest_digits(std::round(10 * innovation) / 10) + " times their declared noise; accepted: at most " +
+           io::shortest_digits(kLargestInnovation) + ", or any by --accept-innovation; flappy-gap check says more");
   normalised_innovation_ = std::max(normalised_innovation_, innovation);
   flight->choose_starts();
   if (flight->starts_s.empty()) {

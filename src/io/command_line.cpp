@@ -69,7 +69,8 @@ Command Command::command(const std::string& name, const std::string& help) const
   return Command(app_->add_subcommand(name, help));
 }
 void Command::renamed_flag(const std::string& name, const std::string& now) const {
-  app_->add_flag_callback(name, [=] { throw InputError(name + ": has another name now; accepted: " + now); })->group("");
+  app_->add_flag_callback(name, [=] { throw InputError(name + ": has another name now; accepted: " + now); })
+      ->group("");
 }
 Command Command::hidden_command(const std::string& name) const {
   return Command(app_->add_subcommand(name)->group("")->allow_extras()->fallthrough(false));

@@ -16,7 +16,7 @@ struct SimulatedFlight {
 /// Flies `vehicle` `copies` times on one thread, each with noise of its own, as `config` says (its own vehicle and
 /// randomisation are not used): path, controller or actor, sensors, excitation, duration. What comes before `from_s` is not
 /// logged, nor is a flight judged there.
-std::vector<SimulatedFlight> simulate(const FlyConfig& config, const model::Vehicle& vehicle,
-                                      std::size_t copies, double from_s = 0);
+std::vector<SimulatedFlight> simulate(const FlyConfig& config, const model::Vehicle& vehicle, std::size_t copies,
+                                      double from_s = 0);
 
 }  // namespace flappy::rollout

@@ -153,7 +153,8 @@ TEST(BlindEffects, HaveNamesOfTheirOwn) {
 
 /// The benchmark takes those before the first outside_... for the catalogue.
 TEST(BlindEffects, HaveThoseOutsideTheCatalogueLast) {
-  EXPECT_TRUE(std::ranges::is_partitioned(effect_names(), [](const auto& name) { return !name.starts_with("outside_"); }));
+  EXPECT_TRUE(
+      std::ranges::is_partitioned(effect_names(), [](const auto& name) { return !name.starts_with("outside_"); }));
 }
 
 }  // namespace

@@ -25,8 +25,7 @@ std::size_t index_before(const std::vector<double>& times, double t);
 /// The line of a stream's file at a time since its first sample.
 std::size_t line_at(const Column& t_s, double after_s);
 
-StreamStatistics stream_statistics(const std::string& name, const Column& t_s,
-                                   std::optional<double> declared_hz);
+StreamStatistics stream_statistics(const std::string& name, const Column& t_s, std::optional<double> declared_hz);
 
 /// Rate of rises through the mean, from the median of the time between them; nothing with fewer than five.
 std::optional<double> beat_frequency(const Column& t_s, const Column& values);
