@@ -39,8 +39,8 @@ struct TransitionReport {
   std::size_t samples = 0, recorded = 0, low = 0, not_covered = 0, diverged = 0;
   /// Length of the replays: one and two beats in whole intervals of the IMU, or between rows of truth.csv.
   std::array<double, 2> beats_s{};
-  double normalised_innovation =
-      0;                ///< by how many times their declared noise the sensors disagree, in the worst of the flights
+  /// By how many times their declared noise the sensors disagree, in the worst of the flights.
+  double normalised_innovation = 0;
   StateVector range{};  ///< within a beat, median over samples, never below the sensors' noise
   /// |simulated - recorded| of each sample, after one and two beats; infinite where the simulator diverged.
   std::array<std::vector<StateVector>, 2> errors;
