@@ -84,14 +84,17 @@ std::vector<EffectDetectability> weigh(const std::vector<Development>& vehicles,
     const double size = std::min(2 * f.detectable, kMostSize);
     if (in_catalogue(effect)) f.value = true_value(*vehicles[0].subject, parameters, effect, size);
     if (!f.undetectable && in_catalogue(effect) && f.value.misfit < kMostMisfit) f.undetectable = beyond_prior(f.value);
-    for (const auto& [at, rivals] : {std::pair{size, &f.inseparable}, std::pair{1.0, &f.inseparable_at_typical}})
+    const auto find_rivals = [&](double at, std::vector<std::string>& rivals) {
       for (std::size_t r = 0; r < blind::kBlindEffects; ++r) {
         const auto rival = static_cast<blind::Effect>(r);
         if (r == e || !in_catalogue(rival)) continue;
         if (io::median(over_vehicles([&](const DetectabilityAnalysis& o) { return o.gain_over(effect, at, rival); })) <
             kNats)
-          rivals->push_back(blind::effect_names()[r]);
+          rivals.push_back(blind::effect_names()[r]);
       }
+    };
+    find_rivals(size, f.inseparable);
+    find_rivals(1, f.inseparable_at_typical);
   }
   return findings;
 }

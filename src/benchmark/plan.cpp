@@ -148,7 +148,7 @@ std::map<std::string, Detectability> read_detectability(const std::filesystem::p
     if (!d.undetectable && kOverDetectable * d.detectable > kLargest)
       t.fail("detectable", "twice that is beyond size 4", "undetectable = true");
     const auto rivals = [&](const char* key) {
-      const std::vector<std::string> list = t.strings(key);
+      std::vector<std::string> list = t.strings(key);
       for (const std::string& rival : list)
         if (model::effect_index(rival.c_str()) < 0)
           t.fail(key, "no effect \"" + rival + "\"", "identifiers of docs/effects.md");

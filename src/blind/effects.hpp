@@ -1,4 +1,4 @@
-// What may be wrong with the blind robot: the catalogue's thirty effects, each in a form of this room's own, and others
+// What may be wrong with the blind robot: the effects of the catalogue, each in a form of this room's own, and others
 // that no catalogue has (outside_*). An effect has one number, its size: 0 is none, 1 is typical of a 12 g vehicle.
 #pragma once
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "io/csv.hpp"
+#include "io/toml_writer.hpp"
 
 namespace flappy::flight {
 namespace {
@@ -220,7 +221,8 @@ void read_hand_back(const io::Table& table, HandBack<double>& h) {
   if (!t) return;
   const auto bound = [&](const char* name, double otherwise) { return t->number_or(name, otherwise, {-kFar, kFar}); };
   const std::string on = t->string_or("on", "truth");
-  if (on != "truth" && on != "estimate") t->fail("on", "is not known", "\"truth\" or \"estimate\"");
+  if (on != "truth" && on != "estimate")
+    t->fail("on", io::toml_string(on) + " is not known", "\"truth\" or \"estimate\"");
   h = {1,
        on == "estimate" ? 1.0 : 0.0,
        bound("x_m", -kFar),
@@ -358,7 +360,8 @@ Task read_task(const io::Table& table, double tick_s) {
   const std::string base = table.string_or("base", "controller");
   k.holds_trim = base == "trim" ? 1 : 0;
   if (base != "trim" && base != "controller")
-    table.fail("base", "is not known", "\"controller\", or \"trim\": what it has learnt, until it is handed back to");
+    table.fail("base", io::toml_string(base) + " is not known",
+               "\"controller\", or \"trim\": what it has learnt, until it is handed back to");
   read_hand_back(table, k.hand_back);
   read_success(table, k.success);
   table.finish();

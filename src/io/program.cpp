@@ -16,15 +16,30 @@ namespace {
 
 constexpr std::array<const char*, 4> kLevels = {"debug", "info", "warning", "error"};  // in the order of LogLevel
 
-/// Those that there are, where one is missing or is none of them.
-std::string subcommands(const CLI::App& app, const CLI::ParseError& error) {
-  if (!std::string_view(error.what()).starts_with("A subcommand is required")) return "";
+/// What is wrong with a command line, and what is accepted there.
+std::string explained(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App* at = &app;
   while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
+  const std::vector<std::string> unknown = app.remaining(true);
+  if (std::string_view(error.what()).starts_with("A subcommand is required")) {
+    std::vector<std::string> names;
+    for (const CLI::App* each : at->get_subcommands([](const CLI::App* each) { return !each->get_group().empty(); }))
+      names.push_back(each->get_name());
+    return (unknown.empty() ? error.what() : unknown.front() + ": no such command") + "; accepted: " + joined(names) +
+           (unknown.empty() ? "" : did_you_mean(unknown.front(), names));
+  }
+  if (unknown.empty()) return error.what();
+  const auto option = std::ranges::find_if(unknown, [](const std::string& word) { return word.starts_with("-"); });
+  if (option == unknown.end())
+    return unknown.front() + ": is not expected; accepted: a value after the option that takes it, one for each";
   std::vector<std::string> names;
-  for (const CLI::App* each : at->get_subcommands([](const CLI::App* each) { return !each->get_group().empty(); }))
-    names.push_back(each->get_name());
-  return "; accepted: " + joined(names);
+  for (const CLI::App* each : {at, &app})
+    for (const CLI::Option* o : each->get_options())
+      if (!o->get_lnames().empty() && !o->get_group().empty()) names.push_back("--" + o->get_lnames().front());
+  std::ranges::sort(names);
+  names.erase(std::ranges::unique(names).begin(), names.end());
+  const std::string name = option->substr(0, option->find('='));
+  return name + ": no such option; accepted: " + joined(names) + did_you_mean(name, names);
 }
 
 }  // namespace
@@ -58,7 +73,7 @@ int Program::run(int argc, char** argv, const std::function<void()>& job) {
     return 0;
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app_->exit(e);  // --help, --version
-    std::fprintf(stderr, "%s: %s%s; see %s --help\n", app_->get_name().c_str(), e.what(), subcommands(*app_, e).c_str(),
+    std::fprintf(stderr, "%s: %s; see %s --help\n", app_->get_name().c_str(), explained(*app_, e).c_str(),
                  app_->get_name().c_str());
     return 2;
   } catch (const InputError& e) {

@@ -48,7 +48,7 @@ Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::s
 }
 
 Vehicle read_vehicle_for_steps(const std::filesystem::path& path, double step_s) {
-  const Vehicle vehicle = read_vehicle(path);
+  Vehicle vehicle = read_vehicle(path);
   const double steps = vehicle.driver.hold_s / step_s;
   if (std::abs(steps - std::round(steps)) > 1e-6 || steps < 0.5)
     io::Config::load(path).root().table("driver").fail(

@@ -32,6 +32,7 @@ using namespace model;
 
 template <class T>
 FLAPPY_INLINE T activated(Activation kind, const T& x) {
+  // NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage): no width is 0
   return kind == Activation::relu ? max(x, T(0)) : tanh(x);
 }
 

@@ -13,10 +13,10 @@ struct SimulatedFlight {
   bool lost = false;                        ///< came apart, tipped over, or strayed from its path while it was logged
 };
 
-/// Flies `vehicle` `copies` times on one thread, each with noise of its own, as `config` says (its own vehicle and
+/// Flies `vehicle` `copies` times on one thread, each with noise of its own, as `given` says (its own vehicle and
 /// randomisation are not used): path, controller or actor, sensors, excitation, duration. What comes before `from_s` is not
 /// logged, nor is a flight judged there.
-std::vector<SimulatedFlight> simulate(const FlyConfig& config, const model::Vehicle& vehicle, std::size_t copies,
+std::vector<SimulatedFlight> simulate(const FlyConfig& given, const model::Vehicle& vehicle, std::size_t copies,
                                       double from_s = 0);
 
 }  // namespace flappy::rollout

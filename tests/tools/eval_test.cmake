@@ -33,6 +33,7 @@ string(REPLACE "\"../" "\"${SOURCE}/configs/" fly "${fly}")
 string(REPLACE "${SOURCE}/configs/tasks/escape.toml" "task.toml" run "${fly}")
 string(REPLACE "precision" "actor = \"../best.json\"\nprecision" run "${run}")
 file(WRITE ${WORK}/run/config/fly.toml "${run}")
+set(run_fly "${run}")
 file(COPY ${WORK}/best.json DESTINATION ${WORK}/run)
 file(COPY ${WORK}/task.toml DESTINATION ${WORK}/run/config)
 
@@ -52,6 +53,13 @@ foreach(row IN ITEMS "success, %( +[0-9.]+)+\n" "95 % interval, from( +[0-9.]+)+
     "nominal vehicle, 20 flights" "time to it, s, median( +[-0-9.]+)+\n" "the hummingbird: 0.25 s; the study's optimum: 0.248 s\n" "hash [0-9a-f]+\n")
   expect_match("stdout" "${out}" "${row}")
 endforeach()
+# A file of a run folder flies as its run does: here 0.65 s without being told.
+string(REGEX REPLACE "duration_s = [^\n]*" "duration_s = 0.65" brief "${run_fly}")
+file(WRITE ${WORK}/brief/config/fly.toml "${brief}")
+file(COPY ${WORK}/best.json DESTINATION ${WORK}/brief)
+file(COPY ${WORK}/task.toml DESTINATION ${WORK}/brief/config)
+run(${WORK}/brief/best.json --set task.success.keep.until_s=0.65 --episodes 2 --no-baselines)
+expect_match("stdout of a run's file" "${out}" "^2 flights of 0.65 s, task escape")
 set(figures episodes=NUMBER success_rate=NUMBER success_low=NUMBER success_high=NUMBER time_to_capture_median_s=NULL
   time_to_capture_p10_s=NULL time_to_capture_p90_s=NULL final_position_error_mm=NUMBER final_heading_error_deg=NUMBER
   overshoot_median_mm=NULL energy_median_J=NUMBER mean_power_median_W=NUMBER failures.crashed=NUMBER
@@ -141,4 +149,4 @@ expect_refused("task \"escape\" would be flown without its excitation, which fla
 expect_refused("flappy-eval: --episodes: Value 0 not in range 1 to 100000; see flappy-eval --help" ${WORK}/best.json --episodes 0)
 expect_refused("flappy-eval: --stream: training not in {test,validation}; see flappy-eval --help" ${WORK}/best.json --stream training)
 expect_refused("flappy-eval: policy is required; see flappy-eval --help")
-expect_refused("flappy-eval: The following argument was not expected: --episode=5; see flappy-eval --help" ${WORK}/best.json --episode=5)
+expect_refused("flappy-eval: --episode: no such option; accepted: --config, --episodes, --help, --json, --log-level, --no-baselines, --seed, --set, --stream, --task, --threads, --vehicle, --version; did you mean \"--episodes\"?; see flappy-eval --help" ${WORK}/best.json --episode=5)

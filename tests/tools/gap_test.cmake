@@ -100,10 +100,11 @@ expect_refused("${WORK}/bad/mocap.csv:1: x_mm: unknown column; accepted here wit
 file(REMOVE ${WORK}/bad/flight.toml)
 expect_refused("${WORK}/bad/flight.toml: cannot be read: No such file or directory" check ${WORK}/bad)
 expect_refused("flappy-gap: A subcommand is required; accepted: check, diagnose; see flappy-gap --help")
+expect_refused("flappy-gap: diagnos: no such command; accepted: check, diagnose; did you mean \"diagnose\"?; see flappy-gap --help" diagnos)
 expect_refused("flappy-gap: flight is required; see flappy-gap --help" check)
 set(diagnose diagnose --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --priors ${SOURCE}/configs/gap/priors.toml
   --flights ${WORK}/good)
-expect_refused("command line: --withhold: no effect \"gale\"; accepted: identifiers of docs/effects.md" ${diagnose} --withhold gale)
+expect_refused("--withhold gale: no such effect; accepted: identifiers of docs/effects.md" ${diagnose} --withhold gale)
 expect_refused("${WORK}/good/imu.csv: cannot be written: Not a directory" ${diagnose} --out ${WORK}/good/imu.csv)
 
 # ---- data that forbid a diagnosis are a result; nothing of an earlier one stays beside it

@@ -43,10 +43,13 @@ std::string file_override(const char* key, const fs::path& path) {
   return std::string(key) + "=" + io::toml_string(fs::absolute(path).string());
 }
 
-/// What is flown: the run's own configuration, or --config with the policy in it.
+/// What is flown: the configuration of the run that the policy is or lies in, or --config with the policy in it.
 FlyConfig read_config(const Request& r) {
   const fs::path policy = r.policy;
-  fs::path config = r.config.empty() ? io::config_path("fly/escape.toml") : r.config;
+  const fs::path of_run = fs::absolute(policy).parent_path() / "config" / "fly.toml";
+  fs::path config = !r.config.empty()    ? fs::path(r.config)
+                    : fs::exists(of_run) ? of_run
+                                         : fs::path(io::config_path("fly/escape.toml"));
   std::vector<std::string> overrides;
   if (fs::is_directory(policy)) {
     if (!r.config.empty())

@@ -69,7 +69,8 @@ Members feedback_of(const flight::FlightConstants& all) {
   const auto k = flight::rounded<float>(all.controller.of<C>());
   C::exported(k, [&](const char* name, const auto& numbers) {
     const float* first = reinterpret_cast<const float*>(&numbers);
-    list.push_back({name, {first, first + sizeof numbers / sizeof(float)}});
+    constexpr std::size_t kCount = sizeof(std::remove_cvref_t<decltype(numbers)>) / sizeof(float);
+    list.push_back({name, {first, first + kCount}});
   });
   return list;
 }

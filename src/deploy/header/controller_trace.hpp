@@ -47,6 +47,6 @@ struct ControllerTrace {
 /// A flight of the configuration's vehicle under its actor, the nominal one. The hand-back is the estimate's, and the IMU's
 /// latency counts in whole control periods, as on board. Same bytes for any number of threads, on any processor. `begin`:
 /// control periods before the first that is recorded; -1: half of `periods` before the hand-back.
-ControllerTrace record_controller(const rollout::FlyConfig& config, int periods = 50, int begin = -1);
+ControllerTrace record_controller(const rollout::FlyConfig& given, int periods = 50, int begin = -1);
 
 }  // namespace flappy::deploy

@@ -17,7 +17,7 @@ inline constexpr std::uint32_t kRolloutFlappers = std::uint32_t{3} << 30;
 
 /// Observations and actions of `count` randomised vehicles, flown by the actor in single precision until hand-back or end,
 /// in the order of flights; those from `first` on.
-policy::PolicyVectors roll_out(const rollout::FlyConfig& config, std::size_t first, std::size_t count);
+policy::PolicyVectors roll_out(const rollout::FlyConfig& given, std::size_t first, std::size_t count);
 
 /// At most `count` rows, evenly chosen.
 policy::PolicyVectors some_of(const policy::PolicyVectors& all, std::size_t count);

@@ -214,7 +214,9 @@ std::optional<Sync> find_lag(const SensorMotion& motion, const std::vector<BeatW
   constexpr double kPenalty_per_s = 0.1, kOtherFrame = 0.01;
   std::optional<Sync> best;
   double best_score = 0;
-  for (double lag_s = -kRange_s; lag_s <= kRange_s; lag_s += kStep_s) {
+  const auto steps = static_cast<int>(std::lround(kRange_s / kStep_s));
+  for (int n = -steps; n <= steps; ++n) {
+    const double lag_s = n * kStep_s;
     Pairs pairs = pair_up(motion, windows, Order::wxyz, {0, lag_s, 0});
     if (pairs.mocap.size() < 10) continue;
     for (const Order order : kOrders) {

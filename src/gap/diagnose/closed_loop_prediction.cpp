@@ -165,8 +165,8 @@ Path path_of(const std::vector<Beat>& beats, const sim::World& world, double tic
   std::vector<OnPath> knots;
   const double first_s = beats.front().t_s, span_s = beats.back().t_s - first_s;
   GapLocation low = place_of(beats.front()), high = low, mean = GapLocation::Zero();
-  for (double t_s = 0; t_s <= span_s; t_s += kKnot_s) {
-    knots.push_back(path_at(beats, first_s + t_s, kFlownSd_s));
+  for (std::size_t n = 0; static_cast<double>(n) * kKnot_s <= span_s; ++n) {
+    knots.push_back(path_at(beats, first_s + static_cast<double>(n) * kKnot_s, kFlownSd_s));
     low = low.cwiseMin(knots.back().at), high = high.cwiseMax(knots.back().at);
     mean += knots.back().at;
   }

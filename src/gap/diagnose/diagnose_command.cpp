@@ -113,10 +113,12 @@ Asked read_asked(const DiagnoseCommand& command) {
         .root()
         .fail("effects", "what is missing is asked of the vehicle as it was believed", "a vehicle without effects");
   std::vector<std::string> withheld;
+  std::vector<std::string> ids;
+  for (const auto& effect : model::effects()) ids.push_back(effect.info.id);
   for (const std::string& id : command.withheld) {
     if (model::effect_index(id.c_str()) < 0)
-      throw io::InputError("command line: --withhold: no effect \"" + id +
-                           "\"; accepted: identifiers of docs/effects.md");
+      throw io::InputError("--withhold " + id + ": no such effect; accepted: identifiers of docs/effects.md" +
+                           io::did_you_mean(id, ids));
     for (std::string& member : model::whole_group(id)) withheld.push_back(std::move(member));
   }
   flightlog::check_each_once(command.flights);

@@ -40,8 +40,9 @@ Json number(const std::optional<double>& value) { return value ? Json(*value) : 
 
 }  // namespace
 
-std::vector<SizeEstimate> sizes_of(const ScoredHypothesis& a, const sim::Randomisation& uncertain) {
+std::vector<SizeEstimate> sizes_of(const ScoredHypothesis& hypothesis, const sim::Randomisation& uncertain) {
   std::vector<SizeEstimate> sizes;
+  const auto& a = hypothesis;
   if (a.fit.point.at.size() == 0) return sizes;
   const Hypothesis h(uncertain, a.effects);
   const Eigen::VectorXd mean = a.fit.mean();

@@ -145,7 +145,9 @@ void Recording::find_phase() {
     double best = -1;
     const double span_s = c.t_s.back() - c.t_s.front();
     const double reach = log.header.flapping_Hz * kFrequencyReach, step = 0.1 / std::max(span_s, 1e-3);
-    for (double hz = log.header.flapping_Hz - reach; hz <= log.header.flapping_Hz + reach; hz += step) {
+    const auto tried = static_cast<int>(2 * reach / step);
+    for (int n = 0; n <= tried; ++n) {
+      const double hz = log.header.flapping_Hz - reach + n * step;
       double cosine = 0, sine = 0;
       for (std::size_t i = 0; i < c.t_s.size(); ++i) {
         const double v = c.left_voltage_V[i] + c.right_voltage_V[i], a = kTurn * hz * (c.t_s[i] - begin_s);
