@@ -37,7 +37,7 @@ std::string explained(const CLI::App& app, const CLI::ParseError& error) {
     for (const CLI::Option* o : each->get_options())
       if (!o->get_lnames().empty() && !o->get_group().empty()) names.push_back("--" + o->get_lnames().front());
   std::ranges::sort(names);
-  names.erase(std::ranges::unique(names).begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
   const std::string name = option->substr(0, option->find('='));
   return name + ": no such option; accepted: " + joined(names) + did_you_mean(name, names);
 }

@@ -69,6 +69,7 @@ Members feedback_of(const flight::FlightConstants& all) {
   const auto k = flight::rounded<float>(all.controller.of<C>());
   C::exported(k, [&](const char* name, const auto& numbers) {
     const float* first = reinterpret_cast<const float*>(&numbers);
+    // NOLINTNEXTLINE(bugprone-sizeof-expression): numbers, not a pointer to them
     constexpr std::size_t kCount = sizeof(std::remove_cvref_t<decltype(numbers)>) / sizeof(float);
     list.push_back({name, {first, first + kCount}});
   });
