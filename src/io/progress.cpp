@@ -49,6 +49,7 @@ double steady_seconds() {
 
 void TimeLeft::add(double now_s, double done) {
   constexpr double kWindow_s = 20, kApart_s = 0.1;
+  if (done < done_) points_.clear();  // work that begins anew
   done_ = done;
   if (!points_.empty() && (done <= points_.back().done || now_s < points_.back().at_s + kApart_s)) return;
   points_.push_back({now_s, done});

@@ -17,7 +17,7 @@ bool interrupted();
 /// three advances where those took longer.
 class TimeLeft {
  public:
-  /// `done`: 0 to 1, at a time that does not go back.
+  /// `done`: 0 to 1, at a time that does not go back. Where `done` goes back, what was before says nothing any more.
   void add(double now_s, double done);
   /// Nothing before three advances.
   std::optional<double> seconds(double now_s) const;

@@ -65,6 +65,15 @@ TEST(TimeLeft, IsThatOfTheRecentRate) {
   EXPECT_NEAR(*left.seconds(now_s + 20), 140, 1e-6) << "nothing done for as long again";
 }
 
+TEST(TimeLeft, ForgetsWorkThatBeginsAnew) {
+  TimeLeft left;
+  for (int i = 0; i <= 10; ++i) left.add(i, 0.1 * i);
+  left.add(11, 0.01);
+  EXPECT_FALSE(left.seconds(11));
+  for (int i = 1; i <= 4; ++i) left.add(11 + i, 0.01 + 0.01 * i);
+  EXPECT_NEAR(*left.seconds(15), 95, 1e-6);
+}
+
 TEST(TimeLeft, IsUnknownBeforeThreeAdvances) {
   TimeLeft left;
   EXPECT_FALSE(left.seconds(0));

@@ -114,7 +114,8 @@ class Evaluation {
       progress.show(done);
       return !io::interrupted();
     };
-    const rollout::Evaluation few = nominal.fly(agent, rollout::Detail::full, keep_going);
+    const rollout::Evaluation few =
+        nominal.fly(agent, rollout::Detail::full, [](double) { return !io::interrupted(); });
     column.nominal = rollout::summarise(few.flights);
     column.stopped = few.stopped;
     if (few.stopped) return column;
