@@ -1,7 +1,12 @@
 #include "torch_peer.hpp"
 
 #include <dlfcn.h>
-#include <torch/torch.h>
+#include <torch/csrc/autograd/autograd.h>
+#include <torch/csrc/autograd/generated/variable_factories.h>
+#include <torch/nn/modules/linear.h>
+#include <torch/optim/adam.h>
+#include <torch/utils.h>
+#include <torch/version.h>
 
 #include <filesystem>
 
