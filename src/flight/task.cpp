@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "io/csv.hpp"
-#include "io/toml_writer.hpp"
 
 namespace flappy::flight {
 namespace {
@@ -220,9 +219,7 @@ void read_hand_back(const io::Table& table, HandBack<double>& h) {
   const auto t = table.optional_table("hand_back");
   if (!t) return;
   const auto bound = [&](const char* name, double otherwise) { return t->number_or(name, otherwise, {-kFar, kFar}); };
-  const std::string on = t->string_or("on", "truth");
-  if (on != "truth" && on != "estimate")
-    t->fail("on", io::toml_string(on) + " is not known", "\"truth\" or \"estimate\"");
+  const std::string on = t->choice_or("on", "truth", {"truth", "estimate"});
   h = {1,
        on == "estimate" ? 1.0 : 0.0,
        bound("x_m", -kFar),
@@ -357,11 +354,8 @@ Task read_task(const io::Table& table, double tick_s) {
               limit("arrived_by_s", kFar),
               limit("arrived_x_m", -kFar)};
 
-  const std::string base = table.string_or("base", "controller");
-  k.holds_trim = base == "trim" ? 1 : 0;
-  if (base != "trim" && base != "controller")
-    table.fail("base", io::toml_string(base) + " is not known",
-               "\"controller\", or \"trim\": what it has learnt, until it is handed back to");
+  // "trim": what the controller has learnt, until it is handed back to
+  k.holds_trim = table.choice_or("base", "controller", {"controller", "trim"}) == "trim" ? 1 : 0;
   read_hand_back(table, k.hand_back);
   read_success(table, k.success);
   table.finish();

@@ -437,6 +437,11 @@ std::string Table::choice(std::string_view key, const std::vector<std::string>& 
   return value;
 }
 
+std::string Table::choice_or(std::string_view key, std::string_view fallback,
+                             const std::vector<std::string>& accepted) const {
+  return has(key) ? choice(key, accepted) : string_or(key, fallback);
+}
+
 std::vector<double> Table::numbers(std::string_view key, Range each) const {
   std::vector<double> values;
   for (const Entry& entry : elements(*section_, key, "an array, each " + describe(each))) {

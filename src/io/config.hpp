@@ -54,6 +54,8 @@ class Table {
   std::string string(std::string_view key) const;
   std::string string_or(std::string_view key, std::string_view fallback) const;
   std::string choice(std::string_view key, const std::vector<std::string>& accepted) const;
+  std::string choice_or(std::string_view key, std::string_view fallback,
+                        const std::vector<std::string>& accepted) const;
   std::vector<double> numbers(std::string_view key, Range each = {}) const;
   /// Exactly `length` numbers.
   std::vector<double> numbers(std::string_view key, std::size_t length, Range each = {}) const;

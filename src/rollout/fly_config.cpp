@@ -126,10 +126,7 @@ class Reader {
     c_.fleet.control_hz = t.number_or("control_hz", 500, {10, 10000});
     c_.fleet.batch.step_s = t.number_or("step_s", 1e-4, {1e-6, 1e-3});
     c_.fleet.batch.threads = static_cast<int>(t.integer_or("threads", 0, 0, 1024));
-    const std::string support = t.string_or("support", "task");
-    if (support != "task" && support != "welded")
-      t.fail("support", io::toml_string(support) + " is not known", "\"task\", \"welded\"");
-    c_.welded = support == "welded";
+    c_.welded = t.choice_or("support", "task", {"task", "welded"}) == "welded";
   }
 
   /// A file that the configuration names, its overrides applied.

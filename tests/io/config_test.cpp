@@ -334,6 +334,13 @@ TEST(Config, RefusesUnknownChoices) {
   EXPECT_EQ(message("k = 'huver'", read),
             "v.toml:1:5: k: \"huver\" is not known; accepted: \"hover\", \"landing\"; did you mean \"hover\"?");
   EXPECT_EQ(message("k = 'x'", read), "v.toml:1:5: k: \"x\" is not known; accepted: \"hover\", \"landing\"");
+  std::string chosen;
+  const Read read_or = [&](const Table& root) { chosen = root.choice_or("k", "landing", {"hover", "landing"}); };
+  EXPECT_EQ(message("k = 'x'", read_or), message("k = 'x'", read));
+  EXPECT_EQ(message("", read_or), "accepted");
+  EXPECT_EQ(chosen, "landing");
+  EXPECT_EQ(message("k = 'hover'", read_or), "accepted");
+  EXPECT_EQ(chosen, "hover");
 }
 
 TEST(Config, RefusesFileNamesThatAreNone) {
