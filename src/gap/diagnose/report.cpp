@@ -42,11 +42,10 @@ Json number(const std::optional<double>& value) { return value ? Json(*value) : 
 
 std::vector<SizeEstimate> sizes_of(const ScoredHypothesis& hypothesis, const sim::Randomisation& uncertain) {
   std::vector<SizeEstimate> sizes;
-  const auto& a = hypothesis;
-  if (a.fit.point.at.size() == 0) return sizes;
-  const Hypothesis h(uncertain, a.effects);
-  const Eigen::VectorXd mean = a.fit.mean();
-  const Eigen::MatrixXd covariance = a.fit.covariance();
+  if (hypothesis.fit.point.at.size() == 0) return sizes;
+  const Hypothesis h(uncertain, hypothesis.effects);
+  const Eigen::VectorXd mean = hypothesis.fit.mean();
+  const Eigen::MatrixXd covariance = hypothesis.fit.covariance();
   for (Eigen::Index i = h.shared(); i < h.size(); ++i) {
     const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
     const double reach = kHalf90 * std::sqrt(covariance(i, i));
