@@ -4,6 +4,11 @@
 #include "flight/pid.hpp"
 #include "flight/task.hpp"
 
+#ifdef __clang__  // conditions that are written for lanes are bits of bools for one flapper
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wbitwise-instead-of-logical"
+#endif
+
 namespace flappy::flight {
 inline namespace FLAPPY_ISA {
 
@@ -203,3 +208,7 @@ FLAPPY_INLINE int observe(std::uint32_t parts, const Estimate<T>& x, const Setpo
 
 }  // namespace FLAPPY_ISA
 }  // namespace flappy::flight
+
+#ifdef __clang__
+#pragma clang diagnostic pop
+#endif
