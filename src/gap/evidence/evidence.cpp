@@ -265,8 +265,10 @@ Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector
     if (normal(0, 0) == 0) continue;  // nothing was seen
     for (Index i = 0; i < k; ++i) change.col(i) = columns[static_cast<std::size_t>(i)]->row(g).transpose();
     const WithoutDiscrepancy without(normal, discrepancy_sd.row(g).transpose());
-    weighed.noalias() = (normal - without.half.transpose() * without.half) * change;
-    result.sums.topLeftCorner(k, k).triangularView<Eigen::Lower>() += change.transpose() * weighed;
+    if (k > 0) {  // Eigen's product of half a matrix reads the first number of none
+      weighed.noalias() = (normal - without.half.transpose() * without.half) * change;
+      result.sums.topLeftCorner(k, k).triangularView<Eigen::Lower>() += change.transpose() * weighed;
+    }
     const VectorXd half_right = without.of(right);
     result.sums.row(k).head(k) += (right - without.half.transpose() * half_right).transpose() * change;
     MatrixXd ridge = normal;
