@@ -207,7 +207,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
       effects.energy_J = &meter.energy_J;
       effects.set = in_force.set;
       effects.kept = in_force.kept;
-      effects.states = in_force.states + first;
+      effects.states = in_force.states != nullptr ? in_force.states + first : nullptr;
       effects.stride = kLanes<T>;
       effects.meter = in_force.meter != nullptr ? in_force.meter + first : nullptr;
       effects.walls = plan.walls;
