@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
       batch.reset(i, {}, flappy::sim::Start::standing);
       batch.set_input(i, {.amplitude_V = amplitude_V(i)});
     }
-    for (int period = 0; period < 250; ++period) batch.step(20);  // half a second
+    for (int period = 0; period < 250; ++period) batch.step(8);  // half a second
 
     std::size_t first = 0;
     while (first < batch.size() && batch.support(first) == flappy::sim::Start::standing) ++first;

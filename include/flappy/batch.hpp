@@ -30,6 +30,8 @@ struct FlapperState {
   double body_rate_rad_s[3] = {0, 0, 0};  ///< in B
   double stroke_rad[2] = {0, 0}, rotation_rad[2] = {0, 0};
   double stroke_rate_rad_s[2] = {0, 0}, rotation_rate_rad_s[2] = {0, 0};
+  /// Means over the last step, from which the next takes rates of its middle; 0 where they are not known.
+  double stroke_acceleration_rad_s2[2] = {0, 0}, rotation_acceleration_rad_s2[2] = {0, 0};
 };
 
 /// What the air did to the wings of a standing or welded flapper since its reset, in B about the torso
@@ -38,8 +40,11 @@ struct HeldImpulse {
   double force_N_s[3], moment_Nm_s[3];
 };
 
+/// At which errors are below those of the vehicle's own figures (docs/accuracy.md), in 4 steps of a driver's millisecond.
+inline constexpr double kDefaultStep_s = 250e-6;
+
 struct BatchOptions {
-  double step_s = 1e-4;
+  double step_s = kDefaultStep_s;
   int threads = 0;  ///< 0: one for each processor
   World world;
   std::string instruction_set;  ///< "scalar", "x86-64-v2", "-v3", "-v4"; empty: the best this processor has

@@ -18,6 +18,6 @@ struct DetectabilityCommand {
 };
 
 /// Finds, prints and writes how large effects have to be; the machine-readable result.
-nlohmann::ordered_json run_detectability(const DetectabilityCommand& command);
+nlohmann::ordered_json run_detectability(const DetectabilityCommand& o);
 
 }  // namespace flappy::benchmark

@@ -1,5 +1,9 @@
 // The closed loop: what a block of flappers does in one control period, stage by stage. Compiled once for each
 // instruction set (FLAPPY_ISA); the bits are the same on all of them.
+#if !defined(__x86_64__)
+#include <chrono>
+#endif
+
 #include "flight/flight_block.hpp"
 #include "flight/sensor_effects.hpp"
 #include "sim/rows.hpp"
@@ -109,7 +113,7 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
 template <class T>
 FLAPPY_INLINE void look(const FlightSpace<T>& s, int first) {
   const auto truth =
-      truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first), load_rows<State<L<T>>>(s.body.state, first));
+      truth_of(view_rows<Parameters<L<T>>>(s.body.parameters, first), view_rows<State<L<T>>>(s.body.state, first));
   store_rows(truth, s.flight.truth, first);
 }
 
@@ -272,13 +276,22 @@ FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPla
   store_rows(episode, f.episode, first);
 }
 
+/// Of a counter that runs evenly: the processor's time stamp, or nanoseconds where there is none.
+std::uint64_t cycles_now() {
+#if defined(__x86_64__)
+  return __rdtsc();
+#else
+  return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+#endif
+}
+
 /// Adds the time since the last lap to a stage, where a benchmark asked for it.
 class Stopwatch {
  public:
-  explicit Stopwatch(std::uint64_t* cycles) : cycles_(cycles), last_(cycles != nullptr ? __rdtsc() : 0) {}
+  explicit Stopwatch(std::uint64_t* cycles) : cycles_(cycles), last_(cycles != nullptr ? cycles_now() : 0) {}
   void lap(Stage stage) {
     if (cycles_ == nullptr) return;
-    const std::uint64_t now = __rdtsc();
+    const std::uint64_t now = cycles_now();
     cycles_[stage] += now - last_;
     last_ = now;
   }
@@ -301,7 +314,7 @@ void fly_block(const FlightSpace<T>& s, const FlightPlan<T>& plan) {
   int imu_samples = 0, mocap_samples = 0;
   for (int i = 0; i < plan.slice_count; ++i) {
     const Slice& slice = plan.slices[i];
-    plan.step(s.body, s.effects, *plan.physics, step, slice.steps, i == 0 ? s.next : nullptr);
+    plan.step(s.body, s.effects, *plan.physics, step, slice.steps, i == 0 ? s.ahead : sim::Ahead{});
     watch.lap(kPhysics);
     step += slice.steps;
     const bool sampled = slice.imu || slice.mocap, last = i + 1 == plan.slice_count;

@@ -204,8 +204,14 @@ void Fleet<T>::fly_block(std::size_t b) {
     const bool last = &plan == &s.plans.back();
     Tap<T> tap;
     if (s.recording && last) tap = {&s.imu_tap[b * s.imu_tap_size], &s.mocap_tap[b * s.mocap_tap_size]};
+    sim::Ahead ahead;
+    if (last && b + 1 < blocks())
+      ahead = {{body.block_after(b),
+                {&s.blocks[b + 1], sizeof s.blocks[b + 1]},
+                {&s.ring[(b + 1) * s.ring_size], s.ring_size * sizeof(T)},
+                {&s.queue[(b + 1) * s.queue_size], s.queue_size * sizeof(T)}}};
     s.fly({body.blocks[b], body.effects_of(b), s.blocks[b], &s.ring[b * s.ring_size], &s.queue[b * s.queue_size], tap,
-           last ? body.block_after(b) : nullptr},
+           ahead},
           plan);
   }
 }

@@ -49,7 +49,7 @@ struct FlightSpace {
   T* ring;   // [slot][row of Increment][lane]
   T* queue;  // [slot][row of MocapSample][lane]
   Tap<T> tap;
-  const sim::Block<T>* next;  // to be fetched from memory meanwhile
+  sim::Ahead ahead;
 };
 
 /// Stages of a control period, in order.

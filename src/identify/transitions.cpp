@@ -87,13 +87,14 @@ class Truth {
     const auto& t = t_s();
     if (t.size() < 2)
       throw io::InputError(table_.name + ": has " + (t.empty() ? "no row" : "one row") + "; accepted: at least two");
-    const double interval_s = std::round((t[1] - t[0]) / kStep_s) * kStep_s;
+    const double interval_s = std::round((t[1] - t[0]) / sim::kDefaultStep_s) * sim::kDefaultStep_s;
     for (std::size_t i = 1; i < t.size(); ++i)
-      if (!(interval_s > 0) || !(std::abs(t[i] - t[i - 1] - interval_s) < 0.01 * kStep_s))
+      if (!(interval_s > 0) || !(std::abs(t[i] - t[i - 1] - interval_s) < 0.01 * sim::kDefaultStep_s))
         throw io::InputError(table_.name + ":" + std::to_string(i + 2) + ": t_s: is " +
                              io::shortest_digits(t[i] - t[i - 1]) + " s after the row before; accepted: " +
-                             (interval_s > 0 ? io::shortest_digits(interval_s) + " s, as the rows before"
-                                             : "a whole number of steps of " + io::shortest_digits(kStep_s) + " s"));
+                             (interval_s > 0
+                                  ? io::shortest_digits(interval_s) + " s, as the rows before"
+                                  : "a whole number of steps of " + io::shortest_digits(sim::kDefaultStep_s) + " s"));
   }
   const std::vector<double>& t_s() const { return table_.column("t_s"); }
   double interval_s() const { return t_s()[1] - t_s()[0]; }
@@ -114,7 +115,9 @@ class Truth {
             {at("left_stroke_rad"), at("right_stroke_rad")},
             {at("left_rotation_rad"), at("right_rotation_rad")},
             {at("left_stroke_rate_rad_s"), at("right_stroke_rate_rad_s")},
-            {at("left_rotation_rate_rad_s"), at("right_rotation_rate_rad_s")}};
+            {at("left_rotation_rate_rad_s"), at("right_rotation_rate_rad_s")},
+            {at("left_stroke_acceleration_rad_s2"), at("right_stroke_acceleration_rad_s2")},
+            {at("left_rotation_acceleration_rad_s2"), at("right_rotation_acceleration_rad_s2")}};
   }
 
  private:
@@ -152,13 +155,15 @@ struct Transitions::Flight {
 
   /// Where states are known best: the ends of the IMU's intervals, or the rows of truth.csv.
   double grid_s() const { return truth ? truth->interval_s() : imu_interval_s; }
-  int grid_steps() const { return std::max(1, static_cast<int>(std::lround(grid_s() / kStep_s))); }
+  int grid_steps() const { return std::max(1, static_cast<int>(std::lround(grid_s() / sim::kDefaultStep_s))); }
   /// Steps of so many beats, on the grid.
   int beat_steps(double beats) const {
     return std::max(1, static_cast<int>(std::lround(beats * beat_s / grid_s()))) * grid_steps();
   }
   /// One and two beats on the grid.
-  std::array<double, 2> window_s() const { return {beat_steps(1) * kStep_s, beat_steps(2) * kStep_s}; }
+  std::array<double, 2> window_s() const {
+    return {beat_steps(1) * sim::kDefaultStep_s, beat_steps(2) * sim::kDefaultStep_s};
+  }
   int spin_up_steps() const { return truth ? 0 : beat_steps(kSpinUpBeats); }
 
   sim::FlapperState at(double t_s) const {
@@ -277,7 +282,7 @@ TransitionReport Transitions::run() const {
     const int ends[2] = {f->beat_steps(1), f->beat_steps(2)}, interval = f->grid_steps();
     const std::vector<int> checkpoints = {ends[0] - interval, ends[0], ends[1] - interval, ends[1]};
     sim::ReplayOptions o;
-    o.step_s = kStep_s;
+    o.step_s = sim::kDefaultStep_s;
     o.threads = options_.threads;
     o.world = f->world;
     o.spin_up_steps = f->spin_up_steps();
@@ -296,7 +301,7 @@ TransitionReport Transitions::run() const {
         continue;
       }
       for (std::size_t b = 0; b < 2; ++b) {
-        const double end_s = windows[i].start_s + report.beats_s[b], interval_s = interval * kStep_s;
+        const double end_s = windows[i].start_s + report.beats_s[b], interval_s = interval * sim::kDefaultStep_s;
         const auto simulated = with_mean_rate(results[i].states[2 * b], results[i].states[2 * b + 1], interval_s);
         const auto recorded = with_mean_rate(f->at(end_s - interval_s), f->at(end_s), interval_s);
         StateVector error = difference(state_vector(simulated), state_vector(recorded));

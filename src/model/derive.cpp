@@ -69,8 +69,6 @@ SideParameters<double> derive_side(const Side& s, double air_density, double ste
   p.rotation_damping_Nm_s = s.rotation.damping_Nm_s;
   p.rotation_friction_Nm = s.rotation.friction_Nm;
   p.stroke_stiffening_kg_m2 = step_s / 2 * p.stroke_damping_Nm_s;
-  p.rotation_stiffening_kg_m2 = step_s / 2 * p.rotation_damping_Nm_s;
-  p.rotation_stiffening_kg_m2_s = step_s * p.rotational_damping_Nm_s2;
   return p;
 }
 

@@ -29,8 +29,7 @@ struct SideParameters {
   T stroke_lower_rad, stroke_upper_rad;
   T rotation_lower_rad, rotation_upper_rad;
   T rotation_damping_Nm_s, rotation_friction_Nm;
-  // implicit damping, as inertia added to a hinge: step/2 damping, and step M_rd/|theta'|
-  T stroke_stiffening_kg_m2, rotation_stiffening_kg_m2, rotation_stiffening_kg_m2_s;
+  T stroke_stiffening_kg_m2;  // implicit damping, as inertia added to the hinge: step/2 damping
 };
 
 template <class T>
@@ -51,6 +50,8 @@ template <class T>
 struct SideState {
   T stroke_rad, rotation_rad;
   T stroke_rate_rad_s, rotation_rate_rad_s;
+  // a step earlier; where a state is set, and of a hinge that was on its stop, the same
+  T stroke_rate_before_rad_s, rotation_rate_before_rad_s;
 };
 
 template <class T>

@@ -17,11 +17,28 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
+/// The step as it was before, at rates of its start, is compiled with this for flappy-bench alone.
+#ifdef FLAPPY_OLD_RATES
+inline constexpr bool kOldRates = true;
+#else
+inline constexpr bool kOldRates = false;
+#endif
+
+/// How the hinges of one side turn: psi', theta', and theta'^2, which in a step is a mean of squares.
+template <class T>
+struct HingeRates {
+  T stroke_rad_s, rotation_rad_s, rotation2_rad2_s2;
+};
+template <class T>
+FLAPPY_INLINE HingeRates<T> hinge_rates(const SideState<T>& q) {
+  return {q.stroke_rate_rad_s, q.rotation_rate_rad_s, q.rotation_rate_rad_s * q.rotation_rate_rad_s};
+}
+
 /// Where a wing is and how it moves relative to B.
 template <class T>
 struct WingPose {
   SinCos<T> beta, theta;
-  T beta_rate, theta_rate;
+  T beta_rate, theta_rate, theta_rate2;
   Vec3<T> body_rate_L;
   Vec3<T> wing_moment_L, moment_L;  // h_w, h
   Vec3<T> moment, momentum;         // h and the momentum of the relative motion, in B
@@ -47,18 +64,25 @@ FLAPPY_INLINE Vec3<T> moment_about_shoulder(const SideParameters<T>& p, const Si
 }
 
 template <int side, class T>
-FLAPPY_INLINE WingPose<T> place_wing(const SideParameters<T>& p, const SideState<T>& q, const Vec3<T>& body_rate) {
+FLAPPY_INLINE WingPose<T> place_wing(const SideParameters<T>& p, const SideState<T>& q, const HingeRates<T>& rates,
+                                     const Vec3<T>& body_rate) {
   WingPose<T> g;
   g.beta = sin_cos(T(T(side) * q.stroke_rad));
   g.theta = sin_cos(q.rotation_rad);
-  const T b = g.beta_rate = T(side) * q.stroke_rate_rad_s;
-  const T t = g.theta_rate = q.rotation_rate_rad_s;
+  const T b = g.beta_rate = T(side) * rates.stroke_rad_s;
+  const T t = g.theta_rate = rates.rotation_rad_s;
+  g.theta_rate2 = rates.rotation2_rad2_s2;
   const Vec3<T> hw = g.wing_moment_L = rotate_y(g.theta.sin, g.theta.cos, p.wing_moment_kg_m);
   const Vec3<T> h = g.moment_L = p.edge_moment_kg_m + hw;
   g.moment = rotate_z(g.beta.sin, g.beta.cos, h);
   g.momentum = rotate_z(g.beta.sin, g.beta.cos, Vec3<T>{t * hw.z - b * h.y, b * h.x, -(t * hw.x)});
   g.body_rate_L = rotate_back_z(g.beta.sin, g.beta.cos, body_rate);
   return g;
+}
+
+template <int side, class T>
+FLAPPY_INLINE WingPose<T> place_wing(const SideParameters<T>& p, const SideState<T>& q, const Vec3<T>& body_rate) {
+  return place_wing<side>(p, q, hinge_rates(q), body_rate);
 }
 
 template <class T>
@@ -79,10 +103,11 @@ FLAPPY_INLINE WingInertia<T> wing_inertia(const SideParameters<T>& p, const Wing
   const T Pw_x = P.xx * w.x + (P.xy * w.y + P.xz * w.z), Pw_y = P.xy * w.x + (P.yy * w.y + P.yz * w.z);
   const T pw_x = pw.xx * w.x + (pw.xy * w.y + pw.xz * w.z), pw_z = pw.xz * w.x + (pw.yz * w.y + pw.zz * w.z);
   const T m_x = (Pw_x + Pw_x) + (b * P.xz + t * pw.xy), m_y = (Pw_y + Pw_y) + (b * P.yz + t * pw.yy);
-  const T k_x = (pw_x + pw_x) + (b * pw.xz + t * pw.xy), k_z = (pw_z + pw_z) + (b * pw.zz + t * pw.yz);
-  const T bt = b * t, t2 = t * t;
-  const T wing_y = bt * pw.xy - k_x * b;
-  i.relative_moment_L = {m_y * b - (k_z * t + bt * T(pw.yy + pw.zz)), bt * pw.xy - m_x * b, k_x * t + bt * pw.xz};
+  const T k_x = (pw_x + pw_x) + b * pw.xz, k_z = (pw_z + pw_z) + b * pw.zz;  // without t^2
+  const T bt = b * t, t2 = g.theta_rate2;
+  const T wing_y = bt * pw.xy - (k_x + t * pw.xy) * b;
+  i.relative_moment_L = {m_y * b - ((k_z * t + t2 * pw.yz) + bt * T(pw.yy + pw.zz)), bt * pw.xy - m_x * b,
+                         (k_x * t + t2 * pw.xy) + bt * pw.xz};
   const Vec3<T> twice{w.x + w.x, w.y + w.y, w.z + w.z + b};
   const Vec3<T> momentum_L{t * hw.z - b * h.y, b * h.x, -(t * hw.x)};
   i.relative_force_L = cross(twice, momentum_L) + Vec3<T>{-(t2 * hw.x), bt * hw.z, -(t2 * hw.z)};

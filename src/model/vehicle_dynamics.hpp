@@ -10,11 +10,17 @@
 // shoulder's acceleration A = (F - F_rel)/M + w x (w x d), d from C to the shoulder. Elimination goes body, strokes,
 // rotations; the rotations come last so that a wing landing on its stop is one 2x2 solve.
 //
-// Time step h: rates first, then positions with the new rates, a leapfrog in which positions lead by h/2. Linear
-// damping is taken at the mean of old and new rate, M_rd at |old| new (exact for pure quadratic drag). Dry friction is
-// the torque that would stop the hinge within the step, limited to the friction: it sticks, but for what reaches a
-// stroke through its wing's rotation, first order in h. A stop prescribes the turn that lands on it exactly: no
-// penetration, and the impulse only ever takes energy.
+// Time step h: rates first, then positions with the new rates, a leapfrog in which positions lead by h/2. What depends on
+// rates is taken in the middle of the step, where positions already are (sim/physics_step.hpp): at rates of its start it
+// would be first order in h, whatever the stops do. Linear damping is taken at the mean of old and new rate, M_rd at |old| new
+// (exact for pure quadratic drag). Dry friction is the torque that would stop the hinge within the step, limited to the
+// friction: it sticks, but for what reaches a stroke through its wing's rotation, first order in h.
+//
+// A landing takes two steps. In the first, a stop prescribes the turn d that lands on it exactly, which leaves d/h = tau u of the
+// rate u; in the second the hinge would be held, and the rest of its momentum goes. Angles lead rates by h/2, so it landed
+// (3/2 - tau) h before the rates at the end of the second step. What pulls a stroke off its stop acts from then on: with a = the
+// acceleration without the stop, it leaves with the rate (3/2 - tau) h a; unless another hinge lands in the same step, whose
+// impulse is not what pulls. No penetration, and the impulse only ever takes energy.
 #pragma once
 
 #include "model/hinged_wing.hpp"
@@ -34,6 +40,7 @@ struct SideLoad {
   T force_x_N, force_z_N;                  // on the wing at the shoulder, in L; none along the span
   Vec3<T> moment_Nm;                       // the same
   T stroke_torque_Nm, rotation_torque_Nm;  // about beta and theta, dry friction and inertia excluded
+  T rotation_stiffening_kg_m2;             // what implicit damping adds to the inertia about theta
 };
 
 template <class T>
@@ -82,24 +89,25 @@ FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const Side
   return placed + (wing.left.second + wing.right.second);
 }
 
-/// Rate, stops and friction of one hinge, about beta or theta. Stops as the turns in one step that just reach
-/// them.
+/// Rates of this step and of the one before, stops and friction of one hinge, about beta or theta. Stops as the turns in
+/// one step that just reach them.
 template <class T>
 struct Hinge {
-  T rate, lowest_turn, highest_turn, friction;
+  T rate, before, lowest_turn, highest_turn, friction;
 };
 
 template <int side, class T>
 FLAPPY_INLINE Hinge<T> stroke_hinge(const SideParameters<T>& p, const SideState<T>& q) {
   const T lowest = p.stroke_lower_rad - q.stroke_rad, highest = p.stroke_upper_rad - q.stroke_rad;
-  if constexpr (side > 0) return {q.stroke_rate_rad_s, lowest, highest, p.stroke_friction_Nm};
-  else return {-q.stroke_rate_rad_s, -highest, -lowest, p.stroke_friction_Nm};
+  if constexpr (side > 0)
+    return {q.stroke_rate_rad_s, q.stroke_rate_before_rad_s, lowest, highest, p.stroke_friction_Nm};
+  else return {-q.stroke_rate_rad_s, -q.stroke_rate_before_rad_s, -highest, -lowest, p.stroke_friction_Nm};
 }
 
 template <class T>
 FLAPPY_INLINE Hinge<T> rotation_hinge(const SideParameters<T>& p, const SideState<T>& q) {
-  return {q.rotation_rate_rad_s, p.rotation_lower_rad - q.rotation_rad, p.rotation_upper_rad - q.rotation_rad,
-          p.rotation_friction_Nm};
+  return {q.rotation_rate_rad_s, q.rotation_rate_before_rad_s, p.rotation_lower_rad - q.rotation_rad,
+          p.rotation_upper_rad - q.rotation_rad, p.rotation_friction_Nm};
 }
 
 /// Dry friction: the torque that would stop the hinge within the step, no more than the friction.
@@ -219,11 +227,8 @@ FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const Sides<
   h.strokes = {left(l.stroke_inertia + (pl.rotor_kg_m2 + pl.stroke_stiffening_kg_m2), esl, esl, h.stroke_l, xsl),
                left(r.stroke_inertia + (pr.rotor_kg_m2 + pr.stroke_stiffening_kg_m2), esr, esr, h.stroke_r, xsr),
                left(T(0), esl, esr, h.stroke_l, xsr)};
-  const auto rotation = [](const WingInertia<T>& g, const T& rate, const SideParameters<T>& s) {
-    return T(g.rotation_inertia + (s.rotation_stiffening_kg_m2 + s.rotation_stiffening_kg_m2_s * abs(rate)));
-  };
-  h.rotations = {left(rotation(l, pose.left.theta_rate, pl), erl, erl, h.rotation_l, xrl),
-                 left(rotation(r, pose.right.theta_rate, pr), err, err, h.rotation_r, xrr),
+  h.rotations = {left(l.rotation_inertia + load.left.rotation_stiffening_kg_m2, erl, erl, h.rotation_l, xrl),
+                 left(r.rotation_inertia + load.right.rotation_stiffening_kg_m2, err, err, h.rotation_r, xrr),
                  left(T(0), erl, err, h.rotation_l, xrr)};
   h.ll = left(l.cross_inertia, esl, erl, h.stroke_l, xrl);
   h.rr = left(r.cross_inertia, esr, err, h.stroke_r, xrr);
@@ -308,7 +313,11 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
   const Inverse<Sym2<T>, T> free = inverse(h.strokes);
   accelerate(free, T(0), T(0));
   const auto beyond = [](const Hinge<T>& q, const T& turn) { return (turn < q.lowest_turn) | (turn > q.highest_turn); };
-  auto out_l = beyond(stroke_l, m.stroke_left), out_r = beyond(stroke_r, m.stroke_right);
+  const auto lands = [&](const Hinge<T>& q, const T& turn) {
+    if constexpr (kOldRates) return beyond(q, turn);
+    else return beyond(q, turn) | beyond(q, T(step * q.rate));
+  };
+  auto out_l = lands(stroke_l, m.stroke_left), out_r = lands(stroke_r, m.stroke_right);
   if (rarely(out_l | out_r)) {  // a stroke reaches its stop: once more, with its turn given and its row of K gone
     const T zero(0);
     const Sym2<T>& S = h.strokes;
@@ -322,16 +331,26 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
       accelerate(K, where(out_l, stop_l, where(out_r, T(-(T(S.lr / S.ll) * stop_r)), zero)),
                  where(out_r, stop_r, where(out_l, T(-(T(S.lr / S.rr) * stop_l)), zero)));
     };
-    const auto landing = [&](const Hinge<T>& q, const T& turn) {
-      return T(T(stopped(q, turn) - step * q.rate) * per_step2);
+    const auto hits = [&](const Hinge<T>& q, const T& turn) {
+      return ((turn == q.lowest_turn) | (turn == q.highest_turn)) & !(q.rate == zero);
     };
-    T stop_l = landing(stroke_l, m.stroke_left), stop_r = landing(stroke_r, m.stroke_right);
+    const auto hit = hits(rotation_l, m.rotation_left) | hits(rotation_r, m.rotation_right);
+    out_l = out_l & !(hit & !beyond(stroke_l, m.stroke_left));
+    out_r = out_r & !(hit & !beyond(stroke_r, m.stroke_right));
+    const auto landing = [&](const Hinge<T>& q, const T& turn, const auto& pushed) {
+      const T coast = step * q.rate;
+      const auto second = ((q.lowest_turn == zero) & (q.rate < zero)) | ((q.highest_turn == zero) & (q.rate > zero));
+      const T tau = clamp(T(q.rate / where(second, q.before, T(1))), zero, T(1));
+      const T pulled_off = kOldRates ? turn : where(pushed, turn, T(T(T(1.5) - tau) * T(turn - coast)));
+      return T(T(stopped(q, where(second, pulled_off, turn)) - coast) * per_step2);
+    };
+    T stop_l = landing(stroke_l, m.stroke_left, hit), stop_r = landing(stroke_r, m.stroke_right, hit);
     prescribe(stop_l, stop_r);
     // the landing of one may throw the other out; lanes where it does not get the same numbers again
     const auto also_l = beyond(stroke_l, m.stroke_left) & !out_l, also_r = beyond(stroke_r, m.stroke_right) & !out_r;
     if (rarely(also_l | also_r)) {
-      stop_l = where(also_l, landing(stroke_l, m.stroke_left), stop_l);
-      stop_r = where(also_r, landing(stroke_r, m.stroke_right), stop_r);
+      stop_l = where(also_l, landing(stroke_l, m.stroke_left, out_r), stop_l);
+      stop_r = where(also_r, landing(stroke_r, m.stroke_right, out_l), stop_r);
       out_l = out_l | also_l;
       out_r = out_r | also_r;
       prescribe(stop_l, stop_r);

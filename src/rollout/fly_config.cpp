@@ -124,7 +124,7 @@ class Reader {
     c_.fleet.seed = static_cast<std::uint64_t>(t.integer("seed", 0, INT64_MAX));
     c_.fleet.first_flapper = static_cast<std::uint32_t>(t.integer_or("first_flapper", 0, 0, 1'000'000'000));
     c_.fleet.control_hz = t.number_or("control_hz", 500, {10, 10000});
-    c_.fleet.batch.step_s = t.number_or("step_s", 1e-4, {1e-6, 1e-3});
+    c_.fleet.batch.step_s = t.number_or("step_s", sim::kDefaultStep_s, {1e-6, 1e-3});
     c_.fleet.batch.threads = static_cast<int>(t.integer_or("threads", 0, 0, 1024));
     c_.welded = t.choice_or("support", "task", {"task", "welded"}) == "welded";
   }

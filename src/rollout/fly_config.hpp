@@ -5,7 +5,7 @@
 //   actor, randomisation = "file"                   optional
 //   precision = "float" | "double"
 //   [flight]          duration_s, seed; first_flapper (0: number of the first flight), settle_s (3), control_hz (500),
-//                     step_s (1e-4), threads (0: all), support ("task", or "welded": on a stand)
+//                     step_s (250e-6), threads (0: all), support ("task", or "welded": on a stand)
 //   [world]           gravity_m_s2, ground_z_m, ceiling_z_m, walls = [[x_m, y_m, normal_x, normal_y], ...]
 //   [constant_input]  and [[excitation]]: excitation.hpp
 //   [log.power]       battery_nominal_V, rate_hz, latency_s, voltage_noise_V, current_noise_A

@@ -187,6 +187,10 @@ struct Recorder<T>::Storage {
                           s.rotation_rate_rad_s[0],
                           s.stroke_rate_rad_s[1],
                           s.rotation_rate_rad_s[1],
+                          s.stroke_acceleration_rad_s2[0],
+                          s.rotation_acceleration_rad_s2[0],
+                          s.stroke_acceleration_rad_s2[1],
+                          s.rotation_acceleration_rad_s2[1],
                           bias[0],
                           bias[1],
                           bias[2],
@@ -231,7 +235,7 @@ struct Recorder<T>::Storage {
     in_force.motors = nullptr;  // the step was metered when it was flown
     sim::StepPlan plan = body.plan();
     plan.steps_per_update = 1;
-    body.kernel(metered.block, in_force, plan, 0, 1, nullptr);
+    body.kernel(metered.block, in_force, plan, 0, 1, {});
     const auto noisy = [&](double value, double sd, std::uint32_t k) {
       return value + sd * normal(sim::Stream::power, n + k);
     };

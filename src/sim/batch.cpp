@@ -233,8 +233,17 @@ void Batch<T>::Storage::put_state(std::size_t i, const FlapperState& state, Star
   x.position_m = {state.position_m[0], state.position_m[1], state.position_m[2]};
   x.attitude = {state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3]};
   x.body_rate_rad_s = {state.body_rate_rad_s[0], state.body_rate_rad_s[1], state.body_rate_rad_s[2]};
-  x.left = {state.stroke_rad[0], state.rotation_rad[0], state.stroke_rate_rad_s[0], state.rotation_rate_rad_s[0]};
-  x.right = {state.stroke_rad[1], state.rotation_rad[1], state.stroke_rate_rad_s[1], state.rotation_rate_rad_s[1]};
+  const auto hinges = [&](int side) -> model::SideState<double> {
+    const double stroke = state.stroke_rate_rad_s[side], rotation = state.rotation_rate_rad_s[side];
+    return {state.stroke_rad[side],
+            state.rotation_rad[side],
+            stroke,
+            rotation,
+            stroke - step_s * state.stroke_acceleration_rad_s2[side],
+            rotation - step_s * state.rotation_acceleration_rad_s2[side]};
+  };
+  x.left = hinges(0);
+  x.right = hinges(1);
   const Vec3<double> velocity{state.velocity_m_s[0], state.velocity_m_s[1], state.velocity_m_s[2]};
   x.com_velocity_m_s = velocity + com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
   if (start == Start::standing) x.support = static_cast<double>(model::Support::standing);
@@ -271,7 +280,7 @@ void Batch<T>::step(int steps) {
   Storage& s = *storage_;
   const StepPlan plan = s.plan();
   io::parallel_for(s.blocks.size(), s.threads, [&](std::size_t b) {
-    s.kernel(s.blocks[b], s.effects_of(b), plan, s.steps, steps, s.block_after(b));
+    s.kernel(s.blocks[b], s.effects_of(b), plan, s.steps, steps, {{s.block_after(b)}});
   });
   s.steps += steps;
 }
@@ -282,6 +291,13 @@ FlapperState Batch<T>::state(std::size_t i) const {
   const auto x = get<State<double>>(block.state, lane);
   const Vec3<double> v =
       x.com_velocity_m_s - com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
+  const double step_s = storage_->step_s;
+  const auto stroke_acceleration = [&](const model::SideState<double>& q) {
+    return (q.stroke_rate_rad_s - q.stroke_rate_before_rad_s) / step_s;
+  };
+  const auto rotation_acceleration = [&](const model::SideState<double>& q) {
+    return (q.rotation_rate_rad_s - q.rotation_rate_before_rad_s) / step_s;
+  };
   return {{x.position_m.x, x.position_m.y, x.position_m.z},
           {x.attitude.w, x.attitude.x, x.attitude.y, x.attitude.z},
           {v.x, v.y, v.z},
@@ -289,7 +305,9 @@ FlapperState Batch<T>::state(std::size_t i) const {
           {x.left.stroke_rad, x.right.stroke_rad},
           {x.left.rotation_rad, x.right.rotation_rad},
           {x.left.stroke_rate_rad_s, x.right.stroke_rate_rad_s},
-          {x.left.rotation_rate_rad_s, x.right.rotation_rate_rad_s}};
+          {x.left.rotation_rate_rad_s, x.right.rotation_rate_rad_s},
+          {stroke_acceleration(x.left), stroke_acceleration(x.right)},
+          {rotation_acceleration(x.left), rotation_acceleration(x.right)}};
 }
 
 template <class T>

@@ -11,6 +11,9 @@ FLAPPY_KERNELS(Kernel<float>, kernel_float);
 FLAPPY_KERNELS(Kernel<double>, kernel_double);
 
 std::vector<std::string> instruction_sets() {
+#if defined(__aarch64__)
+  const bool has[] = {true, true};  // NEON is part of it
+#else
   // clang 14 does not know "x86-64-v2" and so on: the youngest extensions of each level stand for it
   const bool has[] = {
       true, __builtin_cpu_supports("ssse3") && __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"),
@@ -18,6 +21,7 @@ std::vector<std::string> instruction_sets() {
           __builtin_cpu_supports("bmi2"),
       __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512cd") &&
           __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")};
+#endif
   std::vector<std::string> names;
   for (std::size_t i = 0; i < std::size(has) && has[i]; ++i) names.emplace_back(kernel_floats[i]->instruction_set);
   return names;

@@ -7,6 +7,16 @@
 #include "sim/step.hpp"
 
 /// Declares `kernel` as it is compiled for each instruction set (FLAPPY_ISA), and a table of all, `kernel`s, worst first.
+#if defined(__aarch64__)
+#define FLAPPY_KERNELS(Type, kernel) \
+  inline namespace scalar {          \
+  extern const Type kernel;          \
+  }                                  \
+  inline namespace neon {            \
+  extern const Type kernel;          \
+  }                                  \
+  constexpr const Type* kernel##s[] = {&scalar::kernel, &neon::kernel}
+#else
 #define FLAPPY_KERNELS(Type, kernel) \
   inline namespace scalar {          \
   extern const Type kernel;          \
@@ -21,6 +31,7 @@
   extern const Type kernel;          \
   }                                  \
   constexpr const Type* kernel##s[] = {&scalar::kernel, &v2::kernel, &v3::kernel, &v4::kernel}
+#endif
 
 namespace flappy::sim {
 
@@ -29,8 +40,8 @@ namespace flappy::sim {
 std::size_t place_of(std::string_view instruction_set);
 
 /// What T's table has for an instruction set.
-template <class T, class Single, class Double>
-const auto& kernel_of(const Single* const (&singles)[4], const Double* const (&doubles)[4],
+template <class T, class Single, class Double, std::size_t sets>
+const auto& kernel_of(const Single* const (&singles)[sets], const Double* const (&doubles)[sets],
                       std::string_view instruction_set) {
   if constexpr (sizeof(T) == sizeof(float)) return *singles[place_of(instruction_set)];
   else return *doubles[place_of(instruction_set)];

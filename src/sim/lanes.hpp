@@ -4,7 +4,11 @@
 // instruction and emulates it.
 #pragma once
 
+#if defined(__x86_64__)
 #include <immintrin.h>
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
+#endif
 
 #include <cstdint>
 #include <cstring>
@@ -122,6 +126,13 @@ struct Lanes {
       else return Lanes((Raw)_mm256_fmadd_pd((__m256d)a.raw, (__m256d)b.raw, (__m256d)c.raw));
     }
 #endif
+#if defined(__ARM_NEON)
+    if constexpr (N * sizeof(T) == 16) {
+      if constexpr (sizeof(T) == 4)
+        return Lanes((Raw)vfmaq_f32((float32x4_t)c.raw, (float32x4_t)a.raw, (float32x4_t)b.raw));
+      else return Lanes((Raw)vfmaq_f64((float64x2_t)c.raw, (float64x2_t)a.raw, (float64x2_t)b.raw));
+    }
+#endif
     return fused_each(a, b, c);
   }
   static __attribute__((noinline)) Lanes fused_each(Lanes a, Lanes b, Lanes c) {
@@ -142,8 +153,13 @@ struct Lanes {
     }
 #endif
     if constexpr (N * sizeof(T) == 16) {
+#if defined(__x86_64__)
       if constexpr (sizeof(T) == 4) return Lanes((Raw)_mm_sqrt_ps((__m128)a.raw));
       else return Lanes((Raw)_mm_sqrt_pd((__m128d)a.raw));
+#elif defined(__ARM_NEON)
+      if constexpr (sizeof(T) == 4) return Lanes((Raw)vsqrtq_f32((float32x4_t)a.raw));
+      else return Lanes((Raw)vsqrtq_f64((float64x2_t)a.raw));
+#endif
     }
     if constexpr (sizeof(T) == 4) return each([&](int i) { return __builtin_sqrtf(a.raw[i]); });
     else return each([&](int i) { return __builtin_sqrt(a.raw[i]); });

@@ -2,7 +2,9 @@
 // ((w >> 9) + 1/2) 2^-23, which float holds exactly, so flights in float and in double meet the same noise.
 #pragma once
 
+#if defined(__x86_64__)
 #include <immintrin.h>
+#endif
 
 #include <cstdint>
 #include <cstring>
@@ -39,7 +41,9 @@ struct WideWords {
 #if defined(__AVX2__)
     if constexpr (N == 4) return {(Raw)_mm256_mul_epu32((__m256i)a.raw, _mm256_set1_epi64x(m))};
 #endif
+#if defined(__x86_64__)
     if constexpr (N == 2) return {(Raw)_mm_mul_epu32((__m128i)a.raw, _mm_set1_epi64x(m))};
+#endif
     return {(a.raw & 0xffffffffU) * m};
   }
 };

@@ -65,16 +65,44 @@ struct ActiveEffects {
   }
 };
 
-/// What air and motor do to one side.
+template <class T>
+FLAPPY_INLINE auto on_stop(const T& angle, const T& lower, const T& upper) {
+  return (angle == lower) | (angle == upper);
+}
+
+/// Rates in the middle of the step, where angles already are. With u of this step and u_before of the last, the next is
+/// v = 2 u - u_before, or as much as the stops allow, for a hinge on its stop has no rate to extrapolate. Mean and mean square,
+/// (u + v)/2 and (u^2 + v^2)/2, are second order, and of a landing what the two steps of it really have, or near it: within
+/// them the rate drops to 0, tau of a step after the angle was where it is, and they sum to u (1/2 + tau) and u^2 (1/2 + tau^2).
+template <class T>
+FLAPPY_INLINE HingeRates<T> mid_step_rates(const SideParameters<T>& p, const SideState<T>& q,
+                                           const T& rotation_lower_rad, const T& rotation_upper_rad, const T& step,
+                                           const T& per_step) {
+  if constexpr (kOldRates) return hinge_rates(q);
+  const auto next = [&](const T& rate, const T& before, const T& angle, const T& lower, const T& upper) {
+    const T ahead = where(on_stop(angle, lower, upper), rate, T(T(2) * rate - before));
+    return T(clamp(T(step * ahead), T(lower - angle), T(upper - angle)) * per_step);
+  };
+  const T &s = q.stroke_rate_rad_s, &r = q.rotation_rate_rad_s;
+  const T s_next = next(s, q.stroke_rate_before_rad_s, q.stroke_rad, p.stroke_lower_rad, p.stroke_upper_rad);
+  const T r_next = next(r, q.rotation_rate_before_rad_s, q.rotation_rad, rotation_lower_rad, rotation_upper_rad);
+  return {T(0.5) * T(s + s_next), T(0.5) * T(r + r_next), T(0.5) * T(r * r + r_next * r_next)};
+}
+
+/// What air and motor do to one side. M_rd is in `air` at the mid-step rate of theta, `mid_rad_s`, and so the body feels it;
+/// the hinge feels |old| new. Damping is implicit, as inertia added to the hinge: step/2 damping, and step M_rd/|theta'|.
 template <int side, class T>
-FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<T>& q, const WingWrench<T>& air,
-                                    const T& voltage_V) {
+FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<T>& q, const T& mid_rad_s,
+                                    const WingWrench<T>& air, const T& voltage_V, const T& step) {
   SideLoad<T> load;
   load.force_x_N = air.force_x_N;
   load.force_z_N = air.force_z_N;
   load.moment_Nm = air.moment_Nm;
   load.stroke_torque_Nm = air.moment_Nm.z + T(side) * drive_torque(p, q, voltage_V);
-  load.rotation_torque_Nm = air.moment_Nm.y - p.rotation_damping_Nm_s * q.rotation_rate_rad_s;
+  const T &old_rad_s = q.rotation_rate_rad_s, old_speed = abs(old_rad_s);
+  const T damping_Nm = p.rotational_damping_Nm_s2 * T(T(abs(mid_rad_s) * mid_rad_s) - old_speed * old_rad_s);
+  load.rotation_torque_Nm = (air.moment_Nm.y + damping_Nm) - p.rotation_damping_Nm_s * old_rad_s;
+  load.rotation_stiffening_kg_m2 = step * T(T(0.5) * p.rotation_damping_Nm_s + p.rotational_damping_Nm_s2 * old_speed);
   return load;
 }
 
@@ -88,8 +116,13 @@ FLAPPY_INLINE WingWrench<T> air_on_wing(const SideParameters<T>& p, const WingPo
 /// Turns the hinges of one side. The last clamp takes the rounding of a landing on a stop.
 template <int side, class T>
 FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& beta, const T& theta, const T& per_step) {
-  q.stroke_rate_rad_s = T(side) * T(beta * per_step);
-  q.rotation_rate_rad_s = theta * per_step;
+  const T stroke_rate = T(side) * T(beta * per_step), rotation_rate = theta * per_step;
+  q.stroke_rate_before_rad_s =
+      where(on_stop(q.stroke_rad, p.stroke_lower_rad, p.stroke_upper_rad), stroke_rate, q.stroke_rate_rad_s);
+  q.rotation_rate_before_rad_s =
+      where(on_stop(q.rotation_rad, p.rotation_lower_rad, p.rotation_upper_rad), rotation_rate, q.rotation_rate_rad_s);
+  q.stroke_rate_rad_s = stroke_rate;
+  q.rotation_rate_rad_s = rotation_rate;
   q.stroke_rad = clamp(T(q.stroke_rad + T(T(side) * beta)), p.stroke_lower_rad, p.stroke_upper_rad);
   q.rotation_rad = clamp(T(q.rotation_rad + theta), p.rotation_lower_rad, p.rotation_upper_rad);
 }
@@ -135,7 +168,7 @@ FLAPPY_INLINE Hinges<T> hinges_of(const SideParameters<T>& p, const SideFigures<
 
 /// Changes the parameters of a side to its hinges as effects left them.
 template <class T>
-FLAPPY_INLINE void put_hinges(const Hinges<T>& h, const SideParameters<T>& given, SideParameters<T>& p) {
+FLAPPY_INLINE void put_hinges(const Hinges<T>& h, SideParameters<T>& p) {
   p.stroke_torque_per_V_Nm = h.torque_per_V_Nm;
   p.stroke_damping_Nm_s = h.damping_Nm_s;
   p.stroke_stiffening_kg_m2 = h.stiffening_kg_m2;
@@ -145,7 +178,6 @@ FLAPPY_INLINE void put_hinges(const Hinges<T>& h, const SideParameters<T>& given
   p.spring_negative_Nm_rad = h.spring_negative_Nm_rad;
   p.rotation_lower_rad = h.rotation_lower_rad;
   p.rotation_upper_rad = h.rotation_upper_rad;
-  p.rotation_stiffening_kg_m2 = given.rotation_stiffening_kg_m2 + h.rotation_inertia_kg_m2;
 }
 
 /// What acts on a flapper: air and motors;
@@ -194,6 +226,23 @@ FLAPPY_INLINE T extra_work_J(const ActiveEffects<T>& effects, const Hinges<T>& h
   return step_s * T(share * power_W(h.voltage_V, T(rate_rad_s + slip_rad_s)) - power_W(given_V, rate_rad_s));
 }
 
+/// How far effects let a wing go, either way; 0: to its stops.
+template <class T>
+FLAPPY_INLINE T reach_beyond_stops(const ActiveEffects<T>& effects) {
+  T reach_rad(0);
+  effects.apply(
+      reach_rad, [](auto effect, const auto&, const auto&, auto& reach) requires requires { effect.kReach_rad; } {
+        reach = T(effect.kReach_rad);
+      });
+  return reach_rad;
+}
+
+template <class T>
+FLAPPY_INLINE void widen_stops(const T& reach_rad, T& lower_rad, T& upper_rad) {
+  lower_rad = where(reach_rad > T(0), T(-reach_rad), lower_rad);
+  upper_rad = where(reach_rad > T(0), reach_rad, upper_rad);
+}
+
 /// Stage by stage, in the order of effect.hpp.
 template <class T>
 FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<true, T>& a) {
@@ -210,8 +259,8 @@ FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<true, T
         effect.hinges(q, s, state, change);
       });
   if (effects.meter != nullptr) read_meter(s, a.hinges, effects.meter, effects.stride);
-  put_hinges(a.hinges.left, s.p.left, a.p.left);
-  put_hinges(a.hinges.right, s.p.right, a.p.right);
+  put_hinges(a.hinges.left, a.p.left);
+  put_hinges(a.hinges.right, a.p.right);
   a.voltages = {a.hinges.left.voltage_V, a.hinges.right.voltage_V};
   effects.apply(
       s.wind_B_m_s, [&](auto effect, const auto& q, const auto& state,
@@ -243,6 +292,7 @@ template <class T>
 FLAPPY_INLINE void add_hinges(const Hinges<T>& h, SideLoad<T>& load, WingInertia<T>& wing) {
   load.stroke_torque_Nm += h.stroke_torque_Nm;
   load.rotation_torque_Nm += h.rotation_torque_Nm;
+  load.rotation_stiffening_kg_m2 += h.rotation_inertia_kg_m2;
   wing.cross_inertia += h.cross_inertia_kg_m2;
 }
 
@@ -340,7 +390,13 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
   // where everything is and how it moves
   const Matrix3<T> R = rotation_matrix(x.attitude);
   const Vec3<T>& w = x.body_rate_rad_s;
-  const Sides<WingPose<T>> pose{place_wing<+1>(vehicle.left, x.left, w), place_wing<-1>(vehicle.right, x.right, w)};
+  const auto mid_rates = [&](const SideParameters<T>& p, const SideState<T>& q) {
+    T lower = p.rotation_lower_rad, upper = p.rotation_upper_rad;
+    if constexpr (with_effects) widen_stops(reach_beyond_stops(effects), lower, upper);
+    return mid_step_rates(p, q, lower, upper, k.step, k.per_step);
+  };
+  const Sides<WingPose<T>> pose{place_wing<+1>(vehicle.left, x.left, mid_rates(vehicle.left, x.left), w),
+                                place_wing<-1>(vehicle.right, x.right, mid_rates(vehicle.right, x.right), w)};
   const WholeVehicle<T> whole = whole_vehicle(vehicle, pose);
   const auto held = hold(vehicle, x, whole, R, com_m, k.gravity);
 
@@ -348,8 +404,9 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
   auto acting = acts_on<with_effects>(vehicle, x, voltages, R, pose, whole, com_m, effects, k);
   if constexpr (with_effects) apply_effects(effects, acting);
   const Parameters<T>& p = acting.p;
-  Sides<SideLoad<T>> load{load_side<+1>(p.left, x.left, acting.air.left, acting.voltages.left_V),
-                          load_side<-1>(p.right, x.right, acting.air.right, acting.voltages.right_V)};
+  Sides<SideLoad<T>> load{
+      load_side<+1>(p.left, x.left, pose.left.theta_rate, acting.air.left, acting.voltages.left_V, k.step),
+      load_side<-1>(p.right, x.right, pose.right.theta_rate, acting.air.right, acting.voltages.right_V, k.step)};
   Sides<WingInertia<T>> wing{wing_inertia(p.left, pose.left), wing_inertia(p.right, pose.right)};
   if constexpr (with_effects) {
     add_hinges(acting.hinges.left, load.left, wing.left);

@@ -64,6 +64,8 @@ void keep_wings(const FlapperState& from, FlapperState& x) {
     x.rotation_rad[side] = from.rotation_rad[side];
     x.stroke_rate_rad_s[side] = from.stroke_rate_rad_s[side];
     x.rotation_rate_rad_s[side] = from.rotation_rate_rad_s[side];
+    x.stroke_acceleration_rad_s2[side] = from.stroke_acceleration_rad_s2[side];
+    x.rotation_acceleration_rad_s2[side] = from.rotation_acceleration_rad_s2[side];
   }
 }
 
@@ -161,7 +163,7 @@ class ReplayBlock {
     auto& s = storage_of(batch_);
     BlockEffects<double> in_force = s.effects_of(0);
     in_force.voltages_V = next_V_;
-    s.kernel(s.blocks[0], in_force, plan_, 0, steps, nullptr);
+    s.kernel(s.blocks[0], in_force, plan_, 0, steps, {});
     next_V_ += static_cast<std::size_t>(steps) * 2 * kWindows;
   }
 

@@ -29,7 +29,7 @@ struct ReplayWindow {
 using RecordedState = std::function<FlapperState(std::size_t window, double t_s)>;
 
 struct ReplayOptions {
-  double step_s = 1e-4;
+  double step_s = kDefaultStep_s;
   int threads = 0;  ///< 0: one for each processor
   World world;
   std::string instruction_set;  ///< as in BatchOptions

@@ -2,6 +2,9 @@
 // Compiled once for each instruction set (FLAPPY_ISA); the bits are the same on all of them.
 #include "sim/step.hpp"
 
+#include <cstddef>
+#include <iterator>
+
 #include "sim/physics_step.hpp"
 #include "sim/rows.hpp"
 
@@ -92,6 +95,9 @@ FLAPPY_INLINE typename L::Mask plausible(const State<L>& x) {
 template <class T, class L>
 FLAPPY_INLINE typename L::Mask freeze_implausible(const State<L>& x, Block<T>& block, int first) {
   typename L::Mask moves = plausible(x);
+  std::uint32_t any_status = 0;
+  for (int i = 0; i < kWidth<T>; ++i) any_status |= block.status[first + i];
+  if (!any(!moves) && !(any_status & kFrozen)) return moves;
   for (int i = 0; i < kWidth<T>; ++i) {
     std::uint32_t& status = block.status[first + i];
     if (!moves.raw[i]) status |= kFrozen;
@@ -100,12 +106,12 @@ FLAPPY_INLINE typename L::Mask freeze_implausible(const State<L>& x, Block<T>& b
   return moves;
 }
 
+/// Takes back what moved in some lanes.
 template <class L>
-FLAPPY_INLINE State<L> where(typename L::Mask m, State<L> yes, const State<L>& no) {
-  L* a = reinterpret_cast<L*>(&yes);
-  const L* b = reinterpret_cast<const L*>(&no);
-  for (int i = 0; i < kStateRows; ++i) a[i] = where(m, a[i], b[i]);
-  return yes;
+FLAPPY_INLINE void keep(const typename L::Mask& lanes, const State<L>& before, State<L>& x) {
+  const L* from = reinterpret_cast<const L*>(&before);
+  L* to = reinterpret_cast<L*>(&x);
+  for (int i = 0; i < kStateRows; ++i) to[i] = where(lanes, from[i], to[i]);
 }
 
 /// What motors draw while the driver holds its voltage: V i over the steps is, as a stroke advances by h psi' of its end,
@@ -142,35 +148,67 @@ class EnergyMeter {
   L left_rad_, right_rad_;
 };
 
-/// Fetches a block from memory, a share with every step.
+/// Fetches memory into the second-level cache, a share of every part with every step.
 class Prefetch {
  public:
-  Prefetch(const void* from, std::size_t bytes, int steps)
-      : at_(static_cast<const char*>(from)),
-        end_(at_ + (from != nullptr ? bytes : 0)),
-        share_(from != nullptr ? (bytes / kLine + steps - 1) / steps * kLine : 0) {}
+  Prefetch(const Ahead& ahead, int steps) {
+    for (const Ahead::Part& part : ahead.parts) {
+      const char* begin = static_cast<const char*>(part.at);
+      if (part.bytes > 0)
+        parts_[count_++] = {begin, begin + part.bytes, (part.bytes / kLine + steps - 1) / steps * kLine};
+    }
+  }
   void step() {
-    for (const char* until = at_ + share_; at_ < until && at_ < end_; at_ += kLine) __builtin_prefetch(at_, 1);
+    for (int i = 0; i < count_; ++i)
+      for (const char* until = parts_[i].at + parts_[i].share; parts_[i].at < until && parts_[i].at < parts_[i].end;
+           parts_[i].at += kLine)
+        __builtin_prefetch(parts_[i].at, 0, 2);
   }
 
  private:
   static constexpr std::size_t kLine = 64;
-  const char *at_, *end_;
-  std::size_t share_;
+  struct Part {
+    const char *at, *end;
+    std::size_t share;
+  } parts_[std::size(Ahead{}.parts)];
+  int count_ = 0;
 };
+
+/// Rows have positions and rates at one time. Within a block positions are half a step ahead: a step takes rates across the
+/// middle, where positions are, and positions with the rates at its end across the next middle (Verlet 1967, as leapfrog).
+/// A hinge that its stop holds stays there, and so both are exactly inverse to one another.
+template <bool with_effects, class L>
+FLAPPY_INLINE void shift_positions(const Parameters<L>& p, const L& reach_rad, const L& time_s, State<L>& x,
+                                   Vec3<L>& com_m) {
+  if constexpr (kOldRates) return;
+  const auto shift = [&](const SideParameters<L>& side, SideState<L>& q) {
+    L lower_rad = side.rotation_lower_rad, upper_rad = side.rotation_upper_rad;
+    if constexpr (with_effects) widen_stops(reach_rad, lower_rad, upper_rad);
+    const auto shifted = [&](const L& angle, const L& rate, const L& lower, const L& upper) {
+      const auto stays = (time_s < L(0)) & on_stop(angle, lower, upper);
+      return where(stays, angle, clamp(L(angle + time_s * rate), lower, upper));
+    };
+    q.stroke_rad = shifted(q.stroke_rad, q.stroke_rate_rad_s, side.stroke_lower_rad, side.stroke_upper_rad);
+    q.rotation_rad = shifted(q.rotation_rad, q.rotation_rate_rad_s, lower_rad, upper_rad);
+  };
+  shift(p.left, x.left);
+  shift(p.right, x.right);
+  com_m = add_scaled(com_m, time_s, x.com_velocity_m_s);
+  x.attitude = rotated(x.attitude, L(0.5) * time_s * x.body_rate_rad_s);
+}
 
 /// Back from the centre of mass to the torso; contact, plausibility, rows.
 template <class T, class L>
-FLAPPY_INLINE void finish(State<L> x, const Vec3<L>& com_m, const Voltages<L>& voltages, const EnergyMeter<T, L>& meter,
-                          const Parameters<L>& p, const StepPlan& plan, Block<T>& block, int first) {
+FLAPPY_INLINE void finish(State<L>& x, const Vec3<L>& com_m, const Voltages<L>& voltages,
+                          const EnergyMeter<T, L>& meter, const Parameters<L>& p, const StepPlan& plan, Block<T>& block,
+                          int first) {
   x.position_m = where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
   look_around(x, p, plan, block, first);
   const typename L::Mask moves = freeze_implausible(x, block, first);
-  store_rows(where(moves, x, load_rows<State<L>>(block.state, first)), block.state, first);
+  if (rarely(!moves)) keep(!moves, load_rows<State<L>>(block.state, first), x);
+  store_rows(x, block.state, first);
   meter.add(moves);
-  auto drive = load_rows<Drive<L>>(block.drive, first);
-  drive.voltages = voltages;
-  store_rows(drive, block.drive, first);
+  store_rows(voltages, &block.drive[offsetof(Drive<L>, voltages) / sizeof(L)], first);
 }
 
 /// Effects remember nothing of a frozen flapper: what they saw of it last is no number that means anything.
@@ -183,28 +221,20 @@ FLAPPY_INLINE void forget_frozen(BlockEffects<T> effects, const Block<T>& block,
 
 template <bool with_effects, class T>
 void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first_step, int steps,
-                const Block<T>* next) {
+                const Ahead& ahead) {
   using L = Lanes<T, kWidth<T>>;
   const Constants<L> k{plan.step_s,       plan.step_s / 2, 1 / plan.step_s,
                        plan.gravity_m_s2, plan.ground_z_m, plan.ceiling_z_m};
-  Prefetch prefetch(next, sizeof *next, steps);
+  Prefetch prefetch(ahead, steps);
   for (int first = 0; first < kLanes<T>; first += kWidth<T>) {
     const auto& p = view_rows<Parameters<L>>(block.parameters, first);
     auto x = load_rows<State<L>>(block.state, first);
     Voltages<L> voltages = load_rows<Drive<L>>(block.drive, first).voltages;
-    EnergyMeter<T, L> meter(in_force.motors, first, x);
-    int held = 0;  // steps since the meter was read
-    const auto measure = [&] {
-      meter.read(x, voltages, held * plan.step_s);
-      held = 0;
-    };
     ActiveEffects<L> effects;
     Parameters<L> own;
     if constexpr (with_effects) {
       own = p;
       effects.own = &own;
-      if (in_force.motors != nullptr) effects.motors = in_force.motors->rows[0] + first;
-      effects.energy_J = &meter.energy_J;
       effects.set = in_force.set;
       effects.kept = in_force.kept;
       effects.states = in_force.states != nullptr ? in_force.states + first : nullptr;
@@ -214,8 +244,21 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
       effects.wall_count = plan.wall_count;
       for (int i = 0; i < kEffectRows; ++i) effects.rows[i] = L::load(in_force.rows + i * kLanes<T> + first);
     }
-
     Vec3<L> com_m = x.position_m + rotation_matrix(x.attitude) * centre_of_mass(p, x);
+    L reach_rad(0);
+    if constexpr (with_effects) reach_rad = reach_beyond_stops(effects);
+    shift_positions<with_effects>(p, reach_rad, k.half_step, x, com_m);
+
+    EnergyMeter<T, L> meter(in_force.motors, first, x);
+    if constexpr (with_effects) {
+      if (in_force.motors != nullptr) effects.motors = in_force.motors->rows[0] + first;
+      effects.energy_J = &meter.energy_J;
+    }
+    int held = 0;  // steps since the meter was read
+    const auto measure = [&] {
+      meter.read(x, voltages, held * plan.step_s);
+      held = 0;
+    };
     const T* recorded_V = in_force.voltages_V;
     std::int64_t until_update = (plan.steps_per_update - first_step % plan.steps_per_update) % plan.steps_per_update;
     for (int i = 0; i < steps; ++i, --until_update) {
@@ -231,6 +274,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
       if (with_effects && effects.meter != nullptr) effects.meter += kMeterRows * kLanes<T>;
     }
     measure();
+    shift_positions<with_effects>(p, reach_rad, L(-k.half_step), x, com_m);
     finish(x, com_m, voltages, meter, p, plan, block, first);
     if constexpr (with_effects) forget_frozen(in_force, block, first);
   }
@@ -238,9 +282,10 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
 
 template <class T>
 void step_any_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first, int steps,
-                    const Block<T>* next) {
-  if (in_force.set == 0 && in_force.meter == nullptr) step_block<false>(block, in_force, plan, first, steps, next);
-  else step_block<true>(block, in_force, plan, first, steps, next);
+                    const Ahead& ahead) {
+  if (kOldRates || (in_force.set == 0 && in_force.meter == nullptr))
+    step_block<false>(block, in_force, plan, first, steps, ahead);
+  else if constexpr (!kOldRates) step_block<true>(block, in_force, plan, first, steps, ahead);
 }
 
 }  // namespace

@@ -40,11 +40,17 @@ struct BlockEffects {
 /// Rows of a meter: the source's voltage as a share of its nominal one, currents of the left and of the right motor, A.
 inline constexpr int kMeterRows = 3;
 
+/// Memory that the next block will need, to be fetched while this one steps.
+struct Ahead {
+  struct Part {
+    const void* at;
+    std::size_t bytes;
+  } parts[4] = {};
+};
+
 /// Advances all lanes of a block by `steps` physics steps, of which the first is number `first` of the batch.
-/// `next`: the block to be fetched from memory meanwhile, if any.
 template <class T>
-using StepBlock = void (*)(Block<T>&, BlockEffects<T>, const StepPlan&, std::int64_t first, int steps,
-                           const Block<T>* next);
+using StepBlock = void (*)(Block<T>&, BlockEffects<T>, const StepPlan&, std::int64_t first, int steps, const Ahead&);
 
 template <class T>
 struct Kernel {

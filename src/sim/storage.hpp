@@ -93,7 +93,10 @@ struct Batch<T>::Storage {
     }
   }
   std::uint64_t effects_of_lane(std::size_t i) const { return lane_effects.empty() ? 0 : lane_effects[i]; }
-  const Block<T>* block_after(std::size_t b) const { return b + 1 < blocks.size() ? &blocks[b + 1] : nullptr; }
+  Ahead::Part block_after(std::size_t b) const {
+    if (b + 1 < blocks.size()) return {&blocks[b + 1], sizeof(Block<T>)};
+    return {nullptr, 0};
+  }
 
   void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v);
   /// What a meter of flapper `i` needs to know of its motors, to be put to a flapper of any batch.

@@ -176,6 +176,7 @@ TEST(Ends, TimeOutComesAtItsTickAndIsTheOnlyBit) {
           sensors("paper"), {},
           task(with_end(staying("kind = \"standing\""), "time_s = " + std::to_string(time_s)), 1 / control_hz));
       o.control_hz = control_hz;
+      o.batch.step_s = 1e-4;
       o.batch.world.ground_z_m = 0;
       Fleet<float> f(1, test::nominal(), o);
       Fleet<double> d(1, test::nominal(), o);

@@ -151,8 +151,8 @@ void expect_poses_of(const FlightLog& seen, const FlightLog& fine, double latenc
   double position_m = 0, attitude = 0;
   for (std::size_t i = 0; i < m.t_s.size(); ++i) {
     const double t_s = m.t_s[i] - latency_s - delay_s;
-    if (t_s < 1e-4) continue;  // the first of `fine`
-    const auto k = static_cast<std::size_t>(std::lround(t_s / 1e-4)) - 1;
+    if (t_s < sim::kDefaultStep_s) continue;  // the first of `fine`
+    const auto k = static_cast<std::size_t>(std::lround(t_s / sim::kDefaultStep_s)) - 1;
     ASSERT_NEAR(n.t_s[k] - latency_s, t_s, 1e-8);
     for (flightlog::Column MocapStream::*axis : {&MocapStream::x_m, &MocapStream::y_m, &MocapStream::z_m})
       position_m = std::max(position_m, std::abs((m.*axis)[i] - (n.*axis)[k]));
@@ -167,10 +167,10 @@ void expect_poses_of(const FlightLog& seen, const FlightLog& fine, double latenc
 
 TEST(SensorEffects, ShowPosesOfTheTimeBefore) {
   std::vector<std::string> every_step = kQuiet;
-  every_step.push_back("sensors.mocap.rate_hz=10000");
+  every_step.push_back("sensors.mocap.rate_hz=4000");
   const FlightLog plain = open_loop({}, kQuiet), fine = open_loop({}, every_step);
   const double latency_s = plain.header.mocap.latency_s;
-  for (const double delay_s : {0.0123, 0.02, -0.0071, -0.02}) {
+  for (const double delay_s : {0.01225, 0.02, -0.00725, -0.02}) {
     const gap::EffectValues late = {{"mocap_delay", {{"delay_s", delay_s}}}};
     const flightlog::FlightLog seen = open_loop(late, kQuiet);
     ASSERT_GT(seen.mocap.t_s.size() + 10, plain.mocap.t_s.size());

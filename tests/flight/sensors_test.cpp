@@ -256,13 +256,14 @@ TEST_P(Presets, SamplesArriveLateAsStated) {
   const Sensors s = sensors(GetParam());
   Fleet<float> fleet = standing<float>(1, s);
   fleet.record(true);
+  constexpr double h = sim::kDefaultStep_s;
   int imu = 0, pose = 0;
   for (int period = 0; period < 100; ++period) {
     fleet.step();
     for (const auto& y : fleet.imu_samples(0))
-      EXPECT_NEAR(y.arrival_s, std::ceil(++imu / s.imu.rate_hz / 1e-4 - 1e-6) * 1e-4 + s.imu.latency_s, 1e-9);
+      EXPECT_NEAR(y.arrival_s, std::ceil(++imu / s.imu.rate_hz / h - 1e-6) * h + s.imu.latency_s, 1e-9);
     for (const auto& z : fleet.mocap_samples(0))
-      EXPECT_NEAR(z.arrival_s, std::ceil(++pose / s.mocap.rate_hz / 1e-4 - 1e-6) * 1e-4 + s.mocap.latency_s, 1e-9);
+      EXPECT_NEAR(z.arrival_s, std::ceil(++pose / s.mocap.rate_hz / h - 1e-6) * h + s.mocap.latency_s, 1e-9);
   }
   EXPECT_EQ(imu, static_cast<int>(0.2 * s.imu.rate_hz));
   EXPECT_EQ(pose, static_cast<int>(0.2 * s.mocap.rate_hz));

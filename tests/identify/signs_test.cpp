@@ -94,9 +94,9 @@ TEST(Signs, OneRowIsRefused) {
     EXPECT_TRUE(refused(row, 2).starts_with("m.csv:" + std::to_string(row + 2) + ": force_z_N: thrust is -")) << row;
   // rows of -2 V, -3 V and -0.12: offsets add to them
   EXPECT_EQ(refused(22, 3),
-            "m.csv:24: torque_x_Nm: roll is 0.00234, the vehicle's with the offset of all rows -0.00241; likely a "
+            "m.csv:24: torque_x_Nm: roll is 0.00235, the vehicle's with the offset of all rows -0.00242; likely a "
             "flipped axis; accepted: frame B, x forward, y left, z up");
-  EXPECT_TRUE(refused(35, 4).starts_with("m.csv:37: torque_y_Nm: pitch is -0.0015")) << refused(35, 4);
+  EXPECT_TRUE(refused(35, 4).starts_with("m.csv:37: torque_y_Nm: pitch is -0.0016")) << refused(35, 4);
   EXPECT_TRUE(refused(36, 5).starts_with("m.csv:38: torque_z_Nm: yaw is -0.0005")) << refused(36, 5);
   // a row whose offset is as large as its answer says nothing
   EXPECT_EQ(refused(25, 3), "accepted");

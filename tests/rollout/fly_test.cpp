@@ -94,7 +94,7 @@ TEST(Fly, HoversAndDependsOnNothingButItsNumber) {
   EXPECT_EQ(r.summary.crashed, 0u);
   EXPECT_EQ(r.summary.within_share, 1);
   EXPECT_LT(r.summary.takeoff[5], 0.1);
-  EXPECT_EQ(r.steps, 3 * 5000);
+  EXPECT_EQ(r.steps, 3 * 2000);
   const Folder folder;
   const rollout::FlyResult logged = fly(c, {.count = 3, .log_folder = folder / "log", .log_bytes = 1});  // one by one
   EXPECT_EQ(logged.hash, r.hash);
@@ -164,7 +164,7 @@ void expect_voltages_to_the_bit(const std::string& control_hz) {
       const std::vector<rollout::DriverUpdate> updates = rollout::driver_updates(fleet, i);
       ASSERT_FALSE(updates.empty());
       if (i == 0) {
-        for (const rollout::DriverUpdate& u : updates) EXPECT_EQ(u.step, std::exchange(next, next + 10));
+        for (const rollout::DriverUpdate& u : updates) EXPECT_EQ(u.step, std::exchange(next, next + 4));
         EXPECT_LT(updates.back().step, sim::storage_of(fleet.batch()).steps);
       }
       const auto [block, lane] = sim::storage_of(fleet.batch()).at(i);
@@ -230,7 +230,7 @@ TEST(Recorder, LogReadsBackAsFlown) {
   EXPECT_EQ(log.imu.t_s.size(), 250u);
   EXPECT_EQ(log.imu.t_s[0], 0.002);
   EXPECT_EQ(log.mocap.t_s.size(), 75u);
-  EXPECT_NEAR(log.mocap.t_s[0], 0.0067 + 0.03, 1e-9);  // the first step at or after 1/150 s
+  EXPECT_NEAR(log.mocap.t_s[0], 0.00675 + 0.03, 1e-9);  // the first step at or after 1/150 s
 
   const io::CsvTable truth = io::read_csv(folder / "log" / "truth.csv");
   const auto &t = truth.column("t_s"), &rate = truth.column("right_stroke_rate_rad_s"),

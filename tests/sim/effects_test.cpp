@@ -33,6 +33,7 @@ model::Vehicle with(const EffectEntry& e, double scale) {
 /// Near the ground, a ceiling and a wall, and drifting.
 BatchOptions room() {
   BatchOptions o;
+  o.step_s = 1e-4;
   o.threads = 1;
   o.meters_energy = true;
   o.world.ground_z_m = 0;
@@ -238,6 +239,7 @@ TEST(Effects, RememberThroughAReplaysSpinUp) {
     voltages.right_V.push_back(drive.voltages.right_V);
   }
   ReplayOptions o;
+  o.step_s = 1e-4;
   o.threads = 1;
   o.spin_up_steps = 1200;
   const auto recorded = [&](std::size_t, double t_s) {

@@ -92,7 +92,7 @@ TEST(Replay, WindowsDoNotSeeEachOtherOrTheThreads) {
   dragged.effects["body_drag"];
   const Recorded r = fly(one, 300, 0.1);
   VoltageScript wild = r.voltages;
-  for (double& v : wild.left_V) v *= 1e12;
+  for (double& v : wild.left_V) v = std::numeric_limits<double>::quiet_NaN();
   const auto recorded = [&](std::size_t, double t_s) { return r.at(t_s); };
   ReplayOptions o = options();
   o.spin_up_steps = 300;
@@ -134,8 +134,8 @@ TEST(Replay, AVoltageCountsForItsShareOfAStep) {
   // two changes within step 10, which so has 0.2 x 4 + 0.5 x 8 + 0.3 x 2 = 5.4 V
   const VoltageScript within{{0, 1.02e-3, 1.07e-3}, {4, 8, 2}, {4, 8, 2}};
   const VoltageScript means{{0, 1e-3, 1.1e-3}, {4, 5.4, 2}, {4, 5.4, 2}};
-  // the mean is rounded: 1e-15 V for 20 steps
-  EXPECT_LT(largest_difference(end(within, 0), end(means, 0)), 1e-10);
+  // the mean is rounded: 1e-15 V for 20 steps, in accelerations of some 1e5 rad/s^2
+  EXPECT_LT(largest_difference(end(within, 0), end(means, 0)), 1e-9);
   // the ends of steps are not exact: 3 x 0.1 ms is not 0.3 ms
   const VoltageScript rounded{{0, 3e-4 * (1 - 1e-15), 6e-4 * (1 + 1e-15)}, {4, 8, 2}, {4, 8, 2}};
   const VoltageScript exact{{0, 3e-4, 6e-4}, {4, 8, 2}, {4, 8, 2}};

@@ -2,7 +2,8 @@
 """Checks that effects that are off cost nothing: same_code.py OBJDUMP OBJECT BARE
 
 OBJECT is a kernel, BARE the same one compiled without any effect in the catalogue. The functions that fly a block without
-effects must be the same instructions in both, but for where their constants lie.
+effects must be the same instructions in both, but for where their constants lie and for the order in which the compiler
+puts independent ones.
 """
 import re
 import subprocess
@@ -22,7 +23,7 @@ def functions(objdump, path):
             own = found.setdefault(start[1], [])
         elif own is not None and line.strip():
             own.append(re.sub(r"^(R_\w+)\s.*$", r"\1", line.strip()))
-    return found
+    return {name: sorted(instructions) for name, instructions in found.items()}
 
 
 objdump, with_catalogue, bare = sys.argv[1:]

@@ -52,7 +52,7 @@ run(--rounds 1 --seconds 0.01 --no-peers --json ${WORK}/speed.json)
 expect_equal("exit code" "${code}" 0)
 expect_keys(${WORK}/speed.json closed_loop_control_steps_per_s=NUMBER bytes_per_flapper_closed_loop=NUMBER
   closed_loop_shares=OBJECT float_steps_per_s=NUMBER double_steps_per_s=NUMBER two_thread_scaling=NUMBER
-  dart_steps_per_s=NULL mujoco_steps_per_s=NULL thrust_error_100us=NUMBER position_error_100us_m=NUMBER
+  dart_steps_per_s=NULL mujoco_steps_per_s=NULL thrust_error=NUMBER position_error_m=NUMBER
   bytes_per_flapper=NUMBER ns_per_step_1000=NUMBER ns_per_step_100000=NUMBER flops_per_step=NUMBER
   roof_steps_per_s=NUMBER instruction_set=STRING)
 file(READ ${WORK}/speed.json json)
@@ -64,7 +64,7 @@ function(expect_below what actual limit)
     message(SEND_ERROR "${what} is ${actual}, should be below ${limit}")
   endif()
 endfunction()
-string(JSON error GET "${json}" position_error_100us_m)
+string(JSON error GET "${json}" position_error_m)
 expect_below("position error at 100 us" "${error}" 3e-3)
 run(convergence --json ${WORK}/convergence.json)
 expect_equal("exit code" "${code}" 0)

@@ -70,7 +70,7 @@ struct Part {
 
 /// Physics alone: 4,096 flappers by control periods.
 Part batch(const model::Vehicle& vehicle, int threads) {
-  const sim::BatchOptions options{.step_s = 1e-4, .threads = threads};
+  const sim::BatchOptions options{.threads = threads};
   const auto flock = std::make_shared<sim::Batch<float>>(4096, vehicle, options);
   return {"batch", "steps", threads, [flock] {
             constexpr int kPeriods = 50, kPeriod = 20;

@@ -80,7 +80,7 @@ Operations count_operations() {
   model::Vec3<Counted> com{0, 0, 0};
   model::count = {};
   sim::physics_step<false>(p, x, sim::Voltages<Counted>{}, com, sim::ActiveEffects<Counted>{},
-                           sim::Constants<Counted>{1e-4, 5e-5, 1e4, 9.81, 0, 0});
+                           sim::Constants<Counted>{250e-6, 125e-6, 4e3, 9.81, 0, 0});
   return model::count;
 }
 

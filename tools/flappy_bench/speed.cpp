@@ -18,8 +18,8 @@
 namespace flappy::bench {
 namespace {
 
-constexpr double kStep_s = 1e-4;
-constexpr int kPeriod = 20;  // physics steps in a control period of 2 ms
+constexpr double kStep_s = sim::kDefaultStep_s;
+constexpr int kPeriod = static_cast<int>(2e-3 / kStep_s + 0.5);  // physics steps in a control period
 constexpr std::size_t kDistinctVehicles = 1024;
 /// Flights are no longer than this: without a controller a flapper then tumbles, which is not what anyone simulates.
 constexpr double kFlight_s = 0.2;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "flappy/batch.hpp"
 #include "flappy/vehicle.hpp"
 #include "flightlog/flight_log.hpp"
 #include "flightlog/smoother.hpp"
@@ -13,7 +14,7 @@
 
 namespace flappy::gap {
 
-inline constexpr double kPredictionStep_s = 1e-4;
+inline constexpr double kPredictionStep_s = sim::kDefaultStep_s;
 /// Beats until wings that were at rest have forgotten it: after three, thirty times the noise remains.
 inline constexpr double kSpinUpBeats = 6;
 /// Lower than this over its stand a vehicle may still be touching the ground, which no hypothesis knows.

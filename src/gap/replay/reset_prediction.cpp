@@ -238,7 +238,7 @@ std::vector<Rows> PredictedFlight::predict(const std::vector<const Candidate*>& 
     sim::BlockEffects<double> in_force = storage.effects_of(0);
     in_force.voltages_V = voltages_V.data();
     if (r.log.power) in_force.meter = meter.data() + kMeter;
-    storage.kernel(block, in_force, plan, 0, r.steps[k], nullptr);
+    storage.kernel(block, in_force, plan, 0, r.steps[k], {});
     reset(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
     double* to = &samples[k * kSignals * kVehicles];
     const double per_interval = 1 / r.interval_s(k);

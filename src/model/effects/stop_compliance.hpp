@@ -16,7 +16,7 @@ struct StopCompliance {
   static constexpr EffectInfo kInfo{"stop_compliance", Stage::wing, 1, "", "Hunt, Crossley 1975"};
   static constexpr std::array<EffectParameter, 2> kParameters{
       {{"compliance_rad_Nm", 0, 1000, 50, 0, 150}, {"damping_ratio", 0, 2, 0.5, 0.2, 0.8}}};
-  static constexpr double kHardStop_rad = 1.7;
+  static constexpr double kReach_rad = 1.7;  // of the wing, to where the stop is hard again
 
   template <class T>
   static FLAPPY_INLINE void hinges(const T (&q)[2], const Surroundings<T>& s, const StateRows<T>&,
@@ -37,8 +37,8 @@ struct StopCompliance {
     const auto touches = ((over > T(0)) & (push > T(0))) | ((under < T(0)) & (push < T(0)));
     h.rotation_torque_Nm -= where(touches, push, T(0));
     h.rotation_inertia_kg_m2 += where(touches, T(s.step_s * T(k * s.step_s + d)), T(0));
-    h.rotation_upper_rad = T(kHardStop_rad);
-    h.rotation_lower_rad = T(-kHardStop_rad);
+    h.rotation_upper_rad = T(kReach_rad);
+    h.rotation_lower_rad = T(-kReach_rad);
   }
 };
 

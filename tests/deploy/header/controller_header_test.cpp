@@ -313,7 +313,7 @@ TEST(ControllerHeader, TestsItself) {
   }
   // what is computed otherwise is found, by the trace or by a sample that gets in
   const FlyConfig flies = config_of("hover");
-  const std::string header = controller_header(flies, kRun, record_controller(flies));
+  const std::string header = controller_header(flies, kRun, record_controller(flies, 20, 60));
   const auto test_of = [&](const std::string& right, const std::string& wrong) {
     std::string text = header;
     if (text.find(right) == std::string::npos) return -1;

@@ -1,0 +1,273 @@
+#include "many_flights.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "accuracy.hpp"
+#include "io/config.hpp"
+#include "io/installation.hpp"
+#include "sim/kernels.hpp"
+#include "sim/randomise.hpp"
+#include "sim/storage.hpp"
+#include "speed.hpp"
+#ifdef FLAPPY_HAVE_PEERS
+#include "dart_peer.hpp"
+#include "mujoco_peer.hpp"
+#endif
+
+namespace flappy::sim {
+inline namespace old_rates_v3 {
+extern const Kernel<float> kernel_float;
+extern const Kernel<double> kernel_double;
+}  // namespace old_rates_v3
+inline namespace old_rates_v4 {
+extern const Kernel<float> kernel_float;
+extern const Kernel<double> kernel_double;
+}  // namespace old_rates_v4
+}  // namespace flappy::sim
+
+namespace flappy::bench {
+namespace {
+
+constexpr double kFlight_s = 0.3, kSettles_s = 0.5, kHold_s = 1e-3;
+constexpr double kPeriod_s = 2e-3;
+constexpr int kBeats = 17;
+constexpr std::uint64_t kSeed = 9;
+const Manoeuvre kAboutHover{256, 8, 12, {}};
+
+struct OwnFlight {
+  model::Vehicle vehicle;
+  sim::Input input;
+  sim::FlapperState start;
+};
+
+std::vector<OwnFlight> draw(const model::Vehicle& vehicle, const Manoeuvre& manoeuvre) {
+  const sim::Randomisation randomisation =
+      sim::read_randomisation(vehicle, io::Config::load(io::config_path("randomisation/published.toml")).root());
+  std::mt19937_64 random(kSeed);
+  const auto within = [&](double limit) { return limit * (2 * static_cast<double>(random() >> 11) * 0x1p-53 - 1); };
+  std::vector<OwnFlight> flights;
+  for (std::size_t i = 0; i < manoeuvre.flights; ++i) {
+    const double amplitude_V =
+        (manoeuvre.low_V + manoeuvre.high_V) / 2 + within((manoeuvre.high_V - manoeuvre.low_V) / 2);
+    const sim::Input input{amplitude_V, within(1), within(0.5), within(0.05)};
+    const sim::FlapperState start{.stroke_rad = {within(0.5), within(0.5)}, .rotation_rad = {within(0.5), within(0.5)}};
+    model::Vehicle own = randomisation.sample({.seed = kSeed, .flapper = static_cast<std::uint32_t>(i)});
+    if (!manoeuvre.effect.empty()) own.effects[manoeuvre.effect];
+    flights.push_back({own, input, start});
+  }
+  return flights;
+}
+
+template <class T>
+sim::Batch<T> batch_of(const std::vector<OwnFlight>& flights, const Scheme& scheme, sim::Start start) {
+  sim::Batch<T> batch(flights.size(), flights[0].vehicle, {.step_s = scheme.step_s, .threads = 1});
+  if (scheme.old_rates)
+    sim::storage_of(batch).kernel = [] {
+      const bool v4 = sim::best_instruction_set() == "x86-64-v4";
+      if constexpr (sizeof(T) == sizeof(float))
+        return (v4 ? sim::old_rates_v4::kernel_float : sim::old_rates_v3::kernel_float).step;
+      else return (v4 ? sim::old_rates_v4::kernel_double : sim::old_rates_v3::kernel_double).step;
+    }();
+  for (std::size_t i = 0; i < flights.size(); ++i) {
+    batch.set_vehicle(i, flights[i].vehicle);
+    batch.reset(i, flights[i].start, start);
+    batch.set_input(i, flights[i].input);
+  }
+  return batch;
+}
+
+template <class T>
+void advance(sim::Batch<T>& batch, double seconds, const Scheme& scheme) {
+  batch.step(static_cast<int>(std::lround(seconds / scheme.step_s)));
+}
+
+Flight end_of(const sim::FlapperState& s) {
+  return {
+      s.position_m[0], s.position_m[1], s.position_m[2], {s.attitude[0], s.attitude[1], s.attitude[2], s.attitude[3]}};
+}
+
+std::vector<Flight> free_flights(const std::vector<OwnFlight>& flights, const Scheme& scheme) {
+  auto batch = batch_of<double>(flights, scheme, sim::Start::flying);
+  advance(batch, kFlight_s, scheme);
+  std::vector<Flight> ends;
+  for (std::size_t i = 0; i < flights.size(); ++i) ends.push_back(end_of(batch.state(i)));
+  return ends;
+}
+
+/// Mean over whole beats, welded.
+std::vector<double> thrusts_N(const std::vector<OwnFlight>& flights, const Scheme& scheme) {
+  auto batch = batch_of<double>(flights, scheme, sim::Start::welded);
+  advance(batch, kSettles_s, scheme);
+  std::vector<double> thrust_N;
+  for (std::size_t i = 0; i < flights.size(); ++i) thrust_N.push_back(-batch.held_impulse(i).force_N_s[2]);
+  const double beats_s = kBeats / flights[0].vehicle.driver.flapping_Hz;
+  advance(batch, beats_s, scheme);
+  for (std::size_t i = 0; i < flights.size(); ++i)
+    thrust_N[i] = (thrust_N[i] + batch.held_impulse(i).force_N_s[2]) / beats_s;
+  return thrust_N;
+}
+
+/// Of position, m, and of attitude, rad.
+std::array<double, 2> rms(const std::vector<Flight>& flights, const std::vector<Flight>& exact) {
+  double position = 0, attitude = 0;
+  for (std::size_t i = 0; i < flights.size(); ++i) {
+    position += std::pow(distance_m(flights[i], exact[i]), 2);
+    attitude += std::pow(turn_rad(flights[i], exact[i]), 2);
+  }
+  const auto n = static_cast<double>(flights.size());
+  return {std::sqrt(position / n), std::sqrt(attitude / n)};
+}
+
+/// Seconds of flight per second of one processor, in float, a control period of 2 ms at a time: the median of five goes.
+double flapper_s_per_cpu_s(const std::vector<OwnFlight>& few, const Scheme& scheme) {
+  std::vector<OwnFlight> flights;
+  while (flights.size() < 1024) flights.insert(flights.end(), few.begin(), few.end());
+  std::vector<double> goes;
+  for (int go = 0; go < 5; ++go) {
+    auto batch = batch_of<float>(flights, scheme, sim::Start::flying);
+    const double begin_s = processor_seconds();
+    for (int period = 0; period < std::lround(kFlight_s / kPeriod_s); ++period) advance(batch, kPeriod_s, scheme);
+    goes.push_back(kFlight_s * static_cast<double>(flights.size()) / (processor_seconds() - begin_s));
+  }
+  return summary(goes).median;
+}
+
+#ifdef FLAPPY_HAVE_PEERS
+/// Voltages of the driver, held for a millisecond each, left and right.
+std::vector<std::vector<std::array<double, 2>>> voltages_of(const std::vector<OwnFlight>& flights) {
+  const Scheme coarse{kHold_s / 2};
+  auto batch = batch_of<double>(flights, coarse, sim::Start::welded);
+  std::vector<std::vector<std::array<double, 2>>> voltages(flights.size());
+  for (double t_s = 0; t_s < kFlight_s - kHold_s / 2; t_s += kHold_s) {
+    advance(batch, kHold_s, coarse);
+    for (std::size_t i = 0; i < flights.size(); ++i) {
+      const auto at = sim::storage_of(batch).at(i);
+      const auto v = sim::get<sim::Drive<double>>(at.block.drive, at.lane).voltages;
+      voltages[i].push_back({v.left_V, v.right_V});
+    }
+  }
+  return voltages;
+}
+
+struct PeerSettings {
+  std::string engine, name;
+  std::function<std::pair<Flight, double>(const OwnFlight&, const std::vector<std::array<double, 2>>&, double)> fly;
+};
+
+/// Where a peer ends at a step, and what that took of a processor.
+template <class Peer, class Settings>
+std::pair<Flight, double> fly_peer(const OwnFlight& own, const std::vector<std::array<double, 2>>& voltages,
+                                   double step_s, const Settings& settings) {
+  Peer peer(own.vehicle, {.step_s = step_s}, settings);
+  reference::PeerState start;
+  start.stroke_rad = {own.start.stroke_rad[0], own.start.stroke_rad[1]};
+  start.rotation_rad = {own.start.rotation_rad[0], own.start.rotation_rad[1]};
+  peer.set_state(start);
+  const int each = static_cast<int>(std::lround(kHold_s / step_s));
+  const double begin_s = processor_seconds();
+  for (const auto& [left_V, right_V] : voltages)
+    for (int i = 0; i < each; ++i) peer.step(left_V, right_V);
+  const double took_s = processor_seconds() - begin_s;
+  const reference::PeerState s = peer.state();
+  return {{s.p_WB_W_m[0], s.p_WB_W_m[1], s.p_WB_W_m[2], s.q_WB}, took_s};
+}
+
+/// Settings a user would try: integrators, solvers, and stops as MuJoCo has them or as hard as the step allows.
+std::vector<PeerSettings> peer_settings() {
+  std::vector<PeerSettings> all;
+  for (const char* integrator : {"Euler", "implicit"})
+    for (const bool hard : {false, true})
+      all.push_back({"MuJoCo", std::string(integrator) + (hard ? ", hard stops" : ", default stops"),
+                     [=](const OwnFlight& own, const auto& voltages, double step_s) {
+                       const reference::MujocoSettings settings{
+                           .integrator = integrator, .stop_time_s = 2 * step_s, .stop_damping_ratio = hard ? 4.0 : 1.0};
+                       return fly_peer<reference::MujocoPeer>(own, voltages, step_s, settings);
+                     }});
+  for (const bool implicit_spring : {false, true})
+    all.push_back({"DART", implicit_spring ? "implicit spring" : "explicit spring",
+                   [=](const OwnFlight& own, const auto& voltages, double step_s) {
+                     return fly_peer<reference::DartPeer>(own, voltages, step_s,
+                                                          reference::DartSettings{implicit_spring});
+                   }});
+  return all;
+}
+
+/// One row; as many flights as a minute has time for, all if it does.
+WorkPrecisionRow row_of(const PeerSettings& peer, double step_s, const std::vector<OwnFlight>& flights,
+                        const std::vector<std::vector<std::array<double, 2>>>& voltages,
+                        const std::vector<Flight>& exact) {
+  std::vector<Flight> ends;
+  double took_s = 0;
+  while (ends.size() < flights.size() && took_s < 60) {
+    const auto [end, seconds] = peer.fly(flights[ends.size()], voltages[ends.size()], step_s);
+    ends.push_back(end);
+    took_s += seconds;
+  }
+  const auto [position_m, attitude_rad] = rms(ends, exact);
+  return {peer.engine, peer.name,    step_s,
+          position_m,  attitude_rad, kFlight_s * static_cast<double>(ends.size()) / took_s};
+}
+#endif
+
+}  // namespace
+
+bool has_old_rates() {
+  const std::string set = sim::best_instruction_set();
+  return set == "x86-64-v3" || set == "x86-64-v4";
+}
+
+std::vector<Errors> errors_of(const model::Vehicle& vehicle, const Manoeuvre& manoeuvre,
+                              const std::vector<Scheme>& schemes) {
+  const std::vector<OwnFlight> flights = draw(vehicle, manoeuvre);
+  const std::vector<Flight> exact = free_flights(flights, {manoeuvre.exact_step_s});
+  const std::vector<double> exact_N = thrusts_N(flights, {manoeuvre.exact_step_s});
+  std::vector<Errors> errors;
+  for (const Scheme& scheme : schemes) {
+    const auto [position_m, attitude_rad] = rms(free_flights(flights, scheme), exact);
+    const std::vector<double> thrust_N = thrusts_N(flights, scheme);
+    double thrust = 0, mean_N = 0;
+    for (std::size_t i = 0; i < flights.size(); ++i) {
+      thrust += std::pow(thrust_N[i] - exact_N[i], 2);
+      mean_N += exact_N[i];
+    }
+    const auto n = static_cast<double>(flights.size());
+    errors.push_back({position_m, attitude_rad, std::sqrt(thrust / n) / (mean_N / n)});
+  }
+  return errors;
+}
+
+std::vector<WorkPrecisionRow> work_precision(const model::Vehicle& vehicle, double enough_m, bool peers,
+                                             const std::function<void(double done, const std::string& now)>& tell) {
+  const std::vector<OwnFlight> flights = draw(vehicle, kAboutHover);
+  const std::vector<Flight> exact = free_flights(flights, {kAboutHover.exact_step_s});
+  std::vector<WorkPrecisionRow> rows;
+  const double most = peers ? 76 : 16;  // rows
+  const auto tell_of = [&](const std::string& engine, double us) {
+    tell(static_cast<double>(rows.size()) / most, engine + " at " + std::to_string(static_cast<int>(us)) + " us");
+  };
+  for (const bool old_rates : {false, true})
+    for (const double us : {500, 250, 200, 125, 100, 50, 25, 10}) {
+      if (old_rates && !has_old_rates()) continue;
+      const Scheme scheme{us * 1e-6, old_rates};
+      tell_of("flappy", us);
+      const auto [position_m, attitude_rad] = rms(free_flights(flights, scheme), exact);
+      rows.push_back({old_rates ? "flappy, old rates" : "flappy", "float", scheme.step_s, position_m, attitude_rad,
+                      flapper_s_per_cpu_s(flights, scheme)});
+    }
+#ifdef FLAPPY_HAVE_PEERS
+  if (!peers) return rows;
+  const auto voltages = voltages_of(flights);
+  for (const PeerSettings& peer : peer_settings())
+    for (const double us : {500, 250, 200, 125, 100, 50, 25, 20, 10, 5}) {
+      tell_of(peer.engine + ", " + peer.name, us);
+      rows.push_back(row_of(peer, us * 1e-6, flights, voltages, exact));
+      if (rows.back().position_error_m < enough_m / 2) break;
+    }
+#endif
+  return rows;
+}
+
+}  // namespace flappy::bench
