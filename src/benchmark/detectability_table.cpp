@@ -171,21 +171,21 @@ void print(const std::vector<EffectDetectability>& findings) {
 
 }  // namespace
 
-Json run_detectability(const DetectabilityCommand& o) {
-  const blind::Case declared = blind::declared_case(o.vehicle);
-  io::check_output(o.out, {o.vehicle, o.randomise, o.priors});
+Json run_detectability(const DetectabilityCommand& command) {
+  const blind::Case declared = blind::declared_case(command.vehicle);
+  io::check_output(command.out, {command.vehicle, command.randomise, command.priors});
   const auto draws = [&](const std::string& file) {
     return sim::read_randomisation(declared.vehicle, io::Config::load(file).root());
   };
-  const sim::Randomisation robots = draws(o.randomise), uncertain = draws(o.priors);
+  const sim::Randomisation robots = draws(command.randomise), uncertain = draws(command.priors);
   std::vector<Development> vehicles;
   {
     io::ProgressLine line("robots", 60);
     io::stop_on_interrupt();  // with those that are done
-    for (int i = 0; i < o.vehicles && !(io::interrupted() && i > 0); ++i) {
-      line.show(static_cast<double>(i) / o.vehicles);
-      const std::uint64_t seed = o.seed + static_cast<std::uint64_t>(i);
-      vehicles.push_back(develop(declared, robots, uncertain, seed, o.threads));
+    for (int i = 0; i < command.vehicles && !(io::interrupted() && i > 0); ++i) {
+      line.show(static_cast<double>(i) / command.vehicles);
+      const std::uint64_t seed = command.seed + static_cast<std::uint64_t>(i);
+      vehicles.push_back(develop(declared, robots, uncertain, seed, command.threads));
       line.clear();
       std::printf("robot %llu, draw %llu: noise %.2f of the declared\n", static_cast<unsigned long long>(seed),
                   static_cast<unsigned long long>(vehicles.back().subject->flown().seed % blind::kTries),
@@ -195,7 +195,7 @@ Json run_detectability(const DetectabilityCommand& o) {
   }
   const std::vector<EffectDetectability> findings = weigh(vehicles, uncertain);
   print(findings);
-  io::write_atomically(o.out, to_toml(o, vehicles.size(), findings));
+  io::write_atomically(command.out, to_toml(command, vehicles.size(), findings));
   Json effects = Json::object();
   for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
     const EffectDetectability& f = findings[e];

@@ -18,6 +18,6 @@ struct DetectabilityCommand {
 };
 
 /// Finds, prints and writes how large effects have to be; the machine-readable result.
-nlohmann::ordered_json run_detectability(const DetectabilityCommand& o);
+nlohmann::ordered_json run_detectability(const DetectabilityCommand& command);
 
 }  // namespace flappy::benchmark

@@ -5,7 +5,7 @@
 // Unknowns of a step, in B: turning acceleration, acceleration of the torso origin, strokes and rotations:
 //   sum of J^T (m, I) J  x = forces - J^T (what the bodies would need at x = 0)      J: Jacobian of a body's motion
 // Wings are cut into strips (planform.hpp); the wings' stops are stiff springs with dampers, taken implicitly, as nothing
-// else is stiff at a step of 25 us; semi-implicit Euler.
+// else is stiff at a step of 20 us; semi-implicit Euler.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@
 
 namespace flappy::blind {
 
-inline constexpr double kRobotStep_s = 2.5e-5;
+inline constexpr double kRobotStep_s = 2e-5;
 inline constexpr double kBattery_V = 18;  ///< nominal: at it, the motor gets what the driver is told
 
 struct Wall {

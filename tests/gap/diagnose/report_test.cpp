@@ -376,7 +376,7 @@ TEST(RunDiagnose, RefusesWhatItCannotAnswer) {
   std::string fast = nominal;
   with(fast.replace(fast.find("hold_s = 1e-3"), 13, "hold_s = 5e-5"));
   EXPECT_TRUE(
-      refusal().ends_with(": driver.hold_s: physics goes by steps of 0.00025 s here; accepted: a multiple of that"))
+      refusal().ends_with(": driver.hold_s: physics goes by steps of 1e-04 s here; accepted: a multiple of that"))
       << refusal();
 }
 
