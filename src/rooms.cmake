@@ -27,6 +27,15 @@ function(flappy_room name)
   target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:flappy_options>)
 endfunction()
 
+# A part that is opened on demand, from one source: lib/flappy/NAME.so.
+function(flappy_plugin name source)
+  add_library(flappy_${name} MODULE ${source})
+  set_target_properties(flappy_${name} PROPERTIES PREFIX "" OUTPUT_NAME ${name} LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/flappy)
+  target_link_libraries(flappy_${name} PRIVATE flappy_io ${ARGN} flappy_options)
+  target_compile_options(flappy_${name} PRIVATE $<$<CONFIG:Release>:-O1>)  # their work is done in the libraries that they open
+  install(TARGETS flappy_${name} LIBRARY DESTINATION lib/flappy)
+endfunction()
+
 # Objects of one source compiled once for each instruction set, with further options. The second time round, with a suffix, only v3
 # is compiled anew. Few processors run scalar code or v2, which need their bits, not their speed.
 function(flappy_kernels objects name suffix source)

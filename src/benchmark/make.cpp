@@ -1,6 +1,7 @@
 #include "benchmark/make.hpp"
 
 #include <cstdio>
+#include <optional>
 
 #include "benchmark/records.hpp"
 #include "benchmark/work.hpp"
@@ -29,7 +30,12 @@ class Maker {
   bool run() {
     io::make_folder(sealed_);
     io::make_folder(command_.out / "cases");
-    const io::FolderLock lock(command_.out);
+    std::optional<io::FolderLock> lock;
+    if (writes()) {
+      lock.emplace(command_.out);
+      agree_with_what_is_there();
+    }
+    if (command_.ranks != nullptr) command_.ranks->wait();
     agree_with_what_is_there();
     if (fs::exists(command_.out / "manifest.json")) {
       std::printf("%s: made already\n", command_.out.c_str());
@@ -38,12 +44,14 @@ class Maker {
     std::vector<const PlannedCase*> open;
     for (const PlannedCase& p : plan_)
       if (!fs::exists(label_file(p))) open.push_back(&p);
-    const bool all = work_through("flying", open.size(), command_.threads, [&](std::size_t i) { make(*open[i]); });
-    if (all) seal();
+    const bool all =
+        work_through("flying", open.size(), command_.threads, command_.ranks, [&](std::size_t i) { make(*open[i]); });
+    if (all && writes()) seal();
     return all;
   }
 
  private:
+  bool writes() const { return command_.ranks == nullptr || command_.ranks->rank() == 0; }
   fs::path label_file(const PlannedCase& p) const { return sealed_ / (number_text(p.number) + ".json"); }
   fs::path case_folder(const PlannedCase& p) const { return command_.out / "cases" / number_text(p.number); }
 

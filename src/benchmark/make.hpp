@@ -10,6 +10,7 @@
 #include "benchmark/plan.hpp"
 #include "blind/flights.hpp"
 #include "io/installation.hpp"
+#include "io/ranks.hpp"
 
 namespace flappy::benchmark {
 
@@ -19,6 +20,7 @@ struct MakeCommand {
                              detectable = io::config_path("gap/detectable.toml");
   PlanOptions plan;
   int threads = 0;  ///< 0: one for each processor
+  io::Ranks* ranks = nullptr;
   /// What of the catalogue's parameters comes nearest to the effects of a case, by "effect.parameter"; null: nothing does.
   /// Asked of the parts whose intervals are scored; without it none is.
   std::function<std::map<std::string, std::optional<double>>(const blind::Case&,

@@ -24,6 +24,8 @@ namespace fs = std::filesystem;
 /// Made when the labels are opened: no prediction is accepted any more.
 fs::path true_fits(const ScoreCommand& command) { return command.folder / "true_fits"; }
 
+bool writes(const ScoreCommand& command) { return command.ranks == nullptr || command.ranks->rank() == 0; }
+
 // ---- phase 1: nothing below reads what is sealed
 
 class Predictions {
@@ -57,7 +59,7 @@ class Predictions {
     std::vector<const PublicCase*> open;
     for (const PublicCase& c : manifest_.cases)
       if (!fs::exists(file_of(c.number))) open.push_back(&c);
-    const bool all = work_through("diagnosing", open.size(), command_.threads, [&](std::size_t i) {
+    const bool all = work_through("diagnosing", open.size(), command_.threads, command_.ranks, [&](std::size_t i) {
       const PublicCase& c = *open[i];
       const auto start = std::chrono::steady_clock::now();
       Json json = to_json(command_.predictor(question(c, c.withheld)));
@@ -66,9 +68,8 @@ class Predictions {
       io::write_atomically(file_of(c.number), json.dump(1) + "\n");
     });
     if (!all) return false;
-    std::string sums;  // as sha256sum writes and checks them
-    for (const PublicCase& c : manifest_.cases) sums += sum_of(c.number) + "  " + name_of(c.number) + "\n";
-    io::write_atomically(sums_, sums);
+    if (writes(command_)) seal();
+    if (command_.ranks != nullptr) command_.ranks->wait();  // before anybody opens a label
     return true;
   }
 
@@ -79,6 +80,11 @@ class Predictions {
   }
 
  private:
+  void seal() const {
+    std::string sums;  // as sha256sum writes and checks them
+    for (const PublicCase& c : manifest_.cases) sums += sum_of(c.number) + "  " + name_of(c.number) + "\n";
+    io::write_atomically(sums_, sums);
+  }
   static std::string name_of(std::size_t number) { return "predictions/" + number_text(number) + ".json"; }
   fs::path file_of(std::size_t number) const { return command_.folder / name_of(number); }
   std::string sum_of(std::size_t number) const { return io::sha256(io::read_text(file_of(number))); }
@@ -104,17 +110,18 @@ bool fit_truths(const ScoreCommand& command, const Manifest& manifest, const Pre
   const auto file_of = [&](std::size_t number) { return true_fits(command) / (number_text(number) + ".json"); };
   for (std::size_t i = 0; i < cases.size(); ++i)
     if (needs_true_fit(cases[i]) && !fs::exists(file_of(manifest.cases[i].number))) open.push_back(i);
-  const bool all = work_through("fitting true effects", open.size(), command.threads, [&](std::size_t k) {
-    const PublicCase& c = manifest.cases[open[k]];
-    std::vector<std::string> others;
-    for (const model::EffectEntry& e : model::effects())
-      if (std::ranges::count(labels.at(c.number).truth().effects, std::string(e.info.id)) == 0)
-        others.emplace_back(e.info.id);
-    Question q = predictions.question(c, others);
-    q.baselines = false;
-    q.experiments.clear();
-    io::write_atomically(file_of(c.number), to_json(command.predictor(q)).dump(1) + "\n");
-  });
+  const bool all =
+      work_through("fitting true effects", open.size(), command.threads, command.ranks, [&](std::size_t k) {
+        const PublicCase& c = manifest.cases[open[k]];
+        std::vector<std::string> others;
+        for (const model::EffectEntry& e : model::effects())
+          if (std::ranges::count(labels.at(c.number).truth().effects, std::string(e.info.id)) == 0)
+            others.emplace_back(e.info.id);
+        Question q = predictions.question(c, others);
+        q.baselines = false;
+        q.experiments.clear();
+        io::write_atomically(file_of(c.number), to_json(command.predictor(q)).dump(1) + "\n");
+      });
   if (!all) return false;
   for (std::size_t i = 0; i < cases.size(); ++i)
     if (needs_true_fit(cases[i])) cases[i].true_fit = prediction_from(read_json(file_of(manifest.cases[i].number)));
@@ -186,7 +193,8 @@ std::string case_list(const Manifest& manifest, const std::map<std::size_t, Labe
 }  // namespace
 
 Json score_bench(const ScoreCommand& command) {
-  const io::FolderLock lock(command.folder);
+  std::optional<io::FolderLock> lock;
+  if (writes(command)) lock.emplace(command.folder);
   const Manifest manifest = read_manifest(command.folder);
   const Predictions predictions(command, manifest);
   predictions.check_inputs();
@@ -227,6 +235,7 @@ Json score_bench(const ScoreCommand& command) {
           (undetectable.empty() ? "" : " (" + io::joined(undetectable) + ")") + ".\n";
   if (commits.size() > 1) text += "Predicted by " + std::to_string(commits.size()) + " different versions.\n";
   std::fputs(text.c_str(), stdout);
+  if (!writes(command)) return nullptr;
   io::write_atomically(command.folder / "score.md", text);
   io::write_atomically(command.folder / "score.csv", case_list(manifest, labels, cases, predictions));
 

@@ -6,6 +6,7 @@
 
 #include "benchmark/predict/predict.hpp"
 #include "io/installation.hpp"
+#include "io/ranks.hpp"
 
 namespace flappy::benchmark {
 
@@ -14,6 +15,7 @@ struct ScoreCommand {
   std::filesystem::path priors = io::config_path("gap/priors.toml");
   std::filesystem::path experiments = io::config_path("gap/experiments");  ///< for the prediction
   int threads = 0;  ///< cases at a time; 0: one for each processor
+  io::Ranks* ranks = nullptr;
   Predictor predictor = predict;
 };
 

@@ -73,7 +73,12 @@ class Escaper {
     double row[flight::kMaxObservation];
     const double fraction = beat < 0.5 ? beat : beat - 1;
     const int n = flight::observe(rules_.task.parts, seen, goal_, episode_, fraction, std::max(t_s, 0.0), learnt, row);
-    const std::array<double, 4> adds = rules_.policy({row, row + n});
+    std::vector<double> now(row, row + n);
+    if (past_.empty())
+      for (std::uint32_t ago = 1; ago < rules_.task.history; ++ago) past_.insert(past_.end(), row, row + n);
+    now.insert(now.end(), past_.begin(), past_.end());
+    past_.assign(now.begin(), now.begin() + static_cast<std::ptrdiff_t>(past_.size()));
+    const std::array<double, 4> adds = rules_.policy(now);
     std::ranges::copy(adds, episode_.adds);
   }
 
@@ -99,6 +104,7 @@ class Escaper {
   flight::Setpoint<double> start_, goal_{};
   flight::Pid<double> pid_{};
   flight::Episode<double> episode_{};
+  std::vector<double> past_;            // observations at the last actions, newest first
   std::uint32_t tick_ = 0, ended_ = 0;  ///< control periods since the manoeuvre began
 };
 

@@ -114,14 +114,8 @@ void Fleet<T>::set_actor(const std::shared_ptr<const policy::Actor>& actor) {
   s.actor_numbers.clear();
   for (const std::vector<double>* list : {&actor->weights, &actor->mean, &actor->scale})
     for (const double x : *list) s.actor_numbers.push_back(static_cast<T>(x));
-  policy::ActorView<T>& a = s.plan.actor;
-  a.layers = static_cast<int>(actor->widths.size()) - 1;
-  for (std::size_t i = 0; i < actor->widths.size(); ++i) a.widths[i] = actor->widths[i];
-  a.hidden = actor->hidden;
-  a.weights = s.actor_numbers.data();
-  a.mean = a.weights + actor->weights.size();
-  a.scale = a.mean + actor->mean.size();
-  a.clip = static_cast<T>(actor->clip);
+  const T *weights = s.actor_numbers.data(), *mean = weights + actor->weights.size();
+  s.plan.actor = policy::view_of(*actor, weights, mean, mean + actor->mean.size());
 }
 
 template <class T>
@@ -130,6 +124,7 @@ void Fleet<T>::set_action(std::size_t i, const double (&action)[kActions]) {
   auto e = get<Episode<double>>(f.episode, lane);
   for (int k = 0; k < kActions; ++k) e.action[k] = action[k], e.adds[k] = storage_->scaled(k, action[k]);
   put(e, f.episode, lane);
+  storage_->remember(i);
 }
 
 template <class T>
@@ -142,6 +137,7 @@ void Fleet<T>::set_adds(std::size_t i, const double (&adds)[kActions]) {
     e.action[k] = high > low ? 2 * (e.adds[k] - low) / (high - low) - 1 : 0;
   }
   put(e, f.episode, lane);
+  storage_->remember(i);
 }
 
 template <class T>
@@ -210,8 +206,8 @@ void Fleet<T>::fly_block(std::size_t b) {
                 {&s.blocks[b + 1], sizeof s.blocks[b + 1]},
                 {&s.ring[(b + 1) * s.ring_size], s.ring_size * sizeof(T)},
                 {&s.queue[(b + 1) * s.queue_size], s.queue_size * sizeof(T)}}};
-    s.fly({body.blocks[b], body.effects_of(b), s.blocks[b], &s.ring[b * s.ring_size], &s.queue[b * s.queue_size], tap,
-           ahead},
+    s.fly({body.blocks[b], body.effects_of(b), s.blocks[b], &s.ring[b * s.ring_size], &s.queue[b * s.queue_size],
+           s.remembered.data() + b * s.past_size, tap, ahead},
           plan);
   }
 }
@@ -304,20 +300,22 @@ std::uint32_t Fleet<T>::tick(std::size_t i) const {
 }
 template <class T>
 std::vector<double> Fleet<T>::observation(std::size_t i) const {
-  const auto [f, lane] = storage_->at(i);
-  std::vector<double> row(storage_->options.task.observation().size());
-  for (std::size_t k = 0; k < row.size(); ++k) row[k] = f.observation[k][lane];
-  return row;
+  std::vector<T> row(static_cast<std::size_t>(storage_->plan.observed + storage_->plan.past));
+  observation(i, row.data());
+  return {row.begin(), row.end()};
 }
 template <class T>
 void Fleet<T>::observation(std::size_t i, T* row) const {
   const auto [f, lane] = storage_->at(i);
-  for (int k = 0; k < storage_->observed; ++k) row[k] = f.observation[k][lane];
+  const FlightPlan<T>& plan = storage_->plan;
+  for (int k = 0; k < plan.observed; ++k) row[k] = f.observation[k][lane];
+  for (int k = 0; k < plan.past; ++k) row[plan.observed + k] = *storage_->past_at(i, k);
 }
 template <class T>
 void Fleet<T>::true_observation(std::size_t i, T* row) const {
   const auto [f, lane] = storage_->at(i);
   storage_->observe_as(i, get<Truth<double>>(f.truth, lane), row);
+  for (int k = 0; k < storage_->plan.past; ++k) row[storage_->plan.observed + k] = *storage_->past_at(i, k);
 }
 template <class T>
 std::array<T, kActions> Fleet<T>::action(std::size_t i) const {
@@ -408,6 +406,7 @@ std::vector<std::span<std::byte>> Fleet<T>::memory() {
   std::vector<std::span<std::byte>> all{
       std::as_writable_bytes(std::span(body.blocks)), std::as_writable_bytes(std::span(s.blocks)),
       std::as_writable_bytes(std::span(s.ring)), std::as_writable_bytes(std::span(s.queue))};
+  if (!s.remembered.empty()) all.push_back(std::as_writable_bytes(std::span(s.remembered)));
   if (!body.lane_effects.empty()) {
     all.push_back(std::as_writable_bytes(std::span(body.lane_effects)));
     all.push_back(std::as_writable_bytes(std::span(body.block_effects)));
@@ -448,6 +447,7 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
     };
     add(storage_->ring, storage_->ring_size);
     add(storage_->queue, storage_->queue_size);
+    add(storage_->remembered, storage_->past_size);
     all = sim::mixed(all, h);
   }
   return all;
@@ -455,7 +455,8 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
 
 template <class T>
 std::size_t Fleet<T>::bytes_per_flapper() const {
-  return (sizeof(FlightBlock<T>) + (storage_->ring_size + storage_->queue_size) * sizeof(T)) / kLanes<T>;
+  return (sizeof(FlightBlock<T>) + (storage_->ring_size + storage_->queue_size + storage_->past_size) * sizeof(T)) /
+         kLanes<T>;
 }
 
 template class Fleet<float>;

@@ -78,7 +78,7 @@ class Fleet {
   /// The actor that acts from now on, or none: then the last actions stay. std::invalid_argument unless its observation and
   /// action are those of the task.
   void set_actor(const std::shared_ptr<const policy::Actor>& actor);
-  /// Action of flapper `i` for the next period, each in [-1, 1]; an actor would overwrite it.
+  /// Action of flapper `i` for the next period, each in [-1, 1], for what it observes now; an actor would overwrite it.
   void set_action(std::size_t i, const double (&action)[kActions]);
   /// The same by what the action adds to the controller's output: V, V, V, split cycle, each within the task's range.
   void set_adds(std::size_t i, const double (&adds)[kActions]);
@@ -111,7 +111,7 @@ class Fleet {
   double lost_s(std::size_t i) const;      ///< when it was first not kept, as the task asks; 0: never
   std::vector<double> observation(std::size_t i) const;
   void observation(std::size_t i, T* row) const;
-  /// What the policy would observe if the estimate were true.
+  /// What the policy would observe if the estimate were true; what it remembers stays.
   void true_observation(std::size_t i, T* row) const;
   std::array<T, kActions> action(std::size_t i) const;  ///< of the policy, its noise included
   std::array<T, kActions> adds(std::size_t i) const;    ///< what that adds: V, V, V, split cycle

@@ -40,13 +40,13 @@ struct Fleet<T>::Storage {
   int period_steps;
   std::vector<FlightBlock<T>> blocks;
   std::vector<T> ring, queue;  // [block][slot][row][lane]
-  std::size_t ring_size, queue_size;
+  std::vector<T> remembered;   // [block][action ago][row of the observation][lane]
+  std::size_t ring_size, queue_size, past_size;
   std::vector<Segment<T>> path;
   std::shared_ptr<const policy::Actor> actor;
   std::vector<T> actor_numbers;
   std::vector<Period> periods;       // being flown, or flown last
   std::vector<FlightPlan<T>> plans;  // of each of them
-  int observed = 0;                  // rows of the observation
   std::vector<T> imu_tap, mocap_tap;
   std::size_t imu_tap_size = 0, mocap_tap_size = 0;
   bool recording = false;
@@ -71,6 +71,8 @@ struct Fleet<T>::Storage {
       path.push_back(to);
     }
     fill_plan();
+    past_size = static_cast<std::size_t>(plan.past) * kLanes<T>;
+    remembered.assign(n * past_size, T(0));
   }
 
   void fill_plan() {
@@ -87,7 +89,9 @@ struct Fleet<T>::Storage {
     plan.task = rounded<T>(k.task);
     plan.parts = options.task.parts;
     plan.action_repeat = options.task.action_repeat;
-    observed = static_cast<int>(options.task.observation().size());
+    const auto all = static_cast<int>(options.task.observation().size());
+    plan.observed = all / static_cast<int>(options.task.history);
+    plan.past = all - plan.observed;
     plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(k.period_s)};
   }
 
@@ -115,6 +119,17 @@ struct Fleet<T>::Storage {
   Place at(std::size_t i) {
     const auto place = sim::storage_of(batch).at(i);
     return {blocks[i / kLanes<T>], place.lane};
+  }
+
+  /// Number `k` of what flapper `i` remembers.
+  T* past_at(std::size_t i, int k) {
+    return &remembered[i / kLanes<T> * past_size + static_cast<std::size_t>(k) * kLanes<T> + i % kLanes<T>];
+  }
+  /// Flapper `i` acts on what it observes.
+  void remember(std::size_t i) {
+    const auto [f, lane] = at(i);
+    for (int k = plan.past - 1; k >= 0; --k)
+      *past_at(i, k) = k < plan.observed ? f.observation[k][lane] : *past_at(i, k - plan.observed);
   }
 
   Setpoint<double> setpoint(FlightBlock<T>& f, int lane) const {
@@ -202,6 +217,7 @@ void Fleet<T>::Storage::show(std::size_t i) {
   T row[kMaxObservation] = {};
   observe_as(i, get<Estimate<double>>(f.estimate, lane), row);
   for (int k = 0; k < kMaxObservation; ++k) f.observation[k][lane] = row[k];
+  for (int k = 0; k < plan.past; ++k) *past_at(i, k) = row[k % plan.observed];
 }
 
 /// In the arithmetic of the lanes, to the bit.

@@ -48,6 +48,7 @@ struct FlightSpace {
   FlightBlock<T>& flight;
   T* ring;   // [slot][row of Increment][lane]
   T* queue;  // [slot][row of MocapSample][lane]
+  T* past;   // [action ago][row of the observation][lane]; none without a history
   Tap<T> tap;
   sim::Ahead ahead;
 };
@@ -76,6 +77,7 @@ struct FlightPlan {
   ControllerConstants<T> controller;
   TaskConstants<T> task;
   std::uint32_t parts;  // observed
+  int observed, past;   // rows of an observation, and of those remembered
   PathView<T> path;
   policy::ActorView<T> actor;
   std::uint32_t action_repeat;  // control periods for which an action stays

@@ -267,7 +267,12 @@ std::vector<std::pair<std::string, std::vector<Signal>>> Task::observed_parts() 
 
 std::vector<Signal> Task::observation() const {
   std::vector<Signal> list;
-  for (const auto& [part, signals] : observed_parts()) list.insert(list.end(), signals.begin(), signals.end());
+  for (std::uint32_t ago = 0; ago < history; ++ago)
+    for (const auto& [part, signals] : observed_parts())
+      for (Signal s : signals) {
+        if (ago > 0) s.name += "_" + std::to_string(ago) + "_ago";
+        list.push_back(s);
+      }
   return list;
 }
 
@@ -306,8 +311,8 @@ sim::FlapperState Task::sample_start(sim::RandomKey key) const {
 
 Task read_task(const io::Table& table, double tick_s) {
   table.schema(1);
-  table.accept(
-      {"schema", "name", "start", "path", "observation", "action", "reward", "end", "base", "hand_back", "success"});
+  table.accept({"schema", "name", "start", "path", "observation", "history", "action", "reward", "end", "base",
+                "hand_back", "success"});
   Task task;
   task.name = table.string("name");
   task.start = read_start(table);
@@ -323,6 +328,8 @@ Task read_task(const io::Table& table, double tick_s) {
     if (task.parts & bit) table.fail("observation", name + " is given twice", "each part once");
     task.parts |= bit;
   }
+
+  task.history = static_cast<std::uint32_t>(table.integer_or("history", 1, 1, kMaxHistory));
 
   TaskConstants<double>& k = task.constants;
   const char* inputs[kActions] = {"amplitude_V", "difference_V", "bias_V", "split_cycle"};

@@ -14,7 +14,7 @@
 
 namespace flappy::flight {
 
-using policy::kActions, policy::kMaxObservation;
+using policy::kActions, policy::kMaxHistory, policy::kMaxObservation;
 
 /// A row of the observation or the action, for who reads or exports it.
 struct Signal {
@@ -122,11 +122,14 @@ struct Task {
   StartRange start;
   std::vector<Segment<double>> path;
   std::uint32_t parts = 0;          ///< bit of each Part observed
+  std::uint32_t history = 1;        ///< observations that a policy sees at once: now, and at its last actions
   std::uint32_t action_repeat = 1;  ///< control periods for which a policy's action stays
   TaskConstants<double> constants{};
 
-  /// Names of the parts observed, with their signals.
+  /// Names of the parts observed, with their signals as they are now.
   std::vector<std::pair<std::string, std::vector<Signal>>> observed_parts() const;
+  /// All that a policy sees: the parts as they are now, then as they were at each of its last actions, newest first. Before it has
+  /// acted so often, the first observation stands for those that are missing.
   std::vector<Signal> observation() const;
   std::vector<Signal> action() const;
   /// Nobody acts: not even the middle of the action's range is added.

@@ -133,13 +133,22 @@ int processors_of_group(const std::filesystem::path& membership, const std::file
   return static_cast<int>(std::ceil(least));
 }
 
+namespace {
+int sharing = 1;  // processes on this machine
+}
+
+void share_processors(int processes) { sharing = processes; }
+
 int processors() {
   static const int of_group = processors_of_group("/proc/self/cgroup", "/sys/fs/cgroup");
   cpu_set_t mask;
   const int allowed = sched_getaffinity(0, sizeof mask, &mask) == 0
                           ? CPU_COUNT(&mask)
                           : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  return of_group > 0 ? std::min(of_group, allowed) : allowed;
+  // a launcher may have given each process a mask of its own, but they share machine and group
+  const auto share = [](int all) { return std::max(1, all / sharing); };
+  const int own = std::min(allowed, share(static_cast<int>(std::max(1U, std::thread::hardware_concurrency()))));
+  return of_group > 0 ? std::min(share(of_group), own) : own;
 }
 
 void detail::parallel_for(std::size_t count, int threads, const void* job, Call call) {

@@ -8,8 +8,11 @@
 
 namespace flappy::io {
 
-/// How many processors this process may use: those of its affinity mask, at most what its control group is allowed.
+/// How many processors this process may use: those of its affinity mask, at most what its control group is allowed, and its share of
+/// the machine's where share_processors() was told of others.
 int processors();
+/// So many processes like this one share the machine.
+void share_processors(int processes);
 /// The processors that the control group of a process pays for, by `membership` (the kernel's /proc/self/cgroup) and the
 /// files below `root`; 0 where there is no limit.
 int processors_of_group(const std::filesystem::path& membership, const std::filesystem::path& root);

@@ -8,6 +8,8 @@
 
 #include "io/files.hpp"
 #include "io/log.hpp"
+#include "io/parallel.hpp"
+#include "io/progress.hpp"
 #include "io/version.hpp"  // made by the build
 
 namespace flappy::io {
@@ -68,8 +70,17 @@ int Program::run(int argc, char** argv, const std::function<void()>& job) {
     const auto level = std::ranges::find(kLevels, log_level_) - kLevels.begin();
     start_log(static_cast<LogLevel>(level), app_->get_name() + " " FLAPPY_VERSION ", commit " + commit() + ": " +
                                                 joined(std::vector<std::string>(argv, argv + argc), " "));
-    if (!json_path_.empty()) check_output(json_path_);
+    if (takes_ranks_) {
+      rank_ = this_rank();
+      share_processors(rank_.local_size);
+      if (!writes()) {
+        silence_progress();
+        if (std::freopen("/dev/null", "w", stdout) == nullptr) throw InputError("/dev/null: cannot be written");
+      }
+    }
+    if (!json_path_.empty() && writes()) check_output(json_path_);
     job();
+    if (ranks_) ranks_->finish();
     return 0;
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app_->exit(e);  // --help, --version
@@ -78,15 +89,27 @@ int Program::run(int argc, char** argv, const std::function<void()>& job) {
     return 2;
   } catch (const InputError& e) {
     log_error(e.what());
+    if (ranks_) ranks_->leave();
     return 2;
   } catch (const std::exception& e) {
     log_error(app_->get_name() + ": internal fault: " + e.what());
+    if (ranks_) ranks_->leave();
     return 1;
   }
 }
 
+void Program::takes_ranks() {
+  takes_ranks_ = true;
+  app_->add_flag("--allow-network", allow_network_, "let ranks meet at a MASTER_ADDR that is not this machine's own");
+}
+
+Ranks* Program::ranks(const std::string& agreed) {
+  if (rank_.size > 1 && !ranks_) ranks_ = meet(rank_, allow_network_, agreed + "commit: " + commit() + "\n");
+  return ranks_.get();
+}
+
 void Program::write_json(const nlohmann::ordered_json& result) const {
-  if (!json_path_.empty()) write_atomically(json_path_, result.dump(2) + "\n");
+  if (!json_path_.empty() && writes()) write_atomically(json_path_, result.dump(2) + "\n");
 }
 
 }  // namespace flappy::io

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "io/command_line.hpp"
+#include "io/ranks.hpp"
 
 namespace flappy::io {
 
@@ -24,12 +25,21 @@ class Program {
   Command app() { return Command(app_.get()); }
   /// Parses, then runs `job`. 0: done; 2: the user's mistake, one line on stderr; 1: ours.
   int run(int argc, char** argv, const std::function<void()>& job);
+  /// Several ranks may run the program together: an option --allow-network, the first rank alone speaks, and threads are shared.
+  void takes_ranks();
+  /// The ranks that run it, none for one: meets them where it is first called. They end together. `agreed` as meet() has it.
+  Ranks* ranks(const std::string& agreed);
+  /// Whether this is the rank that writes what all of them found.
+  bool writes() const { return rank_.rank == 0; }
   /// Writes `result` where --json asked for it; nothing otherwise.
   void write_json(const nlohmann::ordered_json& result) const;
 
  private:
   std::unique_ptr<CLI::App> app_;
   std::string json_path_, log_level_ = "warning";
+  bool takes_ranks_ = false, allow_network_ = false;
+  Rank rank_;
+  std::unique_ptr<Ranks> ranks_;
 };
 
 }  // namespace flappy::io

@@ -15,6 +15,7 @@ constexpr std::size_t kPoints = 4;  // where the last three advances began and e
 
 volatile std::sig_atomic_t interrupted_flag = 0;
 ProgressLine* visible_line = nullptr;  // on the terminal
+bool silent = false;
 
 /// "9 s", "12 min", "3.4 h"
 std::string duration_text(double s) {
@@ -32,6 +33,8 @@ std::size_t width_of(std::FILE* terminal) {
 }
 
 }  // namespace
+
+void silence_progress() { silent = true; }
 
 void stop_on_interrupt() {
   struct sigaction action {};
@@ -64,8 +67,10 @@ std::optional<double> TimeLeft::seconds(double now_s) const {
 ProgressLine::ProgressLine(std::string what, double plain_every_s, std::FILE* stream, std::function<double()> clock_s)
     : what_(std::move(what)),
       stream_(stream),
-      terminal_(isatty(fileno(stream)) != 0),
-      every_s_(terminal_ ? 0.2 : plain_every_s),
+      terminal_(!silent && isatty(fileno(stream)) != 0),
+      every_s_(silent      ? HUGE_VAL
+               : terminal_ ? 0.2
+                           : plain_every_s),
       clock_s_(std::move(clock_s)),
       shown_s_(clock_s_()) {}
 

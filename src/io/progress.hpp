@@ -64,5 +64,7 @@ class ProgressLine {
 
 /// Clears the line that is visible, if any is.
 void clear_progress();
+/// Lines that are made from now on stay silent: another process speaks for this one.
+void silence_progress();
 
 }  // namespace flappy::io

@@ -1,6 +1,7 @@
 #include "io/run_program.hpp"
 
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -53,9 +54,11 @@ Finished run(const std::vector<std::string>& command, std::string_view input) {
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) fail(error);
   int status = 0;
-  while (waitpid(child, &status, 0) < 0)
+  rusage used{};
+  while (wait4(child, &status, 0, &used) < 0)
     if (errno != EINTR) fail(errno);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contents(streams[1].get()), contents(streams[2].get())};
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contents(streams[1].get()), contents(streams[2].get()),
+          1024.0 * static_cast<double>(used.ru_maxrss)};
 }
 
 std::string run_program(const std::vector<std::string>& command, std::string_view input, const std::string& result) {

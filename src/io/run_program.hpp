@@ -10,6 +10,7 @@ namespace flappy::io {
 struct Finished {
   int exit_code;  ///< -1: it did not end by itself
   std::string out, err;
+  double peak_bytes;  ///< of memory
 };
 /// Runs a program (found along PATH, no shell) with `input` on its stdin. std::system_error where it cannot be run.
 Finished run(const std::vector<std::string>& command, std::string_view input = {});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "rollout/rollout.hpp"
@@ -20,10 +21,12 @@ rollout::FlyConfig of_training(const TrainConfig& config) {
 
 }  // namespace
 
-Collector::Collector(const TrainConfig& config)
+Collector::Collector(const TrainConfig& config, io::Ranks* ranks)
     : config_(config),
+      ranks_(ranks),
       fly_(of_training(config)),
       fleet_(config.flappers, fly_.vehicle, fly_.fleet),
+      last_item_(fleet_.blocks()),
       inputs_(fly_.fleet.task.observation().size()),
       kept_(config.return_steps),
       paid_ticks_(static_cast<std::uint32_t>(
@@ -34,6 +37,7 @@ Collector::Collector(const TrainConfig& config)
       rewards_(config.flappers * kept_),
       staged_(fleet_.blocks()),
       seconds_(fleet_.blocks()) {
+  if (ranks_ != nullptr) std::tie(first_item_, last_item_) = ranks_->share_of(fleet_.blocks(), ranks_->rank());
   if (fly_.fleet.task.start.settled)
     pool_ = rollout::settle<float>(fly_.fleet, config.vehicles, rollout::kHover_s,
                                    [&](std::uint32_t flapper) { return fly_.vehicle_of(flapper); });
@@ -60,7 +64,8 @@ void Collector::begin(const std::shared_ptr<const policy::Actor>& actor) {
   fleet_.begin(static_cast<int>(fly_.fleet.task.action_repeat));
 }
 
-void Collector::run(std::size_t item) {
+void Collector::run(std::size_t k) {
+  const std::size_t item = first_item_ + k;
   const auto from = std::chrono::steady_clock::now();
   fleet_.fly_block(item);
   staged_[item].clear();
@@ -83,7 +88,7 @@ void Collector::gather(std::size_t i, std::size_t item) {
     rewards_[i * kept_ + p.count - 1] += reward;  // the last action is the one that is paid
   }
 
-  float next[flight::kMaxObservation];
+  float next[flight::kMaxHistory * flight::kMaxObservation];
   fleet_.observation(i, next);
   const std::uint32_t ended = fleet_.ended(i);
   const bool handed_back = fleet_.handed_back(i);
@@ -129,13 +134,50 @@ void Collector::emit(std::size_t i, std::size_t item, const float* next, bool te
   std::copy_n(reward + 1, p.count, reward);
 }
 
-void Collector::end(Replay& replay) {
+bool Collector::end(Replay& replay, bool wants_end) {
   fleet_.end();
   const TransitionLayout& at = replay.layout();
-  for (const std::vector<float>& rows : staged_)
+  const auto add = [&](std::span<const float> rows) {
     for (const float* row = rows.data(); row != rows.data() + rows.size(); row += at.row)
       replay.add({row + at.actor_observation, nullptr, row + at.action, row + at.next_actor_observation, nullptr,
                   row[at.reward], row[at.discount]});
+  };
+  if (ranks_ == nullptr) {
+    for (const std::vector<float>& rows : staged_) add(rows);
+    return wants_end;
+  }
+  std::vector<float> mine = {wants_end ? 1.0F : 0.0F};
+  for (std::size_t item = first_item_; item < last_item_; ++item)
+    mine.insert(mine.end(), staged_[item].begin(), staged_[item].end());
+  bool ends = false;
+  for (const std::vector<std::byte>& bytes : ranks_->gather(std::as_bytes(std::span(mine)))) {
+    const std::span all(reinterpret_cast<const float*>(bytes.data()), bytes.size() / sizeof(float));
+    ends |= all[0] > 0;
+    add(all.subspan(1));
+  }
+  return ends;
+}
+
+void Collector::share() {
+  if (ranks_ == nullptr) return;
+  for (const std::span<std::byte> bytes : fleet_.memory())
+    ranks_->share(bytes.data(), fleet_.blocks(), bytes.size() / fleet_.blocks());
+  // of flappers, the last block may have fewer
+  const auto of_flappers = [&](auto& list) {
+    const std::size_t each = list.size() / fleet_.size() * sizeof list[0],
+                      first = fleet_.flappers(first_item_).first * each;
+    const std::size_t last = last_item_ > first_item_ ? fleet_.flappers(last_item_ - 1).second * each : first;
+    auto* const bytes = reinterpret_cast<std::byte*>(list.data());
+    std::size_t at = 0;
+    for (const std::vector<std::byte>& part : ranks_->gather({bytes + first, bytes + last})) {
+      std::ranges::copy(part, bytes + at);
+      at += part.size();
+    }
+  };
+  of_flappers(pending_);
+  of_flappers(observations_);
+  of_flappers(actions_);
+  of_flappers(rewards_);
 }
 
 EpisodeSums Collector::take_sums() {

@@ -1,5 +1,6 @@
 // Episodes of many flappers, and the transitions that they leave for the critics. One step is one action of every flapper;
 // its blocks may be flown on any thread, beside a learner. What a step adds reaches the replay memory only in end().
+// Of several ranks, each flies its share of the blocks; what they add reaches the memories of all.
 #pragma once
 
 #include "flight/fleet.hpp"
@@ -17,13 +18,17 @@ struct EpisodeSums {
 class Collector {
  public:
   /// Settles the vehicles of training where the task starts settled.
-  explicit Collector(const TrainConfig& config);
+  explicit Collector(const TrainConfig& config, io::Ranks* ranks = nullptr);
 
   /// begin() plans a step in which `actor` acts, run() takes one of items() blocks through it, end() closes it.
   void begin(const std::shared_ptr<const policy::Actor>& actor);
-  std::size_t items() const { return fleet_.blocks(); }
-  void run(std::size_t item);
-  void end(Replay& replay);
+  std::size_t items() const { return last_item_ - first_item_; }
+  void run(std::size_t i);
+  /// Whether any rank `wants_end`.
+  bool end(Replay& replay, bool wants_end = false);
+
+  /// Hands all ranks what the others' flappers are and did: before sums are taken and before save().
+  void share();
 
   /// Sums in the order of flappers; then they start from nothing again.
   EpisodeSums take_sums();
@@ -50,8 +55,10 @@ class Collector {
   float* observation(std::size_t i, std::size_t step) { return observations_.data() + (i * kept_ + step) * inputs_; }
 
   const TrainConfig& config_;
+  io::Ranks* ranks_;
   rollout::FlyConfig fly_;
   flight::Fleet<float> fleet_;
+  std::size_t first_item_ = 0, last_item_;  // blocks that are flown here
   std::vector<flight::Snapshot<float>> pool_;
   std::size_t inputs_, kept_;
   std::uint32_t paid_ticks_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "io/parallel.hpp"
 #include "io/sha256.hpp"
@@ -71,22 +72,25 @@ class Reader {
     const io::Table t = root_.table("networks");
     l.actor_hidden = widths(t, "actor");
     l.critic_hidden = widths(t, "critic");
-    const bool relu = t.choice("activation", {"relu", "tanh"}) == "relu";
-    l.actor_activation = l.critic_activation = relu ? policy::Activation::relu : policy::Activation::tanh;
+    const std::string activation = t.choice("activation", {"relu", "tanh", "elu", "silu"});
+    const auto* const known = std::ranges::find(policy::kActivationNames, activation);
+    l.actor_activation = l.critic_activation = static_cast<policy::Activation>(known - policy::kActivationNames);
+    l.layer_norm = t.boolean_or("layer_norm", false);
     l.last_layer_scale = t.number_or("last_layer_scale", 0.1, {0, 1});
 
     std::vector<std::string> parts;
     const auto scales = root_.optional_table("observation");
-    for (const auto& [part, signals] : c_.fly.fleet.task.observed_parts()) {
-      parts.push_back(part);
-      std::vector<double> given;
-      if (scales && scales->has(part)) given = scales->numbers(part, signals.size(), io::positive(1e6));
-      for (std::size_t i = 0; i < signals.size(); ++i) {
-        l.actor_input.mean.push_back((signals[i].low + signals[i].high) / 2);
-        const double range = signals[i].high - signals[i].low;  // 0 of an action that may not change
-        l.actor_input.scale.push_back(!given.empty() ? given[i] : range > 0 ? 2 / range : 1);
+    for (std::uint32_t ago = 0; ago < c_.fly.fleet.task.history; ++ago)
+      for (const auto& [part, signals] : c_.fly.fleet.task.observed_parts()) {
+        parts.push_back(part);
+        std::vector<double> given;
+        if (scales && scales->has(part)) given = scales->numbers(part, signals.size(), io::positive(1e6));
+        for (std::size_t i = 0; i < signals.size(); ++i) {
+          l.actor_input.mean.push_back((signals[i].low + signals[i].high) / 2);
+          const double range = signals[i].high - signals[i].low;  // 0 of an action that may not change
+          l.actor_input.scale.push_back(!given.empty() ? given[i] : range > 0 ? 2 / range : 1);
+        }
       }
-    }
     l.shape = {static_cast<int>(l.actor_input.mean.size()), 0, flight::kActions};
   }
 
@@ -108,6 +112,25 @@ class Reader {
   void read_learning() {
     LearnerOptions& l = c_.learner;
     const io::Table t = root_.table("learn");
+    const bool on_libtorch = t.choice_or("engine", "lanes", {"lanes", "libtorch"}) == "libtorch";
+    if (on_libtorch && !has_libtorch())
+      t.fail("engine", "is libtorch, which this build has not", "\"lanes\", or a build with libtorch-dev installed");
+    c_.engine = on_libtorch ? EngineKind::libtorch : EngineKind::lanes;
+    l.weight_decay = t.number_or("weight_decay", 0, {0, 1});
+    l.gradient_clip = t.number_or("gradient_clip", 0, {0, 1e6});
+    l.device = t.choice_or("device", "cpu", {"cpu", "cuda"});
+    if (!on_libtorch) {  // which has what the lanes have not
+      const auto needs = [](const io::Table& of, const char* key, bool used, const char* accepted) {
+        if (used)
+          of.fail(key, "is what the lanes do not learn", std::string(accepted) + ", or learn.engine = \"libtorch\"");
+      };
+      const io::Table n = root_.table("networks");
+      needs(n, "activation", l.actor_activation > policy::Activation::tanh, "\"relu\", \"tanh\"");
+      needs(n, "layer_norm", l.layer_norm, "false");
+      needs(t, "weight_decay", l.weight_decay > 0, "0");
+      needs(t, "gradient_clip", l.gradient_clip > 0, "0");
+      needs(t, "device", l.device != "cpu", "\"cpu\"");
+    }
     c_.updates_per_step = static_cast<std::uint64_t>(t.integer("updates_per_step", 1, 10000));
     const auto whole_steps = [&](const io::Table& from, const char* key) {
       const auto n = static_cast<std::uint64_t>(from.integer(key, 1, 1'000'000'000));
@@ -119,6 +142,8 @@ class Reader {
     c_.actor_rate = t.number("actor_rate", io::positive(1));
     c_.critic_rate = t.number("critic_rate", io::positive(1));
     c_.last_rate = t.number_or("last_rate", 1, {0, 1});
+    c_.cosine = t.choice_or("schedule", "line", {"line", "cosine"}) == "cosine";
+    c_.warm_up = static_cast<std::uint64_t>(t.integer_or("warm_up", 0, 0, 1'000'000'000));
     c_.policy_averaging = t.number_or("policy_averaging", 1, io::positive(1));
     l.tau = t.number("averaging", io::positive(1));
     l.twin = t.boolean("twin");
@@ -158,6 +183,13 @@ class Reader {
 };
 
 }  // namespace
+
+double TrainConfig::rate_share(std::uint64_t update) const {
+  const double done = static_cast<double>(update) / static_cast<double>(updates);
+  const double way = cosine ? (1 - model::sin_cos_wide(std::numbers::pi * done).cos) / 2 : done;
+  const double warm = update < warm_up ? static_cast<double>(update + 1) / static_cast<double>(warm_up) : 1;
+  return warm * (1 + (last_rate - 1) * way);
+}
 
 policy::Actor TrainConfig::blank_actor() const {
   policy::Actor a;

@@ -5,12 +5,15 @@
 //   seed                    of weights, samples, noise and the vehicles trained on; evaluation flies with the seed of `fly`
 //   threads                 0: all
 //   [observation]           optional: part = [scale of each of its signals], in place of 2 / (high - low) of their ranges
-//   [networks]              actor, critic: widths of hidden layers; activation = "relu" | "tanh"
+//   [networks]              actor, critic: widths of hidden layers; activation = "relu" | "tanh" | "elu" | "silu";
+//                           layer_norm (before it; unless told: false). The last two, layer_norm, and weight_decay, gradient_clip
+//                           (largest norm of a gradient; 0: none) and device = "cpu" | "cuda" in [learn] need libtorch
 //   [collect]               flappers, vehicles (settled, from which episodes are sampled), noise_low, noise_high, noise_kept (from
 //                           action to action), steps_before (actions of each flapper before the first update)
 //   [reward]                scale, discount (from action to action), steps (of the return that the critics learn)
-//   [learn]                 updates, updates_per_step, batch, actor_rate, critic_rate, last_rate (share of the rates at the
-//                           last update, reached in a line), averaging (tau), twin, policy_delay, target_noise,
+//   [learn]                 engine = "lanes" (unless told) | "libtorch", updates, updates_per_step, batch, actor_rate, critic_rate,
+//                           schedule = "line" (unless told) | "cosine" (of the rates, down to last_rate, their share at the last
+//                           update), warm_up (updates until the rates are whole; unless told: 0), averaging (tau), twin, policy_delay, target_noise,
 //                           target_noise_clip, huber (0: squares), replay (transitions kept), policy_averaging (share of
 //                           the actor that the policy takes over after each step; 1: the policy is the actor)
 //   [evaluate]              every (updates), vehicles
@@ -21,7 +24,7 @@
 // Any other override, as "task.reward.goal=1", belongs to `fly`.
 #pragma once
 
-#include "learn/lanes/learner.hpp"
+#include "learn/engine.hpp"
 #include "rollout/fly_config.hpp"
 
 namespace flappy::learn {
@@ -30,6 +33,7 @@ struct TrainConfig {
   rollout::FlyConfig fly;
   std::uint64_t seed = 0;
   int threads = 0;  ///< at least 1
+  EngineKind engine = EngineKind::lanes;
   LearnerOptions learner;
 
   std::size_t flappers = 0, vehicles = 0, steps_before = 0;
@@ -38,6 +42,8 @@ struct TrainConfig {
   std::size_t return_steps = 1;
   std::uint64_t updates = 0, updates_per_step = 1;
   double actor_rate = 0, critic_rate = 0, last_rate = 1, policy_averaging = 1;
+  bool cosine = false;
+  std::uint64_t warm_up = 0;
   std::size_t replay = 0;
   std::uint64_t evaluate_every = 0, checkpoint_every = 0;
   std::size_t evaluate_vehicles = 0, keep = 2;
@@ -47,6 +53,8 @@ struct TrainConfig {
   std::map<std::string, std::string> resolved;
   std::string sha256;  ///< of all of them but for the number of threads
 
+  /// Share of the rates of learning at an update.
+  double rate_share(std::uint64_t update) const;
   /// An actor of this task, without weights.
   policy::Actor blank_actor() const;
 };

@@ -25,24 +25,18 @@ const MetricsColumns kColumns = {
      "critic_loss", "mean_q", "actor_q", "replay", "success_rate", "capture_rate", "time_to_capture_median_s"},
     {"wall_s", "evaluation_s", "updates_per_s", "env_steps_per_s", "share_simulation", "share_learning"}};
 
-/// As /proc/cpuinfo names it.
-std::string processor() {
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);)
-    if (line.starts_with("model name")) return line.substr(std::min(line.find(':') + 2, line.size()));
-  return "unknown";
-}
-
 class Trainer {
  public:
   Trainer(const TrainConfig& config, const TrainOptions& options)
       : config_(config),
         options_(options),
         names_(config.blank_actor()),
-        learner_(config.learner),
+        ranks_(options.ranks),
+        engine_(make_engine(config.engine, with_ranks(config.learner, options.ranks))),
+        learner_(*engine_),
         replay_(config.learner.shape, config.replay),
-        evaluator_(config.fly, {config.evaluate_vehicles, rollout::kValidationFlappers, 1024}),
-        collector_(config) {
+        evaluator_(config.fly, {config.evaluate_vehicles, rollout::kValidationFlappers, 1024, options.ranks}),
+        collector_(config, options.ranks) {
     if (options.init) start_from(*options.init);
     actor_ = std::make_shared<policy::Actor>(named(learner_.actor()));
     average_ = actor_->weights;
@@ -51,21 +45,24 @@ class Trainer {
   TrainSummary run() {
     const fs::path& folder = options_.folder;
     if (options_.from) resume(Checkpoint(*options_.from));
-    else write_config();
-    if (options_.from) forget_after(updates());
-    Metrics metrics(folder, kColumns, records_);
-    metrics_ = &metrics;
+    else if (writes()) write_config();
+    if (writes()) {
+      if (options_.from) forget_after(updates());
+      metrics_.emplace(folder, kColumns, records_);
+    }
     publish();
     if (!options_.from) save();  // from now on it can be resumed, whenever it is killed
-    if (!fs::exists(folder / "run.json")) write_start();
+    if (writes() && !fs::exists(folder / "run.json")) write_start();
     start_ = last_ = mark();
     bool going = true;
     while (going && updates() < config_.updates) {
-      step();
+      const bool ends = !step();
       const bool evaluates = passed(config_.evaluate_every);
       if (evaluates) evaluate();
       if (passed(config_.checkpoint_every) && updates() < config_.updates) save();
       going = !options_.keep_going || options_.keep_going(progress(evaluates));
+      wants_end_ = !going;
+      if (ranks_ != nullptr) going = !ends;  // all at the same step
     }
     if (saved_step_ != steps_) save();
     return summarise();
@@ -111,8 +108,13 @@ class Trainer {
     }
   }
 
-  /// One action of every flapper, and meanwhile the updates of this step.
-  void step() {
+  static LearnerOptions with_ranks(LearnerOptions options, io::Ranks* ranks) {
+    options.ranks = ranks;
+    return options;
+  }
+  bool writes() const { return ranks_ == nullptr || ranks_->rank() == 0; }
+  /// One action of every flapper, and meanwhile the updates of this step. False: a rank wants it to be the last.
+  bool step() {
     const auto from = Clock::now();
     collector_.begin(actor_);
     const std::size_t items = collector_.items();
@@ -121,8 +123,7 @@ class Trainer {
       const std::uint64_t n = config_.updates_per_step;
       for (std::uint64_t u = 0; u < n; ++u) {
         const std::size_t first = items * u / n, last = items * (u + 1) / n;
-        const double done = static_cast<double>(updates()) / static_cast<double>(config_.updates);
-        const double rate = 1 + (config_.last_rate - 1) * done;
+        const double rate = config_.rate_share(updates());
         learner_.update(replay_, rate * config_.actor_rate, rate * config_.critic_rate,
                         {last - first, [&](std::size_t i) { collector_.run(first + i); }});
       }
@@ -139,9 +140,10 @@ class Trainer {
     } else {
       io::parallel_for(items, config_.threads, [&](std::size_t i) { collector_.run(i); });
     }
-    collector_.end(replay_);
+    const bool ends = collector_.end(replay_, wants_end_);
     ++steps_;
     (learnt_ ? learning_s_ : warming_s_) += seconds_since(from);
+    return !ends;
   }
 
   double wall_s() const { return wall_before_s_ + seconds_since(options_.started) - evaluation_s_; }
@@ -168,6 +170,7 @@ class Trainer {
     }
     publish();
 
+    collector_.share();
     const EpisodeSums sums = collector_.take_sums();
     const double samples = static_cast<double>(samples_);
     const auto [simulation, learning] = shares();
@@ -191,7 +194,7 @@ class Trainer {
     evaluation_s_ += seconds_since(from);
     const auto [updates_per_s, env_steps_per_s] = rates_since(last_);
     const double times[] = {wall, evaluation_s_, updates_per_s, env_steps_per_s, simulation, learning};
-    metrics_->record(figures, times);
+    if (metrics_) metrics_->record(figures, times);
     last_ = mark();
   }
 
@@ -206,6 +209,7 @@ class Trainer {
   void publish() {
     if (policy_.widths.empty()) policy_ = averaged();
     if (best_.widths.empty()) best_ = policy_;
+    if (!writes()) return;
     policy::write_actor(options_.folder / "best.json", best_);
     policy::write_actor(options_.folder / "last.json", policy_);
   }
@@ -223,19 +227,24 @@ class Trainer {
                                         {"commit", options_.commit},
                                         {"processor", processor()},
                                         {"instruction_set", sim::best_instruction_set()},
+                                        {"engine", learner_.describe()},
                                         {"config_sha256", config_.sha256},
                                         {"init", options_.init != nullptr},
+                                        {"init_sha256", options_.init_sha256},
                                         {"memory_bytes", costs.memory_bytes},
                                         {"disk_bytes", costs.disk_bytes}};
     io::write_atomically(options_.folder / "run.json", run.dump(2) + "\n");
   }
 
   void save() {
+    collector_.share();
+    saved_step_ = steps_;
+    if (!writes()) return;
     records_ = metrics_->sync();
     CheckpointWriter to(
         options_.folder / checkpoint_name(updates()),
         {updates(), config_.sha256, processor(), sim::best_instruction_set(), options_.commit, wall_s()});
-    to.put("numbers", learner_.numbers());
+    to.put("numbers", learner_.save());
     to.put_bytes("counters", std::as_bytes(std::span(&learner_.counters(), 1)));
     to.put("replay_size", static_cast<std::uint64_t>(replay_.size()));
     to.put("replay_cursor", static_cast<std::uint64_t>(replay_.cursor()));
@@ -250,7 +259,6 @@ class Trainer {
     to.put("best_weights", best_.weights);
     to.put("policy_weights", policy_.weights);
     payload_sha256_ = to.commit();
-    saved_step_ = steps_;
     keep_newest(options_.folder, config_.keep);
   }
 
@@ -259,7 +267,14 @@ class Trainer {
       throw io::InputError(from.path().string() + ": is of another configuration than " +
                            (options_.folder / "config").string() + "; accepted: a checkpoint of this run");
     wall_before_s_ = from.header().wall_s;
-    from.get("numbers", learner_.numbers());
+    std::vector<float> numbers = learner_.save();
+    from.get("numbers", numbers);
+    try {
+      learner_.load(numbers);
+    } catch (const std::invalid_argument& e) {
+      throw io::InputError(from.path().string() + ": " + e.what() +
+                           "; accepted: a checkpoint of this run, as it was written");
+    }
     from.get_bytes("counters", std::as_writable_bytes(std::span(&learner_.counters(), 1)));
     std::uint64_t size = 0, cursor = 0;
     from.get("replay_size", size);
@@ -311,6 +326,10 @@ class Trainer {
     std::tie(s.share_simulation, s.share_learning) = shares();
     if (best_success_ >= 0) s.best_success = best_success_;
     s.best_update = best_update_;
+    if (ranks_ != nullptr) {
+      s.ranks = ranks_->size();
+      s.exchange_s = ranks_->costs().seconds, s.exchanged_bytes = ranks_->costs().bytes;
+    }
     s.payload_sha256 = payload_sha256_;
     if (records_ == 0) return s;
     const std::vector<double> success = read_metrics(options_.folder / "metrics.jsonl").column("success_rate");
@@ -325,11 +344,14 @@ class Trainer {
   const TrainConfig& config_;
   const TrainOptions& options_;
   const policy::Actor names_;  // of the task, its inputs and outputs
-  Learner<float> learner_;
+  io::Ranks* const ranks_;
+  std::unique_ptr<LearnerEngine> engine_;
+  LearnerEngine& learner_;
   Replay replay_;
   rollout::Evaluator evaluator_;
   Collector collector_;
-  Metrics* metrics_ = nullptr;
+  bool wants_end_ = false;
+  std::optional<Metrics> metrics_;
 
   bool learnt_ = false;  // in the last step
   std::uint64_t steps_ = 0, records_ = 0, saved_step_ = ~std::uint64_t{0};
@@ -347,6 +369,13 @@ class Trainer {
 };
 
 }  // namespace
+
+std::string processor() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("model name")) return line.substr(std::min(line.find(':') + 2, line.size()));
+  return "unknown";
+}
 
 nlohmann::ordered_json json_of(const TrainSummary& s) {
   const auto or_null = [](const std::optional<double>& x) {
@@ -367,24 +396,49 @@ nlohmann::ordered_json json_of(const TrainSummary& s) {
           {"best_success_rate", or_null(s.best_success)},
           {"best_update", s.best_update},
           {"stopped", s.stopped},
+          {"ranks", s.ranks},
+          {"exchange_s", s.exchange_s},
+          {"exchanged_bytes", s.exchanged_bytes},
           {"payload_sha256", s.payload_sha256},
           {"policy_sha256", s.policy_sha256}};
 }
 
 void refuse_run_in(const fs::path& folder) {
   std::error_code error;
-  if (!fs::exists(folder, error)) return;
+  if (!fs::is_directory(folder, error)) return;
   const auto left = checkpoints_in(folder);
   if (fs::exists(folder / "run.json", error) || (!left.empty() && left.front().filename() != checkpoint_name(0)))
     throw io::InputError(folder.string() + ": holds a run; accepted: a new folder, or --resume " + folder.string());
 }
 
+void refuse_other_run_in(const fs::path& folder, const TrainConfig& config, const std::string& init_sha256) {
+  if (!fs::exists(folder / "run.json")) return refuse_run_in(folder);
+  const auto run = nlohmann::json::parse(io::read_text(folder / "run.json"), nullptr, false);
+  if (!run.is_object() || run.value("config_sha256", "") != config.sha256 ||
+      run.value("init_sha256", "") != init_sha256)
+    throw io::InputError(folder.string() +
+                         ": holds a run of another configuration; accepted: a new folder, or the same options");
+}
+
+std::optional<fs::path> unfinished_run_in(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(folder / "run.json", error)) return std::nullopt;
+  if (fs::exists(folder / "summary.json")) {
+    const auto summary = nlohmann::json::parse(io::read_text(folder / "summary.json"), nullptr, false);
+    if (summary.is_object() && !summary.value("stopped", true)) return std::nullopt;
+  }
+  return newest_checkpoint(folder).path();
+}
+
 TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
   io::make_folder(options.folder);
-  const io::FolderLock lock(options.folder);
-  if (!options.from) refuse_run_in(options.folder);
+  const bool writes = options.ranks == nullptr || options.ranks->rank() == 0;
+  std::optional<io::FolderLock> lock;
+  if (writes) lock.emplace(options.folder);
+  if (writes && !options.from) refuse_run_in(options.folder);
   Trainer trainer(config, options);
   TrainSummary summary = trainer.run();
+  if (!writes) return summary;
   summary.policy_sha256 = io::sha256(io::read_text(options.folder / "best.json"));
   io::write_atomically(options.folder / "summary.json", json_of(summary).dump(2) + "\n");
   return summary;
@@ -393,10 +447,22 @@ TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
 TrainCosts costs_of(const TrainConfig& config) {
   const TransitionLayout layout(config.learner.shape);
   const std::size_t replay = config.replay * layout.row * sizeof(float);
-  constexpr std::size_t kFlapper = 2500,
-                        kRest = 20'000'000;  // bytes, rounded up: of a flapper; of networks and records
-  const std::size_t flappers = (config.flappers + 1024 + config.vehicles + config.evaluate_vehicles) * kFlapper;
-  return {replay + flappers + kRest, (config.keep + 1) * (replay + config.flappers * kFlapper + kRest)};
+  constexpr std::size_t kFlapper = 2500, kRest = 10'000'000;  // bytes, rounded up: of a flapper; of records
+  const LearnerOptions& l = config.learner;
+  const auto weights = [&](int inputs, std::vector<int> widths, int outputs) {
+    widths.insert(widths.begin(), inputs);
+    widths.push_back(outputs);
+    return policy::weight_count(widths, l.layer_norm);
+  };
+  const auto inputs = static_cast<std::size_t>(l.shape.actor_observation);
+  const std::size_t numbers = (weights(l.shape.actor_observation, l.actor_hidden, l.shape.action) +
+                               2 * weights(l.shape.actor_observation + l.shape.action, l.critic_hidden, 1)) *
+                              sizeof(float);
+  const std::size_t history = inputs * sizeof(float), pending = (config.return_steps + 1) * history;
+  const std::size_t own = config.flappers * (kFlapper + history + pending);
+  const std::size_t others = (1024 + config.vehicles + config.evaluate_vehicles) * (kFlapper + history);
+  constexpr std::size_t kParts = 16 + 4 + 4;  // of gradients at most; weights, targets, moments; the actor, as text
+  return {replay + own + others + kParts * numbers + kRest, (config.keep + 1) * (replay + own + 8 * numbers + kRest)};
 }
 
 }  // namespace flappy::learn

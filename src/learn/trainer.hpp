@@ -8,6 +8,9 @@
 //   RUN/summary.json
 //   RUN/log.txt          what flappy-train notes
 //
+// Of several ranks, each flies its share of the flappers and of the validation vehicles, and takes its share of every batch; the
+// first writes the folder.
+//
 // In every step, the actor as it was after the step before flies, while the learner samples from what was flown before: the
 // lag is one step, whoever is faster. All but timing.jsonl, summary.json, run.json, the events and log.txt is the same for
 // any number of threads, and after any number of resumptions.
@@ -34,8 +37,10 @@ struct TrainOptions {
   std::filesystem::path folder;
   /// Goes on from this checkpoint; nothing: the run starts.
   std::optional<std::filesystem::path> from;
-  std::shared_ptr<const policy::Actor> init;                                         ///< starts with this actor
-  std::string commit;                                                                ///< of the program
+  std::string init_sha256;                    ///< of the file of `init`
+  std::shared_ptr<const policy::Actor> init;  ///< starts with this actor
+  io::Ranks* ranks = nullptr;                 ///< that train together; the first writes
+  std::string commit;                         ///< of the program
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();  ///< when the process did
   std::function<bool(const TrainProgress&)> keep_going;  ///< asked after each step; false: checkpoint and stop
 };
@@ -51,8 +56,10 @@ struct TrainSummary {
   /// When 50, 80, 90, 95 % success were reached: the wall_s of the first evaluation at which, and at the next one, that many
   /// vehicles succeeded. Nothing: not reached.
   std::optional<double> time_to_s[4];
-  std::string payload_sha256;  ///< of the last checkpoint
-  std::string policy_sha256;   ///< of best.json
+  int ranks = 1;
+  double exchange_s = 0, exchanged_bytes = 0;  ///< of this rank, waiting for others included
+  std::string payload_sha256;                  ///< of the last checkpoint
+  std::string policy_sha256;                   ///< of best.json
 };
 inline constexpr double kSuccessLevels[4] = {0.5, 0.8, 0.9, 0.95};
 
@@ -63,9 +70,16 @@ struct TrainCosts {
 
 /// io::InputError where a folder holds a run already.
 void refuse_run_in(const std::filesystem::path& folder);
+/// The same, but for a run of this configuration that began with this actor.
+void refuse_other_run_in(const std::filesystem::path& folder, const TrainConfig& config,
+                         const std::string& init_sha256);
+/// The newest checkpoint of a run that did not reach its end; nothing where there is none.
+std::optional<std::filesystem::path> unfinished_run_in(const std::filesystem::path& folder);
 /// io::InputError where the run folder is taken, a checkpoint does not fit, the disk is full, or learning diverged.
 TrainSummary train(const TrainConfig& config, const TrainOptions& options);
 TrainCosts costs_of(const TrainConfig& config);
+/// This machine's, as /proc/cpuinfo names it.
+std::string processor();
 /// What summary.json holds.
 nlohmann::ordered_json json_of(const TrainSummary& summary);
 

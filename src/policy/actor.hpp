@@ -2,38 +2,94 @@
 // evaluate it here. Observation rows in, action rows out.
 #pragma once
 
+#include <algorithm>
+
 #include "model/math.hpp"
+#include "policy/activation.hpp"
 
 namespace flappy::policy {
 
 inline constexpr int kActions = 4;
 inline constexpr int kMaxObservation = 40;  // all parts together
+inline constexpr int kMaxHistory = 8;       // observations that an actor sees at once
 
-enum class Activation { relu, tanh };
+inline constexpr int kMaxLayers = 32, kMaxWidth = 2048;
 
-inline constexpr int kMaxLayers = 6, kMaxWidth = 256;
-
-/// Weights of each layer: for every output its bias, then one weight for each input. Hidden layers share one activation,
-/// the last is tanh.
+/// Weights of each layer: for every output its bias, then one weight for each input; with layer norm (Ba et al. 2016, arXiv
+/// 1607.06450), those of a hidden layer are followed by a gain for each output, then a shift for each. Hidden layers share one
+/// activation, the last is tanh.
 template <class T>
 struct ActorView {
   int layers = 0;                // 0: no actor
   int widths[kMaxLayers + 1]{};  // inputs, then outputs of each layer
   Activation hidden = Activation::relu;
+  bool layer_norm = false;     // of the sums of hidden layers, before their activation
   const T* weights = nullptr;  // of all layers, one after the other
   const T* mean = nullptr;     // of each input
   const T* scale = nullptr;    // input = clamp((observation - mean) * scale, +-clip)
   T clip = 0;
 };
 
+/// That of an Actor or a PolicyNetwork, whose numbers stand elsewhere.
+template <class T, class Shape>
+ActorView<T> view_of(const Shape& shape, const T* weights, const T* mean, const T* scale) {
+  ActorView<T> view;
+  view.layers = static_cast<int>(shape.widths.size()) - 1;
+  std::ranges::copy(shape.widths, view.widths);
+  view.hidden = shape.hidden;
+  view.layer_norm = shape.layer_norm;
+  view.weights = weights, view.mean = mean, view.scale = scale;
+  view.clip = static_cast<T>(shape.clip);
+  return view;
+}
+
 inline namespace FLAPPY_ISA {
 
 using namespace model;
 
-template <class T>
-FLAPPY_INLINE T activated(Activation kind, const T& x) {
-  // NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage): no width is 0
-  return kind == Activation::relu ? max(x, T(0)) : tanh(x);
+/// tanh of half of x gives the other exponentials: 1 / (1 + exp(-x)) = (1 + t) / 2, exp(x) - 1 = 2 t / (1 - t).
+template <class L>
+FLAPPY_INLINE L silu(const L& x) {
+  const L half = x * L(0.5);
+  return half * tanh(half) + half;
+}
+template <class L>
+FLAPPY_INLINE L elu(const L& x) {
+  const L t = tanh(L(min(x, L(0)) * L(0.5)));
+  return where(x > L(0), x, L(L(t + t) / L(L(1) - t)));
+}
+
+template <class L>
+FLAPPY_INLINE void activate(Activation kind, int count, L* x) {
+  switch (kind) {
+    case Activation::relu:
+      for (int i = 0; i < count; ++i) x[i] = max(x[i], L(0));
+      return;
+    case Activation::tanh:
+      for (int i = 0; i < count; ++i) x[i] = tanh(x[i]);
+      return;
+    case Activation::elu:
+      for (int i = 0; i < count; ++i) x[i] = elu(x[i]);
+      return;
+    case Activation::silu:
+      for (int i = 0; i < count; ++i) x[i] = silu(x[i]);
+      return;
+  }
+}
+
+/// Takes out the mean of a layer, divides by its standard deviation, and applies gains and shifts.
+template <class L>
+FLAPPY_INLINE void normalise(const Element<L>* gains, int count, L* x) {
+  const L share = L(1) / L(static_cast<Element<L>>(count));
+  L sum(0), squares(0);
+  for (int i = 0; i < count; ++i) sum += x[i];
+  const L mean = sum * share;
+  for (int i = 0; i < count; ++i) {
+    x[i] -= mean;
+    squares += x[i] * x[i];
+  }
+  const L scale = L(1) / sqrt(L(squares * share + L(static_cast<Element<L>>(kLayerNormEpsilon))));
+  for (int i = 0; i < count; ++i) x[i] = L(x[i] * scale) * L(gains[i]) + L(gains[count + i]);
 }
 
 /// kOutputs neurons at once, so that an input is fetched once for all of them.
@@ -64,7 +120,11 @@ FLAPPY_INLINE void evaluate(const ActorView<Element<L>>& actor, const L* observa
     for (; o + 8 <= outputs; o += 8, weights += 8 * row) neurons<8>(weights, inputs, in, out + o);
     for (; o < outputs; ++o, weights += row) neurons<1>(weights, inputs, in, out + o);
     const bool last = layer + 1 == actor.layers;
-    for (o = 0; o < outputs; ++o) out[o] = activated(last ? Activation::tanh : actor.hidden, out[o]);
+    if (actor.layer_norm && !last) {
+      normalise(weights, outputs, out);
+      weights += 2 * outputs;
+    }
+    activate(last ? Activation::tanh : actor.hidden, outputs, out);
   }
   for (int o = 0; o < actor.widths[actor.layers]; ++o) action[o] = values[actor.layers % 2][o];
 }

@@ -1,5 +1,6 @@
 #include "policy/actor_file.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -17,10 +18,11 @@ using Json = nlohmann::ordered_json;
 
 }  // namespace
 
-std::size_t weight_count(const std::vector<int>& widths) {
+std::size_t weight_count(const std::vector<int>& widths, bool layer_norm) {
   std::size_t n = 0;
   for (std::size_t i = 0; i + 1 < widths.size(); ++i)
-    n += static_cast<std::size_t>(widths[i] + 1) * static_cast<std::size_t>(widths[i + 1]);
+    n += static_cast<std::size_t>(widths[i] + 1 + (layer_norm && i + 2 < widths.size() ? 2 : 0)) *
+         static_cast<std::size_t>(widths[i + 1]);
   return n;
 }
 
@@ -46,11 +48,14 @@ Actor read_actor(const std::filesystem::path& path) {
     check("widths", &Json::is_number_integer, "whole numbers");
     for (const char* key : {"mean", "scale", "weights"}) check(key, &Json::is_number, "numbers");
     for (const auto w : json.at("widths").get<std::vector<std::int64_t>>())
-      if (w < 1 || w > kMaxWidth) refuse(path, "a layer is " + std::to_string(w) + " wide", "1 to 256");
+      if (w < 1 || w > kMaxWidth)
+        refuse(path, "a layer is " + std::to_string(w) + " wide", "1 to " + std::to_string(kMaxWidth));
     a.widths = json.at("widths").get<std::vector<int>>();
     const auto hidden = json.at("hidden").get<std::string>();
-    if (hidden != "relu" && hidden != "tanh") refuse(path, "hidden is \"" + hidden + "\"", "relu or tanh");
-    a.hidden = hidden == "relu" ? Activation::relu : Activation::tanh;
+    const auto* known = std::ranges::find(kActivationNames, hidden);
+    if (known == std::end(kActivationNames)) refuse(path, "hidden is \"" + hidden + "\"", "relu, tanh, elu or silu");
+    a.hidden = static_cast<Activation>(known - kActivationNames);
+    if (json.contains("layer_norm")) a.layer_norm = json.at("layer_norm").get<bool>();
     a.mean = json.at("mean").get<std::vector<double>>();
     a.scale = json.at("scale").get<std::vector<double>>();
     a.clip = json.at("clip").get<double>();
@@ -59,7 +64,8 @@ Actor read_actor(const std::filesystem::path& path) {
     refuse(path, e.what(), "an actor file");
   }
   const auto layers = static_cast<int>(a.widths.size()) - 1;
-  if (layers < 1 || layers > kMaxLayers) refuse(path, "has " + std::to_string(layers) + " layers", "1 to 6");
+  if (layers < 1 || layers > kMaxLayers)
+    refuse(path, "has " + std::to_string(layers) + " layers", "1 to " + std::to_string(kMaxLayers));
   if (!(a.clip > 0 && a.clip <= 1e30))
     refuse(path, "clip is " + io::shortest_digits(a.clip), "a number above 0, at most 1e30");
   const auto count = [&](const char* name, std::size_t have, std::size_t want) {
@@ -72,7 +78,7 @@ Actor read_actor(const std::filesystem::path& path) {
   count("scale", a.scale.size(), inputs);
   count("action", a.action.size(), kActions);
   count("widths", static_cast<std::size_t>(a.widths.back()), kActions);
-  count("weights", a.weights.size(), weight_count(a.widths));
+  count("weights", a.weights.size(), weight_count(a.widths, a.layer_norm));
   for (const auto* numbers : {&a.mean, &a.scale, &a.weights})
     for (const double x : *numbers)
       if (!(std::abs(x) <= static_cast<double>(std::numeric_limits<float>::max())))
@@ -82,11 +88,11 @@ Actor read_actor(const std::filesystem::path& path) {
 }
 
 void write_actor(const std::filesystem::path& path, const Actor& a) {
-  const Json json = {
-      {"schema", 1},         {"task", a.task},     {"observation", a.observation},
-      {"action", a.action},  {"widths", a.widths}, {"hidden", a.hidden == Activation::relu ? "relu" : "tanh"},
-      {"mean", a.mean},      {"scale", a.scale},   {"clip", a.clip},
-      {"weights", a.weights}};
+  Json json = {{"schema", 1},         {"task", a.task},     {"observation", a.observation},
+               {"action", a.action},  {"widths", a.widths}, {"hidden", name_of(a.hidden)},
+               {"mean", a.mean},      {"scale", a.scale},   {"clip", a.clip},
+               {"weights", a.weights}};
+  if (a.layer_norm) json["layer_norm"] = true;
   io::write_atomically(path, json.dump() + "\n");
 }
 

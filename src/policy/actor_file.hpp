@@ -1,5 +1,5 @@
 // A trained actor on disk: JSON, so that any tool can read it. Weights of a layer: for every output its bias, then one
-// weight for each input.
+// weight for each input; with layer norm, after those of a hidden layer a gain for each output, then a shift for each.
 #pragma once
 
 #include <filesystem>
@@ -15,6 +15,7 @@ struct Actor {
   std::vector<std::string> observation, action;  ///< names of its inputs and outputs
   std::vector<int> widths;                       ///< inputs, then outputs of each layer
   Activation hidden = Activation::relu;
+  bool layer_norm = false;  ///< before each hidden activation
   std::vector<double> weights, mean, scale;
   double clip = 10;
 };
@@ -24,6 +25,6 @@ Actor read_actor(const std::filesystem::path& path);
 void write_actor(const std::filesystem::path& path, const Actor& actor);
 
 /// Number of weights that `widths` asks for.
-std::size_t weight_count(const std::vector<int>& widths);
+std::size_t weight_count(const std::vector<int>& widths, bool layer_norm = false);
 
 }  // namespace flappy::policy

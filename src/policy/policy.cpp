@@ -7,7 +7,7 @@
 #include <system_error>
 
 #include "io/files.hpp"
-#include "io/installation.hpp"
+#include "io/plugin.hpp"
 #include "io/run_program.hpp"
 #include "io/temporary_folder.hpp"
 #include "policy/torch_script.hpp"
@@ -103,17 +103,11 @@ std::unique_ptr<const Policy> load_header(const fs::path& path, int observations
   return policy;
 }
 
-fs::path torch_plugin() { return io::beside_program("lib/flappy/torch_script.so"); }
+constexpr const char* kPlugin = "torch_script";
 
-/// Loaded once, and never unloaded.
 const TorchFunctions& torch() {
-  static const TorchFunctions* const functions = [] {
-    const fs::path plugin = torch_plugin();
-    void* loaded = dlopen(plugin.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (loaded == nullptr)
-      refuse(plugin, "cannot be loaded: " + std::string(dlerror()), "LibTorch as it was built with (libtorch1.13)");
-    return static_cast<const TorchFunctions*>(dlsym(loaded, "flappy_torch_functions"));
-  }();
+  static const auto* const functions =
+      io::plugin<TorchFunctions>(kPlugin, "flappy_torch_functions", "this build has no LibTorch");
   return *functions;
 }
 
@@ -125,7 +119,7 @@ std::unique_ptr<const Policy> load_policy(const fs::path& path, int observations
   refuse(path, "is no policy", "a TorchScript file (.pt) or a C header (.h)");
 }
 
-bool reads_torch_script() { return fs::exists(torch_plugin()); }
+bool reads_torch_script() { return io::has_plugin(kPlugin); }
 
 std::string torch_script(const PolicyNetwork& network, const std::string& contract) {
   if (!reads_torch_script()) throw std::invalid_argument("TorchScript is not written by a build without LibTorch");

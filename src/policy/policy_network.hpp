@@ -4,15 +4,19 @@
 #include <string>
 #include <vector>
 
+#include "policy/activation.hpp"
+
 namespace flappy::policy {
 
 /// action = middle + half tanh(...(clamp((observation - mean) scale, +-clip)))
 struct PolicyNetwork {
   std::vector<int> widths;  ///< inputs, then outputs of each layer
-  bool relu = true;         ///< hidden layers; else tanh
+  Activation hidden = Activation::relu;
+  bool layer_norm = false;  ///< of the sums of hidden layers, before their activation
   float clip = 0;
-  std::vector<float> mean, scale;   ///< of each input
-  std::vector<float> weights;       ///< of each layer: for every output its bias, then one weight for each input
+  std::vector<float> mean, scale;  ///< of each input
+  std::vector<float>
+      weights;  ///< of each layer: for every output its bias, then one weight for each input; gains and shifts
   std::vector<float> middle, half;  ///< of each output, in its unit
 
   int inputs() const { return widths.front(); }

@@ -70,8 +70,17 @@ std::string write(const PolicyNetwork& n, const std::string& contract) {
     module.register_parameter("weight" + number, all.narrow(0, 1, inputs).clone(torch::MemoryFormat::Contiguous),
                               false);
     const bool last = layer + 2 == n.widths.size();
-    forward << "    x = torch." << (n.relu && !last ? "relu" : "tanh") << "(torch.addmm(self.bias" << number
-            << ", x, self.weight" << number << "))\n";
+    forward << "    x = torch.addmm(self.bias" << number << ", x, self.weight" << number << ")\n";
+    if (n.layer_norm && !last) {
+      for (const char* name : {"gain", "shift"}) {
+        module.register_parameter(
+            name + number, torch::from_blob(const_cast<float*>(weights), {outputs}, torch::kFloat).clone(), false);
+        weights += outputs;
+      }
+      forward << "    x = torch.layer_norm(x, [" << outputs << "], self.gain" << number << ", self.shift" << number
+              << ", " << kLayerNormEpsilon << ")\n";
+    }
+    forward << "    x = torch." << (last ? "tanh" : name_of(n.hidden)) << "(x)\n";
   }
   forward << "    action = self.middle + self.half * x\n"
           << "    refused = torch.isnan(observation).any(1, True)\n"

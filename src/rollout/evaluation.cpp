@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "io/toml_writer.hpp"
@@ -80,6 +81,24 @@ class Part {
   std::vector<double> drawn_J_;  // by the motors, until the last tick
 };
 
+/// The outcomes of all ranks; stopped where one of them was.
+void share(io::Ranks& ranks, Evaluation& e) {
+  const auto gather = [&](const auto& list) { return ranks.gather(std::as_bytes(std::span(list))); };
+  const double own[] = {e.stopped ? 1.0 : 0.0, e.steps};
+  std::vector<Outcome> all;
+  for (const std::vector<std::byte>& of_rank : gather(e.flights)) {
+    const auto* flights = reinterpret_cast<const Outcome*>(of_rank.data());
+    all.insert(all.end(), flights, flights + of_rank.size() / sizeof(Outcome));
+  }
+  e.flights = std::move(all);
+  e.steps = 0;
+  for (const std::vector<std::byte>& of_rank : gather(own)) {
+    const auto* figures = reinterpret_cast<const double*>(of_rank.data());
+    e.stopped |= figures[0] > 0;
+    e.steps += figures[1];
+  }
+}
+
 template <class T>
 Evaluation fly_all(FlyConfig config, const EvaluationOptions& options, Hovers<T>& hovers, const Agent& agent,
                    Detail detail, const std::function<bool(double)>& keep_going) {
@@ -128,11 +147,17 @@ Evaluator::Evaluator(FlyConfig config, const EvaluationOptions& options)
   if (c.duration_s < needs_s - 1e-9)
     refuse("is judged until " + io::shortest_digits(needs_s) + " s, but flown for " + io::shortest_digits(c.duration_s),
            "flight.duration_s of " + io::shortest_digits(needs_s) + " or more");
+  if (options_.ranks == nullptr) return;
+  const auto [first, last] = options_.ranks->share_of(options_.count, options_.ranks->rank());
+  options_.count = last - first;
+  options_.first_flapper += static_cast<std::uint32_t>(first);
 }
 
 Evaluation Evaluator::fly(const Agent& agent, Detail detail, const std::function<bool(double done)>& keep_going) {
-  if (config_.precision == "float") return fly_all(config_, options_, float_hovers_, agent, detail, keep_going);
-  return fly_all(config_, options_, double_hovers_, agent, detail, keep_going);
+  Evaluation e = config_.precision == "float" ? fly_all(config_, options_, float_hovers_, agent, detail, keep_going)
+                                              : fly_all(config_, options_, double_hovers_, agent, detail, keep_going);
+  if (options_.ranks != nullptr) share(*options_.ranks, e);
+  return e;
 }
 
 FlyConfig nominal(FlyConfig config) {

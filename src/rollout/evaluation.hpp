@@ -2,6 +2,7 @@
 // same configuration and numbers, however many threads and in parts of whatever size.
 #pragma once
 
+#include "io/ranks.hpp"
 #include "rollout/outcome.hpp"
 #include "rollout/rollout.hpp"
 
@@ -14,7 +15,8 @@ inline constexpr std::uint32_t kTrainingFlappers = 0, kValidationFlappers = std:
 struct EvaluationOptions {
   std::size_t count = 1000;
   std::uint32_t first_flapper = kTestFlappers;
-  std::size_t part = 1024;  ///< flights at a time: bounds memory
+  std::size_t part = 1024;     ///< flights at a time: bounds memory
+  io::Ranks* ranks = nullptr;  ///< fly their shares of the flights; all have the outcomes of all
 };
 
 /// Who acts on top of the controller. Where it is neither, the controller flies alone, the goal its set point, without

@@ -226,7 +226,9 @@ class Reader {
 }  // namespace
 
 model::Vehicle FlyConfig::vehicle_of(std::uint32_t flapper, std::uint32_t episode) const {
-  return randomisation ? randomisation->sample({fleet.seed, flapper, episode}) : vehicle;
+  model::Vehicle v = randomisation ? randomisation->sample({fleet.seed, flapper, episode}) : vehicle;
+  for (const auto& [id, values] : added_effects) v.effects[id] = values;
+  return v;
 }
 
 FlyConfig read_fly_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {

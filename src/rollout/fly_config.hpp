@@ -37,6 +37,8 @@ struct FlyConfig {
   std::string vehicle_text;       ///< of that file; of the vehicle that overrides made of it
   model::Vehicle vehicle;
   std::optional<sim::Randomisation> randomisation;
+  /// What every vehicle has besides, randomised or not: as model::Vehicle::effects.
+  std::map<std::string, std::map<std::string, double>> added_effects;
   flight::FleetOptions fleet;
   std::string precision;
   double duration_s = 0, settle_s = 0;

@@ -9,6 +9,7 @@
 #include <pagmo/algorithms/cmaes.hpp>
 #include <pagmo/population.hpp>
 #include <pagmo/problem.hpp>
+#include <span>
 
 #include "rollout/flight_score.hpp"
 #include "rollout/rollout.hpp"
@@ -78,27 +79,36 @@ struct Problem {
   }
 };
 
+/// Flies, and scores each flight.
+void judge(const TuneConfig& config, FlyConfig fly, std::span<Score> scores) {
+  Rollout<float> flights(std::move(fly), scores.size());
+  const flight::Fleet<float>& fleet = flights.fleet();
+  const auto ticks = static_cast<double>(flights.ticks(flights.config()));
+  while (!flights.over()) {
+    flights.step();
+    if (flights.tick() % kLook != 0) continue;
+    for (std::size_t i = 0; i < scores.size(); ++i)
+      look(scores[i], fleet.truth(i), fleet.target(i), static_cast<double>(flights.tick()) / ticks,
+           flights.t_s() >= config.settle_s);
+  }
+}
+
 double cost_of_trial(const TuneConfig& config, const Trial& trial, const flight::Controller& controller) {
   FlyConfig fly = trial.fly;
   fly.fleet.controller = controller;
   fly.fleet.seed = config.seed;
   fly.duration_s = config.duration_s;
-  Rollout<float> flights(std::move(fly), trial.count);
-  const flight::Fleet<float>& fleet = flights.fleet();
-  const auto ticks = static_cast<double>(flights.ticks(flights.config()));
+  const auto [first, last] = config.ranks != nullptr ? config.ranks->share_of(trial.count, config.ranks->rank())
+                                                     : std::pair{std::size_t{0}, trial.count};
+  fly.fleet.first_flapper += static_cast<std::uint32_t>(first);
   std::vector<Score> scores(trial.count);
-  while (!flights.over()) {
-    flights.step();
-    if (flights.tick() % kLook != 0) continue;
-    for (std::size_t i = 0; i < trial.count; ++i)
-      look(scores[i], fleet.truth(i), fleet.target(i), static_cast<double>(flights.tick()) / ticks,
-           flights.t_s() >= config.settle_s);
-  }
+  if (last > first) judge(config, std::move(fly), std::span(scores).subspan(first, last - first));
+  if (config.ranks != nullptr)
+    config.ranks->share(reinterpret_cast<std::byte*>(scores.data()), trial.count, sizeof scores[0]);
   double sum = 0;
   for (const Score& s : scores) sum += cost_of(s);
   return sum / static_cast<double>(trial.count);
 }
-
 }  // namespace
 
 TuneConfig read_tune_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {

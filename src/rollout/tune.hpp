@@ -10,6 +10,7 @@
 
 #include <functional>
 
+#include "io/ranks.hpp"
 #include "rollout/fly_config.hpp"
 
 namespace flappy::rollout {
@@ -27,6 +28,7 @@ struct TuneConfig {
   std::uint64_t seed;
   unsigned population, generations;
   flight::Controller start;
+  io::Ranks* ranks = nullptr;  ///< fly their shares of the flights of each trial
 };
 
 /// io::InputError for whatever is missing, unknown or out of range.

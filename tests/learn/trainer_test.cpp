@@ -229,7 +229,16 @@ TEST(TrainConfig, SaysWhatIsWrong) {
     }
   };
   refused({"learn.batch=100"}, "learn.batch: is no multiple of 64");
-  refused({"networks.actor=[32, 500]"}, "networks.actor");
+  refused({"networks.actor=[32, 5000]"}, "networks.actor");
+  refused({"networks.activation=silu"},
+          "networks.activation: is what the lanes do not learn; accepted: \"relu\", \"tanh\", or learn.engine = "
+          "\"libtorch\"");
+  refused({"networks.layer_norm=true"}, "networks.layer_norm: is what the lanes do not learn");
+  refused({"learn.weight_decay=0.1"}, "learn.weight_decay: is what the lanes do not learn");
+  refused({"learn.gradient_clip=1"}, "learn.gradient_clip: is what the lanes do not learn");
+  refused({"learn.device=cuda"}, "learn.device: is what the lanes do not learn");
+  refused({"learn.engine=torch"}, "learn.engine");
+  refused({"task.history=9"}, "history: 9 is out of range; accepted: an integer from 1 to 8");
   refused({"networks.actor=[]"}, "networks.actor: is no list of hidden layers");
   refused({"learn.replay=1024", "collect.flappers=2000"}, "learn.replay: is less than one step adds");
   refused({"learn.replay=2048", "learn.batch=4096"}, "learn.replay: is less than a batch");
@@ -246,6 +255,30 @@ TEST(TrainConfig, SaysWhatIsWrong) {
   } catch (const io::InputError& e) {
     EXPECT_NE(std::string(e.what()).find("says no success"), std::string::npos) << e.what();
   }
+}
+
+TEST(TrainConfig, SchedulesItsRates) {
+  const Overrides all = {"learn.updates=1000", "learn.updates_per_step=1", "learn.last_rate=0.2"};
+  const auto with = [&](Overrides more) {
+    more.insert(more.end(), all.begin(), all.end());
+    return small_training(more);
+  };
+  const TrainConfig line = with({}), cosine = with({"learn.schedule=cosine", "learn.warm_up=100"});
+  EXPECT_DOUBLE_EQ(line.rate_share(0), 1);
+  EXPECT_DOUBLE_EQ(line.rate_share(250), 0.8);
+  EXPECT_DOUBLE_EQ(cosine.rate_share(0), 0.01 * line.rate_share(0));
+  EXPECT_NEAR(cosine.rate_share(500), 0.6, 1e-12);
+  EXPECT_NEAR(cosine.rate_share(250), 1 - 0.8 * (1 - std::sqrt(0.5)) / 2, 1e-12);
+  EXPECT_NEAR(cosine.rate_share(1000), 0.2, 1e-12);
+}
+
+TEST(TrainConfig, SeesItsHistory) {
+  const TrainConfig one = small_training(), three = small_training({"task.history=3"});
+  const auto seen = three.blank_actor().observation;
+  const std::size_t now = one.blank_actor().observation.size();
+  ASSERT_EQ(seen.size(), 3 * now);
+  EXPECT_EQ(seen[now], seen[0] + "_1_ago");
+  EXPECT_EQ(three.learner.actor_input.scale[2 * now + 4], one.learner.actor_input.scale[4]);
 }
 
 TEST(TrainConfig, CountsInWholeSteps) {

@@ -16,16 +16,22 @@
 namespace flappy::flight {
 namespace {
 
-policy::Actor random_actor(std::vector<int> widths, policy::Activation hidden, std::uint32_t seed) {
+policy::Actor random_actor(std::vector<int> widths, policy::Activation hidden, std::uint32_t seed,
+                           bool layer_norm = false) {
   std::mt19937 engine(seed);
   std::normal_distribution<double> normal;
   policy::Actor a;
   a.task = "test";
   a.widths = std::move(widths);
   a.hidden = hidden;
-  for (std::size_t layer = 0; layer + 1 < a.widths.size(); ++layer)
+  a.layer_norm = layer_norm;
+  for (std::size_t layer = 0; layer + 1 < a.widths.size(); ++layer) {
     for (int o = 0; o < a.widths[layer + 1]; ++o)
       for (int i = 0; i <= a.widths[layer]; ++i) a.weights.push_back(normal(engine) / std::sqrt(a.widths[layer] + 1.0));
+    if (!layer_norm || layer + 2 == a.widths.size()) continue;
+    for (int o = 0; o < a.widths[layer + 1]; ++o) a.weights.push_back(1 + 0.2 * normal(engine));
+    for (int o = 0; o < a.widths[layer + 1]; ++o) a.weights.push_back(0.2 * normal(engine));
+  }
   for (int i = 0; i < a.widths[0]; ++i) {
     a.observation.push_back("o" + std::to_string(i));
     a.mean.push_back(normal(engine));
@@ -45,8 +51,23 @@ std::vector<double> expected(const policy::Actor& a, std::vector<double> x) {
     for (int o = 0; o < a.widths[layer]; ++o) {
       double sum = a.weights[weight++];
       for (const double in : x) sum += a.weights[weight++] * in;
-      const bool last = layer + 1 == a.widths.size();
-      y.push_back(last || a.hidden == policy::Activation::tanh ? std::tanh(sum) : std::max(sum, 0.0));
+      y.push_back(sum);
+    }
+    const bool last = layer + 1 == a.widths.size();
+    if (a.layer_norm && !last) {
+      const double n = static_cast<double>(y.size());
+      double mean = 0, variance = 0;
+      for (const double v : y) mean += v / n;
+      for (const double v : y) variance += (v - mean) * (v - mean) / n;
+      for (std::size_t o = 0; o < y.size(); ++o)
+        y[o] = (y[o] - mean) / std::sqrt(variance + 1e-5) * a.weights[weight + o] + a.weights[weight + y.size() + o];
+      weight += 2 * y.size();
+    }
+    for (double& v : y) {
+      if (last || a.hidden == policy::Activation::tanh) v = std::tanh(v);
+      else if (a.hidden == policy::Activation::relu) v = std::max(v, 0.0);
+      else if (a.hidden == policy::Activation::elu) v = v > 0 ? v : std::expm1(v);
+      else v = v / (1 + std::exp(-v));
     }
     x = y;
   }
@@ -61,27 +82,28 @@ struct Numbers {
   explicit Numbers(const policy::Actor& a) {
     for (const auto* list : {&a.weights, &a.mean, &a.scale})
       for (const double x : *list) all.push_back(static_cast<T>(x));
-    view.layers = static_cast<int>(a.widths.size()) - 1;
-    for (std::size_t i = 0; i < a.widths.size(); ++i) view.widths[i] = a.widths[i];
-    view.hidden = a.hidden;
-    view.weights = all.data();
-    view.mean = all.data() + a.weights.size();
-    view.scale = view.mean + a.mean.size();
-    view.clip = static_cast<T>(a.clip);
+    const T *weights = all.data(), *mean = weights + a.weights.size();
+    view = policy::view_of(a, weights, mean, mean + a.mean.size());
   }
 };
 
 /// Weights have size 1/sqrt(inputs), so sums have size 1 and gather sqrt(inputs) roundings for each layer, which the next one
-/// carries on: 40 ulp for up to six layers. Measured: 6.
+/// carries on: 40 ulp for up to six layers. Measured: 6. Layer norm divides by the deviation of a layer, which can be small where
+/// that has few neurons: ten times as much.
 template <class T, int N>
 void lanes_agree() {
   using L = model::Lanes<T, N>;
   std::mt19937 engine(5);
   std::normal_distribution<double> normal(0, 2);
-  for (const policy::Activation hidden : {policy::Activation::relu, policy::Activation::tanh})
+  for (const auto& [hidden, layer_norm] : {std::pair{policy::Activation::relu, false},
+                                           {policy::Activation::tanh, false},
+                                           {policy::Activation::elu, false},
+                                           {policy::Activation::silu, false},
+                                           {policy::Activation::relu, true},
+                                           {policy::Activation::silu, true}})
     for (const std::vector<int>& widths :
-         {std::vector<int>{3, 4}, {1, 1, 4}, {17, 31, 4}, {18, 64, 64, 4}, {5, 7, 9, 11, 13, 15, 4}, {32, 256, 3, 4}}) {
-      const policy::Actor a = random_actor(widths, hidden, 3);
+         {std::vector<int>{3, 4}, {1, 1, 4}, {17, 31, 4}, {18, 64, 64, 4}, {5, 7, 9, 11, 13, 15, 4}, {32, 256, 7, 4}}) {
+      const policy::Actor a = random_actor(widths, hidden, 3, layer_norm);
       const Numbers<T> numbers(a);
       std::vector<L> in(static_cast<std::size_t>(widths[0]));
       for (L& row : in)
@@ -93,8 +115,8 @@ void lanes_agree() {
         for (const L& row : in) alone.push_back(row.raw[i]);
         const std::vector<double> y = expected(a, alone);
         for (std::size_t k = 0; k < y.size(); ++k)
-          EXPECT_NEAR(out[k].raw[i], y[k], 40 * std::numeric_limits<T>::epsilon())
-              << widths.size() << " layers, lane " << i;
+          EXPECT_NEAR(out[k].raw[i], y[k], (layer_norm ? 400 : 40) * std::numeric_limits<T>::epsilon())
+              << widths.size() << " layers, " << name_of(hidden) << ", lane " << i;
       }
       // a lane of NaN is nobody else's affair
       const std::vector<L> good = in;
@@ -135,13 +157,25 @@ policy::Actor fitting(const Task& task) {
 }
 
 TEST(Actor, ActsInAFleetOnWhatItObserves) {
-  const FleetOptions o = hovering();
+  FleetOptions o = hovering();
+  o.task.history = 3;
+  o.task.action_repeat = 2;
   const auto actor = std::make_shared<policy::Actor>(fitting(o.task));
   Fleet<double> with(3, test::nominal(), o), by_hand(3, test::nominal(), o);
   with.set_actor(actor);
+  std::vector<double> past[3];
   for (int period = 0; period < 50; ++period) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::vector<double> y = expected(*actor, by_hand.observation(i));
+    for (std::size_t i = 0; i < 3 && period % 2 == 0; ++i) {
+      // what it sees now, and saw at its last two actions, or first
+      const std::vector<double> seen = by_hand.observation(i);
+      std::vector<double> wanted(seen.begin(), seen.begin() + 18);
+      for (std::size_t ago = 0; ago < 2; ++ago)
+        wanted.insert(wanted.end(), past[i].empty() ? seen.begin() : past[i].end() - 18 * (1 + ago),
+                      past[i].empty() ? seen.begin() + 18 : past[i].end() - 18 * ago);
+      ASSERT_EQ(seen, wanted) << "period " << period;
+      if (past[i].empty()) past[i].insert(past[i].end(), seen.begin(), seen.begin() + 18);
+      past[i].insert(past[i].end(), seen.begin(), seen.begin() + 18);
+      const std::vector<double> y = expected(*actor, seen);
       by_hand.set_action(i, {y[0], y[1], y[2], y[3]});
     }
     with.step();
@@ -237,6 +271,12 @@ TEST(ActorFile, ReadsBackWhatWasWritten) {
   EXPECT_EQ(b.scale, a.scale);
   EXPECT_EQ(b.clip, a.clip);
   EXPECT_EQ(policy::weight_count({18, 5, 4}), 19u * 5 + 6 * 4);
+  EXPECT_EQ(policy::weight_count({18, 5, 4}, true), 19u * 5 + 2 * 5 + 6 * 4);
+  EXPECT_EQ(io::read_text(file_name()).find("layer_norm"), std::string::npos);
+  write_actor(file_name(), random_actor({18, 5, 4}, policy::Activation::silu, 11, true));
+  const policy::Actor c = policy::read_actor(file_name());
+  EXPECT_TRUE(c.layer_norm);
+  EXPECT_EQ(c.hidden, policy::Activation::silu);
 }
 
 std::string refused(const std::string& text) {
@@ -269,8 +309,8 @@ TEST(ActorFile, RefusesWhatIsNoActor) {
   has(with([](policy::Actor& a) { a.scale.push_back(1); }), "scale has 4");
   has(with([](policy::Actor& a) { a.widths = {3}; }), "0 layers");
   has(with([](policy::Actor& a) { a.widths = {}; }), "layers");
-  has(with([](policy::Actor& a) { a.widths = std::vector<int>(8, 3); }), "7 layers");
-  has(with([](policy::Actor& a) { a.widths = {3, 257, 4}; }), "257 wide");
+  has(with([](policy::Actor& a) { a.widths = std::vector<int>(34, 3); }), "33 layers; accepted: 1 to 32");
+  has(with([](policy::Actor& a) { a.widths = {3, 2049, 4}; }), "2049 wide; accepted: 1 to 2048");
   has(with([](policy::Actor& a) { a.widths = {3, 0, 4}; }), "0 wide");
   has(with([](policy::Actor& a) { a.widths = {3, -5, 4}; }), "-5 wide");
   has(with([](policy::Actor& a) { a.widths = {3, 5, 3}; }), "widths has 3");

@@ -48,7 +48,7 @@ IGNORANT = {"tools/flappy_gap": {"blind", "benchmark", "benchmark/predict"}}
 # Which room declares itself in which public header.
 PUBLIC = {"vehicle.hpp": "model", "vehicle_file.hpp": "model", "world.hpp": "sim", "batch.hpp": "sim"}
 TORCH = {"torch", "ATen", "c10", "caffe2"}
-MAY_USE_TORCH = {"policy"}
+MAY_USE_TORCH = ("src/policy/", "src/learn/torch/", "src/io/torch/")
 GENERATED = {"io/version.hpp"}
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTILINE)
@@ -84,17 +84,17 @@ def faults(root):
         text = path.read_text(encoding="utf-8")
         for match in INCLUDE.finditer(text):
             line = text.count("\n", 0, match.start()) + 1
-            fault = fault_of(root, room, public, match[1], match[2])
+            fault = fault_of(root, where, room, public, match[1], match[2])
             if fault:
                 found.append(f"{where}:{line}: {match[2]}: {fault}")
     return found
 
 
-def fault_of(root, room, public, bracket, name):
-    """Why a file of `room` may not include `name`; None if it may."""
+def fault_of(root, where, room, public, bracket, name):
+    """Why the file `where` of `room` may not include `name`; None if it may."""
     first, _, rest = name.partition("/")
     if first in TORCH:
-        return None if room in MAY_USE_TORCH else f"LibTorch belongs to {', '.join(sorted(MAY_USE_TORCH))}"
+        return None if str(where).startswith(MAY_USE_TORCH) else f"LibTorch belongs to {' and '.join(MAY_USE_TORCH)}"
     if first == "flappy":
         if not (root / "include" / name).exists():
             return "no such public header"
@@ -147,8 +147,9 @@ def self_test():
         ({"src/deploy/header/x.cpp": '#include "learn/d.hpp"\n', "src/learn/d.hpp": ""}, "not learn"),
         ({"src/learn/x.cpp": '#include "deploy/d.hpp"\n', "src/deploy/d.hpp": ""}, "not deploy"),
         ({"src/flightlog/check/x.cpp": '#include "sim/b.hpp"\n'}, "flightlog/check may include flightlog, io, not sim"),
-        ({"src/flight/x.cpp": "#include <torch/script.h>\n"}, "LibTorch belongs to policy"),
-        ({"src/learn/x.cpp": "#include <torch/torch.h>\n"}, "LibTorch belongs to policy"),
+        ({"src/flight/x.cpp": "#include <torch/script.h>\n"}, "LibTorch belongs to src/policy/ and src/learn/torch/ and src/io/torch/"),
+        ({"src/learn/torch/x.cpp": "#include <torch/torch.h>\n"}, None),
+        ({"src/learn/x.cpp": "#include <torch/torch.h>\n"}, "LibTorch belongs to src/policy/ and src/learn/torch/ and src/io/torch/"),
         ({"src/attic/x.cpp": ""}, "src/attic/x.cpp: no known room"),
         ({"tools/flappy_blind/main.cpp": '#include "blind/y.hpp"\n', "src/blind/y.hpp": ""}, None),
         ({"tools/flappy_gap/main.cpp": '#include "gap/diagnose/y.hpp"\n#include "command.hpp"\n', "src/gap/diagnose/y.hpp": ""}, None),

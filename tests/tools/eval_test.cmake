@@ -53,6 +53,26 @@ foreach(row IN ITEMS "success, %( +[0-9.]+)+\n" "95 % interval, from( +[0-9.]+)+
     "nominal vehicle, 20 flights" "time to it, s, median( +[-0-9.]+)+\n" "the hummingbird: 0.25 s; the study's optimum: 0.248 s\n" "hash [0-9a-f]+\n")
   expect_match("stdout" "${out}" "${row}")
 endforeach()
+# ---- what it survives
+
+run(${WORK}/run ${short} --episodes 20 --effects --json ${WORK}/effects.json)
+expect_equal("stderr" "${err}" "")
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "^20 flights each, task escape, seed 1, test vehicles: success, %, by size of an effect, of its typical one\n +0.5 +1 +1.5 +2\n  none +[0-9.]+\n")
+file(READ ${WORK}/effects.json json)
+string(JSON count LENGTH "${json}" effects)
+string(REGEX MATCHALL "\n  [a-z_]+( +([0-9.]+|-))( +([0-9.]+|-))( +([0-9.]+|-))( +([0-9.]+|-))" rows "${out}")
+list(LENGTH rows printed)
+expect_equal("rows of effects" "${printed}" "${count}")
+string(JSON hash GET "${json}" hash)
+foreach(k IN ITEMS 0 8 12)  # of the vehicle, the battery, the gear: each flies otherwise
+  string(JSON name GET "${json}" effects ${k} effect)
+  string(JSON with GET "${json}" effects ${k} success 1 hash)
+  if(with STREQUAL hash)
+    message(SEND_ERROR "${name} changes nothing")
+  endif()
+endforeach()
+
 # A file of a run folder flies as its run does: here 0.65 s without being told.
 string(REGEX REPLACE "duration_s = [^\n]*" "duration_s = 0.65" brief "${run_fly}")
 file(WRITE ${WORK}/brief/config/fly.toml "${brief}")
@@ -149,4 +169,4 @@ expect_refused("task \"escape\" would be flown without its excitation, which fla
 expect_refused("flappy-eval: --episodes: Value 0 not in range 1 to 100000; see flappy-eval --help" ${WORK}/best.json --episodes 0)
 expect_refused("flappy-eval: --stream: training not in {test,validation}; see flappy-eval --help" ${WORK}/best.json --stream training)
 expect_refused("flappy-eval: policy is required; see flappy-eval --help")
-expect_refused("flappy-eval: --episode: no such option; accepted: --config, --episodes, --help, --json, --log-level, --no-baselines, --seed, --set, --stream, --task, --threads, --vehicle, --version; did you mean \"--episodes\"?; see flappy-eval --help" ${WORK}/best.json --episode=5)
+expect_refused("flappy-eval: --episode: no such option; accepted: --allow-network, --config, --effects, --episodes, --help, --json, --log-level, --no-baselines, --seed, --set, --stream, --task, --threads, --vehicle, --version; did you mean \"--episodes\"?; see flappy-eval --help" ${WORK}/best.json --episode=5)

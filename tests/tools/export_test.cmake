@@ -54,6 +54,24 @@ endfunction()
 flown(of_run ${WORK}/run)
 flown(of_header ${WORK}/out/flappy_policy.h --config ${WORK}/run/config/fly.toml)
 expect_equal("flights of the header" "${of_header}" "${of_run}")
+
+# ---- any network that LibTorch trains: layer norm, another activation, a history, more layers
+
+if(TORCH)
+  execute_process(COMMAND ${TRAIN} ${SOURCE}/configs/train/escape.toml ${small} --set learn.updates=300 --set evaluate.every=300
+    --set checkpoint.every=300 --set learn.engine=libtorch --set networks.activation=silu --set networks.layer_norm=true
+    --set networks.actor=[24,40,9] --set task.history=2 --out ${WORK}/deep OUTPUT_QUIET RESULT_VARIABLE code)
+  expect_equal("exit code of flappy-train" "${code}" 0)
+  run(${WORK}/deep --out ${WORK}/deep_out)
+  expect_equal("stderr" "${err}" "")
+  expect_match("stdout" "${out}" " passed +0 +4000 +0\n")
+  flown(of_deep ${WORK}/deep)
+  flown(of_deep_header ${WORK}/deep_out/flappy_policy.h --config ${WORK}/deep/config/fly.toml)
+  expect_equal("flights of the deep header" "${of_deep_header}" "${of_deep}")
+  expect_refused("--int8: whole numbers hold no layer norm, elu or silu; accepted: a policy of relu or tanh without layer norm"
+    ${WORK}/deep --out ${WORK}/deep_int8 --int8)
+endif()
+
 flown(of_int8 ${WORK}/out/flappy_policy_int8.h --config ${WORK}/run/config/fly.toml)
 if(of_int8 STREQUAL of_run)
   message(SEND_ERROR "8 bits fly to the bit as 32 do")

@@ -74,6 +74,7 @@ class OwnFlight {
                         L(model::beat_fraction<float>(fleet_.snapshot(0).phase)), L(0),
                         flight::PidController::trim(pid, lanes_of<flight::Pid>(f.controller)), row);
     for (int i = 0; i < rows; ++i) f.observation[i][0] = row[i].raw[0];
+    for (std::uint32_t ago = 1; ago < task.history; ++ago) fleet_.set_action(0, middle);  // remembers it
   }
   Fleet<float>& fleet() { return fleet_; }
 
@@ -132,7 +133,7 @@ TEST(Onboard, FliesAsTheLanesDo) {
 
 TEST(Onboard, FliesAnyPolicyAsTheLanesDo) {
   // with its turn, several samples in a control period, and a tracker that does not always see
-  FlyConfig config = escape({"sensors.mocap.loss_probability=0.1", "sensors.mocap.loss_length=1.5",
+  FlyConfig config = escape({"task.history=3", "sensors.mocap.loss_probability=0.1", "sensors.mocap.loss_length=1.5",
                              "sensors.imu.rate_hz=1000.0", "sensors.mocap.rate_hz=750.0"});
   policy::Actor a = *config.actor;
   a.widths = {static_cast<int>(a.observation.size()), 16, 16, flight::kActions};

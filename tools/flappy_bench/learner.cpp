@@ -5,6 +5,7 @@
 #include <memory>
 #include <random>
 #ifdef FLAPPY_HAVE_TORCH
+#include "learn/engine.hpp"
 #include "torch_peer.hpp"
 #endif
 
@@ -109,16 +110,23 @@ std::vector<LearnerRow> measure_learner(const SpeedOptions& options, const std::
     Learner<float> one(row.options), two(two_threads);
 #ifdef FLAPPY_HAVE_TORCH
     std::unique_ptr<Torch> torch;
-    if (options.peers) torch = std::make_unique<Torch>(row.options, replay, one);
+    std::unique_ptr<learn::LearnerEngine> engine;
+    if (options.peers) {
+      torch = std::make_unique<Torch>(row.options, replay, one);
+      engine = learn::make_engine(learn::EngineKind::libtorch, row.options);
+    }
 #endif
     const auto by_one = [&] { one.update(replay, kRate, kRate); };
-    std::vector<double> ours, theirs, ratios, scaling;
+    std::vector<double> ours, theirs, ratios, shares, scaling;
     for (int round = 0; round < options.rounds; ++round) {
       ours.push_back(per_second(options.seconds, processor_seconds, by_one));
 #ifdef FLAPPY_HAVE_TORCH
       if (torch) {
         theirs.push_back(per_second(options.seconds, processor_seconds, [&] { torch->update(); }));
         ratios.push_back(ours.back() / theirs.back());
+        shares.push_back(
+            per_second(options.seconds, processor_seconds, [&] { engine->update(replay, kRate, kRate, {}); }) /
+            theirs.back());
       }
 #endif
       const double alone = per_second(options.seconds, wall_seconds, by_one);
@@ -126,7 +134,9 @@ std::vector<LearnerRow> measure_learner(const SpeedOptions& options, const std::
       progress(++done, options.rounds * static_cast<int>(rows.size()));
     }
     row.updates_per_s = summary(std::move(ours));
-    if (!theirs.empty()) row.torch_per_s = summary(std::move(theirs)), row.times_torch = summary(std::move(ratios));
+    if (!theirs.empty())
+      row.torch_per_s = summary(std::move(theirs)), row.times_torch = summary(std::move(ratios)),
+      row.engine_share = summary(std::move(shares));
     row.two_thread_scaling = summary(std::move(scaling));
   }
   return rows;

@@ -14,11 +14,12 @@ namespace flappy::bench {
 struct LearnerRow {
   std::string name;
   learn::LearnerOptions options;
-  double multiply_adds = 0;           ///< of an update, without padding
-  Figure updates_per_s;               ///< one core
-  std::optional<Figure> torch_per_s;  ///< one core, the same update in plain LibTorch
-  std::optional<Figure> times_torch;  ///< pair by pair
-  Figure two_thread_scaling;          ///< wall time, pair by pair
+  double multiply_adds = 0;            ///< of an update, without padding
+  Figure updates_per_s;                ///< one core
+  std::optional<Figure> torch_per_s;   ///< one core, the same update in plain LibTorch
+  std::optional<Figure> times_torch;   ///< pair by pair
+  std::optional<Figure> engine_share;  ///< updates of the engine on LibTorch by those of plain LibTorch, pair by pair
+  Figure two_thread_scaling;           ///< wall time, pair by pair
 };
 
 /// A replay memory of random numbers that fits learner_options(); td3: twins, delay and noise, else DDPG.

@@ -8,6 +8,7 @@
 #include "accuracy.hpp"
 #include "busy.hpp"
 #include "closed_loop.hpp"
+#include "engines.hpp"
 #include "flappy/batch.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "hover.hpp"
@@ -266,14 +267,17 @@ Json learner(const SpeedOptions& options) {
   const double peak = peak_multiply_adds_per_s();
   std::printf("updates/s, actor 32-32, one core, median of %d [range], %s\n", options.rounds,
               sim::best_instruction_set().c_str());
-  std::printf("  %-24s %10s %22s %8s %10s %10s %12s\n", "", "", "", "of peak", "LibTorch", "we are x", "two threads");
+  std::printf("  %-24s %10s %22s %8s %10s %10s %10s %12s\n", "", "", "", "of peak", "LibTorch", "we are x",
+              "its engine", "two threads");
   Json list = Json::array();
   for (const LearnerRow& r : rows) {
     const double share = r.multiply_adds * r.updates_per_s.median / peak;
     std::printf("  %-24s %10.0f  [%8.0f .. %8.0f] %6.0f %%", r.name.c_str(), r.updates_per_s.median,
                 r.updates_per_s.low, r.updates_per_s.high, 100 * share);
-    if (r.torch_per_s) std::printf(" %10.0f %10.1f", r.torch_per_s->median, r.times_torch->median);
-    else std::printf(" %10s %10s", "-", "-");
+    if (r.torch_per_s)
+      std::printf(" %10.0f %10.1f %8.0f %%", r.torch_per_s->median, r.times_torch->median,
+                  100 * r.engine_share->median);
+    else std::printf(" %10s %10s %10s", "-", "-", "-");
     std::printf(" %10.2f x\n", r.two_thread_scaling.median);
     list.push_back({{"name", r.name},
                     {"batch", r.options.batch},
@@ -284,6 +288,7 @@ Json learner(const SpeedOptions& options) {
                     {"share_of_peak", share},
                     {"torch_updates_per_s", r.torch_per_s ? Json(r.torch_per_s->median) : Json(nullptr)},
                     {"times_torch", r.times_torch ? Json(r.times_torch->median) : Json(nullptr)},
+                    {"engine_share", r.engine_share ? Json(r.engine_share->median) : Json(nullptr)},
                     {"two_thread_scaling", r.two_thread_scaling.median}});
   }
   std::printf("this core does %.0f G multiply-adds/s\n", peak / 1e9);
@@ -321,6 +326,32 @@ Json busy(const model::Vehicle& vehicle, const SpeedOptions& options) {
   return {{"busy", list}, {"processors", io::processors()}, {"instruction_set", sim::best_instruction_set()}};
 }
 
+Json engines(int seeds) {
+  const std::vector<EngineRow> rows = measure_engines(seeds);
+  std::printf("configs/train/escape.toml, seeds 0 to %d, %d processors, %s\n", seeds - 1, io::processors(),
+              sim::best_instruction_set().c_str());
+  std::printf("  %-10s %8s %10s %12s %24s %10s\n", "", "start", "memory", "updates/s", "to 90 %: median [range]",
+              "best");
+  Json list = Json::array();
+  for (const EngineRow& r : rows) {
+    std::printf("  %-10s %6.2f s %7.0f MB %12.0f %8.1f s [%5.1f .. %5.1f] %8.2f %%  reached by %d of %d\n",
+                r.engine.c_str(), r.start_s, r.peak_bytes / 1e6, r.updates_per_s.median, r.to_90_s.median,
+                r.to_90_s.low, r.to_90_s.high, 100 * r.best_success.median, r.reached, seeds);
+    list.push_back({{"engine", r.engine},
+                    {"start_s", r.start_s},
+                    {"peak_bytes", r.peak_bytes},
+                    {"updates_per_s", r.updates_per_s.median},
+                    {"time_to_90_s", r.reached > 0 ? Json(r.to_90_s.median) : Json(nullptr)},
+                    {"time_to_90_s_low", r.to_90_s.low},
+                    {"time_to_90_s_high", r.to_90_s.high},
+                    {"best_success", r.best_success.median},
+                    {"reached", r.reached}});
+  }
+  if (rows.size() > 1)
+    std::printf("libtorch takes %.1f x the time of lanes to 90 %%\n", rows[1].to_90_s.median / rows[0].to_90_s.median);
+  return {{"engines", list}, {"processors", io::processors()}, {"instruction_set", sim::best_instruction_set()}};
+}
+
 }  // namespace
 }  // namespace flappy::bench
 
@@ -342,6 +373,10 @@ int main(int argc, char** argv) {
   io::Command work_precision =
       app.command("work-precision", "error against processor time of our step, MuJoCo and DART");
   io::Command learner = app.command("learner", "updates per second of the learner, beside LibTorch");
+  io::Command engines =
+      app.command("engines", "training on lanes and on LibTorch: start, memory, updates/s, time to 90 %");
+  int seeds = 5;
+  engines.option("--seeds", seeds, "of each engine").range(1, 100).shows_default();
   io::Command busy = app.command("busy", "work per second of processor time while others hold all processors");
   io::Command batch = app.command("batch", "fly a batch at one input and summarise it");
   std::string config;
@@ -353,6 +388,7 @@ int main(int argc, char** argv) {
   return program.run(argc, argv, [&] {
     if (batch.given()) return program.write_json(bench::fly_batch(config, overrides));
     if (learner.given()) return program.write_json(bench::learner(options));
+    if (engines.given()) return program.write_json(bench::engines(seeds));
     const model::Vehicle v = model::read_vehicle(vehicle);
     program.write_json(convergence.given()      ? bench::convergence(v)
                        : work_precision.given() ? bench::error_against_work(v, options)

@@ -23,12 +23,7 @@ using Json = nlohmann::ordered_json;
 ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& config) {
   if (const auto& actor = config.actor) {
     return [actor, task = config.fleet.task.constants](const std::vector<double>& observation) {
-      policy::ActorView<double> view;
-      view.layers = static_cast<int>(actor->widths.size()) - 1;
-      std::ranges::copy(actor->widths, view.widths);
-      view.hidden = actor->hidden;
-      view.weights = actor->weights.data(), view.mean = actor->mean.data(), view.scale = actor->scale.data();
-      view.clip = actor->clip;
+      const auto view = policy::view_of(*actor, actor->weights.data(), actor->mean.data(), actor->scale.data());
       double action[flight::kActions];
       policy::evaluate(view, observation.data(), action);
       std::array<double, flight::kActions> adds{};

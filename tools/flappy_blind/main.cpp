@@ -11,6 +11,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
 #include "io/installation.hpp"
+#include "io/sha256.hpp"
 
 namespace flappy::blind {
 namespace {
@@ -98,6 +99,7 @@ int main(int argc, char** argv) {
   score.option("--priors", scored.priors, "what is uncertain of the vehicle").shows_default();
   score.option("--threads", scored.threads, "cases at a time; 0: one for each processor").range(0, 1024);
   program.app().expect_commands(1, 1);
+  program.takes_ranks();
   return program.run(argc, argv, [&] {
     using blind::Programme;
     if (oracle.given()) throw io::InputError("oracle: has another name now; accepted: detectability");
@@ -108,8 +110,10 @@ int main(int argc, char** argv) {
       made.true_values = [&](const blind::Case& c, const std::vector<blind::BlindEffect>& effects) {
         return benchmark::true_values(c, effects, uncertain, 1);
       };
+      made.ranks = program.ranks("work: make\n");
       if (!benchmark::make_bench(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
     } else if (score.given()) {
+      scored.ranks = program.ranks("priors: " + io::sha256(io::read_text(scored.priors)) + "\n");
       const nlohmann::ordered_json scores = benchmark::score_bench(scored);
       if (!scores.is_null()) program.write_json(scores);
     } else if (list.given())

@@ -10,7 +10,9 @@
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/schema.hpp"
+#include "io/sha256.hpp"
 #include "io/toml_writer.hpp"
+#include "model/effects/registry.hpp"
 #include "rollout/evaluation.hpp"
 
 namespace flappy::eval {
@@ -36,7 +38,8 @@ struct Request {
   std::size_t episodes = 10000;
   std::uint64_t seed = 1;
   int threads = 0;
-  bool no_baselines = false;
+  bool no_baselines = false, effects = false;
+  io::Ranks* ranks = nullptr;
 };
 
 std::string file_override(const char* key, const fs::path& path) {
@@ -84,7 +87,8 @@ class Evaluation {
   Evaluation(const Request& request, const FlyConfig& config)
       : config_(config),
         options_{.count = request.episodes,
-                 .first_flapper = request.stream == "test" ? rollout::kTestFlappers : rollout::kValidationFlappers},
+                 .first_flapper = request.stream == "test" ? rollout::kTestFlappers : rollout::kValidationFlappers,
+                 .ranks = request.ranks},
         evaluator_(config, options_),
         nominal_(rollout::nominal(config), nominal_options()) {}
 
@@ -290,7 +294,98 @@ Controller controller_named(const std::string& name, const FlyConfig& config) {
   return flight::read_controller(io::Config::load(io::config_path("controllers/" + name + ".toml")).root());
 }
 
-void evaluate(const Request& request, const io::Program& program) {
+/// Sizes of an effect, of its typical one.
+constexpr double kSizes[] = {0.5, 1, 1.5, 2};
+
+/// The vehicle with one entry of the catalogue: its sizes as given, of the typical ones, within what a vehicle file accepts.
+FlyConfig with_effect(FlyConfig config, const model::EffectEntry& effect, double size) {
+  auto& values = config.added_effects[effect.info.id];
+  for (int i = 0; i < effect.info.sizes; ++i) {
+    const model::EffectParameter& p = effect.parameters[static_cast<std::size_t>(i)];
+    values[p.name] = std::clamp(size * p.typical, p.low, p.high);
+  }
+  config.vehicle.effects[effect.info.id] = values;
+  return config;
+}
+
+/// What the policy survives: its success with each effect, by size.
+void evaluate_effects(const Request& request, const FlyConfig& config, const rollout::Agent& agent,
+                      const io::Program& program) {
+  const auto stream = request.stream == "test" ? rollout::kTestFlappers : rollout::kValidationFlappers;
+  const rollout::EvaluationOptions options{.count = request.episodes, .first_flapper = stream, .ranks = request.ranks};
+  io::ProgressLine progress("effects flown");
+  double done = 0;
+  bool over = false;  // on all ranks alike
+  const auto fly = [&](const FlyConfig& flown) -> std::optional<Summary> {
+    const rollout::Evaluation e = rollout::Evaluator(flown, options).fly(agent, rollout::Detail::success, [](double) {
+      return !io::interrupted();
+    });
+    over |= e.stopped;
+    if (e.stopped) return std::nullopt;
+    return rollout::summarise(e.flights);
+  };
+  const double all = static_cast<double>(model::effects().size() * std::size(kSizes)) + 1;
+  const auto without = fly(config);
+  progress.show(++done / all);
+  Json list = Json::array();
+  std::vector<std::string> rows;
+  const auto percent = [](const std::optional<Summary>& flown) {
+    char text[16];
+    std::snprintf(text, sizeof text, "%8.1f", flown ? 100 * flown->success.value : 0);
+    return flown ? std::string(text) : "       -";
+  };
+  for (const model::EffectEntry& effect : model::effects()) {
+    std::string row;
+    Json json = {{"effect", effect.info.id}, {"typical", Json::object()}, {"success", Json::array()}};
+    for (int i = 0; i < effect.info.sizes; ++i) {
+      const model::EffectParameter& p = effect.parameters[static_cast<std::size_t>(i)];
+      json["typical"][p.name] = p.typical;
+    }
+    for (const double size : kSizes) {
+      std::optional<Summary> flown;
+      if (!over) try {
+          const FlyConfig with = with_effect(config, effect, size);
+          const flight::Fleet<float> one(1, with.vehicle, with.fleet);  // on all ranks, whatever their shares
+          flown = fly(with);
+        } catch (const std::invalid_argument& refused) {  // a delay that the sensors do not allow
+          json["refused"] = refused.what();
+        }
+      progress.show(++done / all);
+      row += percent(flown);
+      const auto figure = [&](auto value) { return flown ? Json(value()) : Json(nullptr); };
+      json["success"].push_back({{"size", size},
+                                 {"rate", figure([&] { return flown->success.value; })},
+                                 {"low", figure([&] { return flown->success.low; })},
+                                 {"high", figure([&] { return flown->success.high; })},
+                                 {"hash", figure([&] { return hexadecimal(flown->hash); })}});
+    }
+    char name[64];
+    std::snprintf(name, sizeof name, "  %-28s", effect.info.id);
+    rows.push_back(name + row);
+    list.push_back(json);
+  }
+  progress.clear();
+  std::printf(
+      "%s%zu flights each, task %s, seed %llu, %s vehicles: success, %%, by size of an effect, of its typical one\n",
+      over ? "stopped; " : "", request.episodes, config.fleet.task.name.c_str(),
+      static_cast<unsigned long long>(request.seed), request.stream.c_str());
+  std::printf("  %-28s", "");
+  for (const double size : kSizes) std::printf("%8g", size);
+  std::printf("\n  %-28s%s\n", "none", percent(without).c_str());
+  for (const std::string& row : rows) std::printf("%s\n", row.c_str());
+  program.write_json({{"policy", request.policy},
+                      {"task", config.fleet.task.name},
+                      {"seed", request.seed},
+                      {"vehicles", request.stream},
+                      {"episodes", request.episodes},
+                      {"stopped", over},
+                      {"success_rate", without ? Json(without->success.value) : Json(nullptr)},
+                      {"hash", without ? Json(hexadecimal(without->hash)) : Json(nullptr)},
+                      {"effects", list},
+                      {"commit", io::commit()}});
+}
+
+void evaluate(Request request, io::Program& program) {
   const fs::path path = request.policy;
   const std::string kind = path.extension().string();
   std::error_code ignored;
@@ -300,10 +395,19 @@ void evaluate(const Request& request, const io::Program& program) {
       throw io::InputError(request.policy + ": is no policy; accepted: " + kPolicies);
   }
   const FlyConfig config = read_config(request);
+  std::string agreed = "episodes: " + std::to_string(request.episodes) + "\n";
+  if (const fs::path file = fs::is_directory(path) ? path / "best.json" : path; fs::exists(file))
+    agreed += "policy: " + io::sha256(io::read_text(file)) + "\n";
+  for (const auto& [name, text] : config.resolved) agreed += name + ": " + io::sha256(text) + "\n";
+  request.ranks = program.ranks(agreed);
   const flight::Task& task = config.fleet.task;
   std::unique_ptr<const policy::Policy> policy;
   if (kind == ".pt" || kind == ".h")
     policy = policy::load_policy(path, static_cast<int>(task.observation().size()), flight::kActions);
+  if (request.effects) {
+    io::stop_on_interrupt();
+    return evaluate_effects(request, config, {policy ? nullptr : config.actor, policy.get()}, program);
+  }
   std::vector<std::pair<const char*, Controller>> alone;
   if (!request.no_baselines)
     alone = {{"PID alone", controller_named("pid", config)}, {"ARC alone", controller_named("arc", config)}};
@@ -344,5 +448,8 @@ int main(int argc, char** argv) {
       .shows_default();
   app.option("--threads", r.threads, "0: one for each processor").range(0, 1024).shows_default();
   app.flag("--no-baselines", r.no_baselines, "without PID and ARC");
+  program.takes_ranks();
+  app.flag("--effects", r.effects,
+           "instead: success with each effect of the catalogue, at 0.5 to 2 times its typical size");
   return program.run(argc, argv, [&] { eval::evaluate(r, program); });
 }

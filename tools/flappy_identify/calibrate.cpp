@@ -10,6 +10,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "identify/force_sensor.hpp"
 #include "io/progress.hpp"
+#include "io/sha256.hpp"
 #include "shared_options.hpp"
 
 namespace flappy::identify {
@@ -22,7 +23,7 @@ struct Settings {
   unsigned seeds = 20;
 };
 
-Json run(const Settings& s) {
+Json run(const Settings& s, io::Program& program) {
   const auto began = std::chrono::steady_clock::now();
   const model::Vehicle vehicle = s.source.read_vehicle();
   model::Vehicle truth = model::read_vehicle(s.truth);
@@ -32,33 +33,52 @@ Json run(const Settings& s) {
   const std::vector<sim::Input> inputs = s.inputs.empty() ? default_inputs() : read_inputs(s.inputs, vehicle.driver);
   const std::vector<sim::Input> held =
       s.held_out.empty() ? std::vector<sim::Input>{} : read_inputs(s.held_out, vehicle.driver);
+  // of each seed: whether it was done, the largest errors, and of each parameter whether it was seen, and inside its interval
+  const std::size_t width = 3 + 2 * config.parameters.size();
+  std::vector<double> found(width * s.seeds, 0);
+  io::Ranks* const ranks = program.ranks("work: calibrate, " + std::to_string(s.seeds) + " seeds of " +
+                                         io::sha256(io::read_text(s.truth) + io::read_text(s.source.vehicle) +
+                                                    io::read_text(s.fit.config) + s.fit.method) +
+                                         "\n");
+  const auto [first, last] =
+      ranks != nullptr ? ranks->share_of(s.seeds, ranks->rank()) : std::pair{std::size_t{0}, std::size_t{s.seeds}};
+  io::stop_on_interrupt();
+  io::ProgressLine line("fitted");
+  for (std::size_t k = first; k < last && !io::interrupted(); ++k) {
+    line.show(static_cast<double>(k - first) / static_cast<double>(last - first));
+    const auto seed = static_cast<unsigned>(k + 1);
+    double* const of_seed = &found[k * width];
+    MeasuredMap measured = simulate_forces(truth, inputs, {}, seed, options.map);
+    measured.name = s.inputs.empty() ? "map of " + s.truth : s.inputs;
+    const ForceFit fit = fit_forces(vehicle, measured, config, options);
+    of_seed[1] = fit.after.total;
+    if (!held.empty()) {
+      const MeasuredMap other = simulate_forces(truth, held, {}, seed + 1000000, options.map);
+      of_seed[2] = map_error(other.wrenches, force_map<double>(std::span(&fit.vehicle, 1), held, options.map)).total;
+    }
+    for (std::size_t i = 0; i < config.parameters.size(); ++i) {
+      const FittedParameter& p = fit.known.parameters[i];
+      of_seed[3 + 2 * i] = p.seen;
+      of_seed[4 + 2 * i] = p.seen && p.low <= *true_values[i] && *true_values[i] <= p.high;
+    }
+    of_seed[0] = 1;
+  }
+  if (ranks != nullptr) ranks->share(reinterpret_cast<std::byte*>(found.data()), s.seeds, width * sizeof(double));
   struct Count {
     unsigned seen = 0, inside = 0;
   };
   std::vector<Count> counts(config.parameters.size());
   double after = 0, held_error = 0;
-  io::stop_on_interrupt();
-  io::ProgressLine line("fitted");
   unsigned done = 0;
-  for (unsigned seed = 1; seed <= s.seeds && !io::interrupted(); ++seed) {
-    line.show(static_cast<double>(seed - 1) / s.seeds);
-    MeasuredMap measured = simulate_forces(truth, inputs, {}, seed, options.map);
-    measured.name = s.inputs.empty() ? "map of " + s.truth : s.inputs;
-    const ForceFit fit = fit_forces(vehicle, measured, config, options);
-    after = std::max(after, fit.after.total);
-    if (!held.empty()) {
-      const MeasuredMap other = simulate_forces(truth, held, {}, seed + 1000000, options.map);
-      held_error =
-          std::max(held_error,
-                   map_error(other.wrenches, force_map<double>(std::span(&fit.vehicle, 1), held, options.map)).total);
-    }
+  for (std::size_t k = 0; k < s.seeds; ++k) {
+    const double* const of_seed = &found[k * width];
+    done += of_seed[0] > 0;
+    after = std::max(after, of_seed[1]);
+    held_error = std::max(held_error, of_seed[2]);
     for (std::size_t i = 0; i < counts.size(); ++i) {
-      const FittedParameter& p = fit.known.parameters[i];
-      if (!p.seen) continue;
-      ++counts[i].seen;
-      if (p.low <= *true_values[i] && *true_values[i] <= p.high) ++counts[i].inside;
+      counts[i].seen += of_seed[3 + 2 * i] > 0;
+      counts[i].inside += of_seed[4 + 2 * i] > 0;
     }
-    ++done;
   }
   line.clear();
   unsigned seen = 0, inside = 0;
@@ -88,7 +108,8 @@ Json run(const Settings& s) {
 
 }  // namespace
 
-Command add_calibrate(const io::Command& program) {
+Command add_calibrate(io::Program& owner) {
+  const io::Command program = owner.app();
   const auto s = std::make_shared<Settings>();
   io::Command app = program.command("calibrate", "counts how often a fit's 95 % intervals hold the truth");
   s->source.add(app, "vehicle to start each fit from");
@@ -98,7 +119,7 @@ Command add_calibrate(const io::Command& program) {
   app.option("--held-out-inputs", s->held_out, "table of inputs to judge each fit on");
   s->fit.starts = 1;
   s->fit.add(app);
-  return {app, [s] { return run(*s); }};
+  return {app, [s, &owner] { return run(*s, owner); }};
 }
 
 }  // namespace flappy::identify

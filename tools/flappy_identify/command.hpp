@@ -4,7 +4,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "io/command_line.hpp"
+#include "io/program.hpp"
 
 namespace flappy::identify {
 
@@ -18,7 +18,7 @@ struct Command {
 
 Command add_forces(const io::Command& program);
 Command add_simulate_forces(const io::Command& program);
-Command add_calibrate(const io::Command& program);
+Command add_calibrate(io::Program& program);
 Command add_compare_map(const io::Command& program);
 Command add_kinematics(const io::Command& program);
 Command add_transitions(const io::Command& program);

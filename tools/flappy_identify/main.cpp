@@ -7,9 +7,10 @@ int main(int argc, char** argv) {
   io::Program program("flappy-identify", "Fits a vehicle to measurements, and compares it with them.", {});
   const std::vector<identify::Command> commands = {
       identify::add_forces(program.app()),     identify::add_simulate_forces(program.app()),
-      identify::add_calibrate(program.app()),  identify::add_compare_map(program.app()),
+      identify::add_calibrate(program),        identify::add_compare_map(program.app()),
       identify::add_kinematics(program.app()), identify::add_transitions(program.app())};
   program.app().expect_commands(1, 1);
+  program.takes_ranks();
   return program.run(argc, argv, [&] {
     for (const identify::Command& command : commands)
       if (command.app.given()) program.write_json(command.run());

@@ -11,6 +11,7 @@
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/schema.hpp"
+#include "io/sha256.hpp"
 #include "learn/checkpoint.hpp"
 #include "learn/learning_curve.hpp"
 #include "learn/trainer.hpp"
@@ -64,6 +65,10 @@ void print(const fs::path& folder, const TrainSummary& s) {
   for (const auto& t : s.time_to_s) t ? std::printf(" %.1f s", *t) : std::printf(" -");
   std::printf("\n  simulation %.0f %%, learning %.0f %%, the rest %.0f %% of the time of all threads\n",
               100 * s.share_simulation, 100 * s.share_learning, 100 * (1 - s.share_simulation - s.share_learning));
+  if (s.ranks > 1)
+    std::printf("  %d ranks: %.0f kB came from others for each update, %.0f %% of the time in exchanges\n", s.ranks,
+                s.exchanged_bytes / 1e3 / static_cast<double>(std::max<std::uint64_t>(1, s.updates)),
+                100 * s.exchange_s / s.wall_s);
   std::printf("  policy %s, last checkpoint's payload %s\n", (folder / "best.json").c_str(), s.payload_sha256.c_str());
   if (s.stopped) std::printf("  go on: flappy-train --resume %s\n", folder.c_str());
 }
@@ -81,7 +86,7 @@ TrainSummary train_one(const TrainConfig& config, TrainOptions options) {
   bool said = false;
   options.keep_going = [&](const TrainProgress& p) {
     if (!std::exchange(said, true)) {
-      io::log_into(options.folder);
+      if (options.ranks == nullptr || options.ranks->rank() == 0) io::log_into(options.folder);
       const TrainCosts costs = costs_of(config);
       std::printf("%s: seed %llu, %d threads, %.0f MB of memory, at most %.0f MB on disk\n", options.folder.c_str(),
                   static_cast<unsigned long long>(config.seed), config.threads,
@@ -99,6 +104,49 @@ TrainSummary train_one(const TrainConfig& config, TrainOptions options) {
   print(options.folder, summary);
   std::fflush(stdout);
   return summary;
+}
+
+/// Runs of several seeds, shared out among the ranks; what is there already goes on, or is done. Then their learning curve.
+void train_seeds(io::Program& program, const std::vector<std::uint64_t>& seeds, const fs::path& folder,
+                 TrainOptions options, const std::function<TrainConfig(std::uint64_t)>& config_of) {
+  const auto folder_of = [&](std::uint64_t seed) { return folder / ("seed_" + std::to_string(seed)); };
+  std::string agreed;
+  for (const std::uint64_t seed : seeds) {
+    const TrainConfig config = config_of(seed);
+    refuse_other_run_in(folder_of(seed), config, options.init_sha256);
+    agreed += "configuration: " + config.sha256 + "\n";
+  }
+  io::Ranks* const ranks = program.ranks(agreed);
+  for (std::size_t i = 0; i < seeds.size() && !io::interrupted(); ++i) {
+    if (ranks != nullptr && i % static_cast<std::size_t>(ranks->size()) != static_cast<std::size_t>(ranks->rank()))
+      continue;
+    options.folder = folder_of(seeds[i]);
+    options.from = unfinished_run_in(options.folder);
+    if (fs::exists(options.folder / "summary.json") && !options.from) continue;
+    train_one(config_of(seeds[i]), options);
+    options.started = std::chrono::steady_clock::now();
+  }
+  if (ranks != nullptr) ranks->wait();
+  if (!program.writes()) return;
+  std::vector<SeedCurve> curves;
+  Json all = Json::array();
+  bool stopped = false;
+  for (const std::uint64_t seed : seeds) {
+    const fs::path summary = folder_of(seed) / "summary.json";
+    if (!fs::exists(summary)) continue;
+    all.push_back(Json::parse(io::read_text(summary)));
+    stopped |= all.back().at("stopped").get<bool>();
+    curves.push_back(read_seed_curve(folder_of(seed), seed, "success_rate"));
+  }
+  program.write_json(all);
+  if (stopped || curves.size() < seeds.size()) {
+    std::printf("stopped with %zu of %zu seeds; go on: the same command\n", curves.size(), seeds.size());
+    return;
+  }
+  const LearningCurve curve = learning_curve(curves);
+  write_curve_csv(folder / "curve.csv", curve);
+  write_curve_svg(folder / "curve.svg", curve, "success_rate");
+  std::printf("%s and curve.svg: learning curve of %zu seeds\n", (folder / "curve.csv").c_str(), curves.size());
 }
 
 }  // namespace
@@ -125,6 +173,7 @@ int main(int argc, char** argv) {
   app.option("--set", overrides, "override a key: learn.updates=1000, task.reward.goal=1")
       .one_at_a_time()
       .excludes(resumed);
+  program.takes_ranks();
   return program.run(argc, argv, [&] {
     if (config_name.empty() == resume.empty())
       throw io::InputError("flappy-train: what to train is not clear; accepted: a configuration, or --resume RUN");
@@ -132,6 +181,15 @@ int main(int argc, char** argv) {
     learn::TrainOptions options;
     options.commit = io::commit();
     options.started = train::started;
+    const auto train_it = [&](const learn::TrainConfig& config) {
+      if (!options.from) learn::refuse_run_in(options.folder);  // on all ranks, before they meet
+      std::string agreed = "configuration: " + config.sha256 + "\ninit: " + options.init_sha256 + "\n";
+      if (options.from) agreed += "checkpoint: " + learn::Checkpoint(*options.from).payload_sha256() + "\n";
+      // LibTorch's replicas step each on their own
+      if (config.engine == learn::EngineKind::libtorch) agreed += "processor: " + learn::processor() + "\n";
+      options.ranks = program.ranks(agreed);
+      program.write_json(learn::json_of(train::train_one(config, options)));
+    };
     const auto with_threads = [&](std::vector<std::string> list) {
       if (threads > 0) list.push_back("threads=" + std::to_string(threads));
       return list;
@@ -141,39 +199,22 @@ int main(int argc, char** argv) {
           io::read_of_run(resume, [&] { return learn::read_train_config(train::config_of(resume), with_threads({})); });
       options.folder = resume;
       options.from = from.empty() ? learn::newest_checkpoint(resume).path() : fs::path(resume) / from;
-      program.write_json(learn::json_of(train::train_one(config, options)));
-      return;
+      return train_it(config);
     }
     if (!init.empty()) {
       const fs::path file = fs::is_directory(init) ? fs::path(init) / "best.json" : fs::path(init);
       options.init = std::make_shared<policy::Actor>(policy::read_actor(file));
+      options.init_sha256 = io::sha256(io::read_text(file));
     }
     const fs::path folder = out.empty() ? fs::path("runs") / fs::path(config_name).stem() : fs::path(out);
     if (seeds.empty()) {
       options.folder = folder;
-      program.write_json(
-          learn::json_of(train::train_one(learn::read_train_config(config_name, with_threads(overrides)), options)));
-      return;
+      return train_it(learn::read_train_config(config_name, with_threads(overrides)));
     }
-    std::vector<learn::SeedCurve> curves;
-    train::Json all = train::Json::array();
-    const auto folder_of = [&](std::uint64_t seed) { return folder / ("seed_" + std::to_string(seed)); };
-    for (const std::uint64_t seed : train::seeds_of(seeds)) learn::refuse_run_in(folder_of(seed));
-    for (const std::uint64_t seed : train::seeds_of(seeds)) {
+    train::train_seeds(program, train::seeds_of(seeds), folder, options, [&](std::uint64_t seed) {
       std::vector<std::string> list = with_threads(overrides);
       list.push_back("seed=" + std::to_string(seed));
-      options.folder = folder_of(seed);
-      options.started = curves.empty() ? train::started : std::chrono::steady_clock::now();
-      const learn::TrainSummary s = train::train_one(learn::read_train_config(config_name, list), options);
-      all.push_back(learn::json_of(s));
-      if (s.stopped) break;
-      curves.push_back(learn::read_seed_curve(options.folder, seed, "success_rate"));
-    }
-    program.write_json(all);
-    if (curves.size() < all.size()) return;
-    const learn::LearningCurve curve = learn::learning_curve(curves);
-    learn::write_curve_csv(folder / "curve.csv", curve);
-    learn::write_curve_svg(folder / "curve.svg", curve, "success_rate");
-    std::printf("%s and curve.svg: learning curve of %zu seeds\n", (folder / "curve.csv").c_str(), curves.size());
+      return learn::read_train_config(config_name, list);
+    });
   });
 }

@@ -3,8 +3,10 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "io/config.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "io/sha256.hpp"
 #include "rollout/tune.hpp"
 
 namespace {
@@ -28,9 +30,14 @@ int main(int argc, char** argv) {
   program.app().option("config", config_name, "what to vary and how to judge: configs/tune/*.toml").required();
   program.app().option("out", out, "controller file to write").required();
   program.app().option("--set", overrides, "override a key: generations=10").one_at_a_time();
+  program.takes_ranks();
   return program.run(argc, argv, [&] {
-    const rollout::TuneConfig config = rollout::read_tune_config(config_name, overrides);
-    io::check_output(out, {config_name});
+    rollout::TuneConfig config = rollout::read_tune_config(config_name, overrides);
+    if (program.writes()) io::check_output(out, {config_name});
+    std::string agreed = "tuning: " + io::sha256(io::Config::load(config_name, overrides).resolved()) + "\n";
+    for (const rollout::Trial& t : config.trials)
+      for (const auto& [name, text] : t.fly.resolved) agreed += name + ": " + io::sha256(text) + "\n";
+    config.ranks = program.ranks(agreed);
     const auto start = std::chrono::steady_clock::now();
     io::stop_on_interrupt();
     const double before = rollout::cost_of(config, config.start);
@@ -40,9 +47,10 @@ int main(int argc, char** argv) {
       const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       std::printf("generation %u of %u: cost %.4f, %.0f s\n", ++generation, config.generations, r.cost, wall_s);
       std::fflush(stdout);
-      io::write_atomically(
-          out, controller_text(r.best, "Tuned by flappy-tune, generation " + std::to_string(r.generations) + "."));
-      return !io::interrupted();
+      if (program.writes())
+        io::write_atomically(
+            out, controller_text(r.best, "Tuned by flappy-tune, generation " + std::to_string(r.generations) + "."));
+      return !(config.ranks != nullptr ? config.ranks->any(io::interrupted()) : io::interrupted());
     });
     program.write_json({{"start_cost", before}, {"cost", result.cost}, {"generations", generation}});
   });

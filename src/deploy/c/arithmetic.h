@@ -46,6 +46,37 @@ static inline float flappy_copysign(float magnitude, float sign) {
   return m.number;
 }
 
+/* Correctly rounded; NaN below 0. */
+static inline float flappy_sqrt(float x) {
+  flappy_float f;
+  int32_t exponent;
+  uint64_t mantissa, rest, root = 0, bit = (uint64_t)1 << 48;
+  f.number = x;
+  if (!(x > 0.0F)) return x < 0.0F ? (x - x) / (x - x) : x;
+  if (f.bits >= 0x7f800000U) return x;
+  exponent = (int32_t)(f.bits >> 23);
+  mantissa = f.bits & 0x007fffffU;
+  if (exponent > 0) {
+    mantissa |= 0x00800000U;
+  } else {
+    for (exponent = 1; mantissa < 0x00800000U; --exponent) mantissa <<= 1;
+  }
+  /* x = mantissa 2^(exponent - 150); two bits more, or one, make the exponent even */
+  mantissa <<= exponent % 2 != 0 ? 1 : 2;
+  exponent -= exponent % 2 != 0 ? 151 : 152;
+  for (rest = mantissa << 24; bit != 0; bit >>= 2) {
+    if (rest >= root + bit) {
+      rest -= root + bit;
+      root = (root >> 1) + bit;
+    } else {
+      root >>= 1;
+    }
+  }
+  /* root has one bit too many; half-way between two numbers there is none whose square is x */
+  f.bits = ((uint32_t)(exponent / 2 + 138) << 23) + (uint32_t)((root + 1) >> 1);
+  return f.number;
+}
+
 static inline float flappy_tanh(float x) {
   /* from exp(-2 |x|) - 1 = 2^-k (1 - r + r^2 e) - 1 with a whole k and |r| < 0.35 */
   const float to_whole = 12582912.0F, y = flappy_min(87.0F, 2.0F * flappy_abs(x));

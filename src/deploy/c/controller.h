@@ -81,6 +81,9 @@ static inline void flappy_controller_begin(flappy_controller *c) {
   c->tick = c->segment = 0;
   c->handed_back = c->hovering = 0;
   for (i = 0; i < 4; ++i) c->added[i] = flappy_controller_k.start_added[i];
+#if FLAPPY_CONTROLLER_PAST > 0
+  c->remembers = 0;
+#endif
 }
 
 /* Feedback alone, to where the task begins and to stay there until flappy_controller_begin(): so the trim is learnt, to
@@ -201,8 +204,8 @@ static inline float *flappy_put4(float *row, float a, float b, float c, float d)
   return row + 4;
 }
 
-/* What the policy sees: the parts that its task shows, in this order. */
-static inline void flappy_controller_observe(const flappy_controller *c, float obs[FLAPPY_CONTROLLER_OBS]) {
+/* The parts that the task shows, in this order, as they are now. */
+static inline void flappy_controller_see(const flappy_controller *c, float *obs) {
   const uint32_t parts = FLAPPY_CONTROLLER_PARTS;
   const flappy_motion *x = &c->estimate;
   const flappy_matrix R = flappy_rotation_matrix(x->attitude);
@@ -238,6 +241,18 @@ static inline void flappy_controller_observe(const flappy_controller *c, float o
   (void)row;
 }
 
+/* What the policy sees: the parts as they are now, then as they were at its last actions. */
+static inline void flappy_controller_observe(const flappy_controller *c, float obs[FLAPPY_CONTROLLER_OBS]) {
+  flappy_controller_see(c, obs);
+#if FLAPPY_CONTROLLER_PAST > 0
+  {
+    const uint32_t now = FLAPPY_CONTROLLER_OBS - FLAPPY_CONTROLLER_PAST;
+    uint32_t i;
+    for (i = 0; i < FLAPPY_CONTROLLER_PAST; ++i) obs[now + i] = c->remembers ? c->past[i] : obs[i % now];
+  }
+#endif
+}
+
 /* Whether the policy is to act now. */
 static inline int flappy_controller_policy_due(const flappy_controller *c) {
   return !c->handed_back && c->tick % FLAPPY_CONTROLLER_ACTION_REPEAT == 0;
@@ -246,6 +261,12 @@ static inline int flappy_controller_policy_due(const flappy_controller *c) {
 /* What the policy adds from now on until the hand-back; what is not finite adds nothing. */
 static inline void flappy_controller_act(flappy_controller *c, const float added[4]) {
   uint32_t i;
+#if FLAPPY_CONTROLLER_PAST > 0
+  float obs[FLAPPY_CONTROLLER_OBS];
+  flappy_controller_observe(c, obs);
+  for (i = 0; i < FLAPPY_CONTROLLER_PAST; ++i) c->past[i] = obs[i];
+  c->remembers = 1;
+#endif
   for (i = 0; i < 4; ++i) c->added[i] = flappy_abs(added[i]) <= 1e6F ? added[i] : 0.0F;
 }
 

@@ -72,6 +72,10 @@ typedef struct {
   flappy_estimator estimator;
   flappy_motion estimate; /* at now_us */
   flappy_feedback feedback;
+#if FLAPPY_CONTROLLER_PAST > 0
+  float past[FLAPPY_CONTROLLER_PAST]; /* what the policy saw at its last actions, newest first */
+  int remembers;
+#endif
   float added[4];         /* by the policy: V, V, V, split cycle */
   flappy_wing_beat input; /* before the driver clips it */
   uint32_t phase;         /* of the wing beat, 2^32 each */

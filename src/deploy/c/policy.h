@@ -1,3 +1,13 @@
+/* What hidden layers may do: exp(x) - 1 and 1 / (1 + exp(-x)) from the tanh of half of x. */
+static inline float flappy_elu(float x) {
+  const float t = flappy_tanh(flappy_min(x, 0.0F) * 0.5F);
+  return x > 0.0F ? x : (t + t) / (1.0F - t);
+}
+static inline float flappy_silu(float x) {
+  const float half = x * 0.5F;
+  return flappy_fma(half, flappy_tanh(half), half);
+}
+
 /* One layer: for every output its bias, then one weight for each input. Four outputs at a time share what they read; each
    sums up its inputs in their order. */
 static inline const float *flappy_policy_layer(const float *weights, const float *in, uint32_t inputs, float *out,
@@ -27,6 +37,24 @@ static inline const float *flappy_policy_layer(const float *weights, const float
   return weights;
 }
 
+#if FLAPPY_POLICY_LAYER_NORM
+/* Takes the mean out, divides by the standard deviation, then a gain and a shift for each number. */
+static inline const float *flappy_policy_normalise(const float *gains, float *x, uint32_t count) {
+  const float share = 1.0F / (float)count;
+  float mean = 0.0F, squares = 0.0F, scale;
+  uint32_t i;
+  for (i = 0; i < count; ++i) mean += x[i];
+  mean *= share;
+  for (i = 0; i < count; ++i) {
+    x[i] -= mean;
+    squares = flappy_fma(x[i], x[i], squares);
+  }
+  scale = 1.0F / flappy_sqrt(flappy_fma(squares, share, (float)1e-5));
+  for (i = 0; i < count; ++i) x[i] = flappy_fma(x[i] * scale, gains[i], gains[count + i]);
+  return gains + 2 * count;
+}
+#endif
+
 /* Observation in, what is added to the feedback controller's output out, both in the units of the tables above. An
    observation with a NaN in it is refused: it returns 1 and adds nothing. Otherwise it returns 0. */
 static inline int flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT]) {
@@ -43,6 +71,9 @@ static inline int flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float a
   for (layer = 0; layer < FLAPPY_POLICY_LAYERS; ++layer) {
     float *out = values[(layer + 1) % 2];
     weights = flappy_policy_layer(weights, values[layer % 2], widths[layer], out, widths[layer + 1]);
+#if FLAPPY_POLICY_LAYER_NORM
+    if (layer + 1 < FLAPPY_POLICY_LAYERS) weights = flappy_policy_normalise(weights, out, widths[layer + 1]);
+#endif
     for (i = 0; i < widths[layer + 1]; ++i)
       out[i] = layer + 1 == FLAPPY_POLICY_LAYERS ? flappy_tanh(out[i]) : FLAPPY_POLICY_HIDDEN(out[i]);
   }

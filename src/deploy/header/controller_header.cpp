@@ -261,6 +261,8 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
   define("PHASE_STEP", number(phase_step) + " /* of the wing beat, 2^32 each, in that time */");
   define("ACTION_REPEAT", number(o.task.action_repeat) + " /* control periods for which the policy's output stays */");
   define("OBS", std::to_string(o.task.observation().size()));
+  define("PAST", std::to_string(o.task.observation().size() / o.task.history * (o.task.history - 1)) +
+                     " /* numbers of it that are of the policy's last actions */");
   define("PARTS", number(o.task.parts) + " /* of the observation: bits in flappy_controller_observe() */");
   define("HANDS_BACK", o.task.constants.hand_back.enabled > 0 ? "1" : "0");
   define("IMU_LATENCY_US", number(std::lround(o.sensors.imu.latency_s * 1e6)) + " /* as trained with */");

@@ -61,7 +61,7 @@ class Numbers {
 
 /// What differs between numbers of 32 and of 8 bits.
 struct Kind {
-  const char *title, *code, *hidden_tanh;
+  const char *title, *code, *hidden;
   std::size_t scratch_bytes;  ///< for each neuron of the widest layer
   Numbers numbers;
 };
@@ -75,7 +75,8 @@ void add_common(const Network& n, Numbers& to) {
 }
 
 Kind kind_of(const policy::PolicyNetwork& n) {
-  Kind kind{"A trained policy", "policy.h", "flappy_tanh(x)", 2 * sizeof(float), {}};
+  static constexpr const char* kHidden[] = {"flappy_max(x, 0.0F)", "flappy_tanh(x)", "flappy_elu(x)", "flappy_silu(x)"};
+  Kind kind{"A trained policy", "policy.h", kHidden[static_cast<int>(n.hidden)], 2 * sizeof(float), {}};
   add_common(n, kind.numbers);
   kind.numbers.add("weights", "WEIGHTS", n.weights);
   return kind;
@@ -84,7 +85,7 @@ Kind kind_of(const policy::PolicyNetwork& n) {
 Kind kind_of(const QuantisedNetwork& n) {
   Kind kind{"A trained policy in whole numbers of 8 bits",
             "policy_int8.h",
-            "127.0F * flappy_tanh(x)",
+            n.relu ? "flappy_max(x, 0.0F)" : "127.0F * flappy_tanh(x)",
             1 + sizeof(std::int32_t),
             {}};
   add_common(n, kind.numbers);
@@ -129,8 +130,11 @@ std::string header(const rollout::FlyConfig& config, const policy::RunInfo& run,
   define("NEURONS", neurons);
   define("WIDTHS", "{" + widths + "}");
   define("WIDEST", widest);
-  if constexpr (std::is_same_v<Network, policy::PolicyNetwork>) define("CLIP", c_number(n.clip));
-  define("HIDDEN(x)", n.relu ? "flappy_max(x, 0.0F)" : kind.hidden_tanh);
+  if constexpr (std::is_same_v<Network, policy::PolicyNetwork>) {
+    define("CLIP", c_number(n.clip));
+    define("LAYER_NORM", n.layer_norm ? 1 : 0);
+  }
+  define("HIDDEN(x)", kind.hidden);
   define("VECTORS", vectors.rows());
   text << kCodes << "\n"
        << kSignalType << "\n"

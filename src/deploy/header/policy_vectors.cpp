@@ -22,7 +22,8 @@ std::vector<To> cast(const From& from) {
 policy::PolicyNetwork network_of(const rollout::FlyConfig& config) {
   const policy::Actor& a = *config.actor;
   policy::PolicyNetwork n{a.widths,
-                          a.hidden == policy::Activation::relu,
+                          a.hidden,
+                          a.layer_norm,
                           static_cast<float>(a.clip),
                           cast<float>(a.mean),
                           cast<float>(a.scale),
@@ -39,14 +40,7 @@ policy::PolicyNetwork network_of(const rollout::FlyConfig& config) {
 }
 
 std::vector<float> evaluate(const policy::PolicyNetwork& n, const std::vector<float>& observation) {
-  policy::ActorView<float> view;
-  view.layers = static_cast<int>(n.widths.size()) - 1;
-  std::ranges::copy(n.widths, view.widths);
-  view.hidden = n.relu ? policy::Activation::relu : policy::Activation::tanh;
-  view.weights = n.weights.data();
-  view.mean = n.mean.data();
-  view.scale = n.scale.data();
-  view.clip = n.clip;
+  const auto view = policy::view_of(n, n.weights.data(), n.mean.data(), n.scale.data());
   const auto inputs = static_cast<std::size_t>(n.inputs()), outputs = static_cast<std::size_t>(n.outputs());
   std::vector<float> action;
   std::vector<Lane> in(inputs), out(outputs);

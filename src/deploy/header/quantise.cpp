@@ -48,7 +48,10 @@ QuantisedNetwork quantise(const policy::PolicyNetwork& n, const std::vector<floa
   const auto inputs = static_cast<std::size_t>(n.inputs());
   const std::size_t rows = observation.size() / inputs;
   if (rows == 0) throw std::invalid_argument("nothing to fit scales to");
-  QuantisedNetwork q{n.widths, n.relu, n.mean, n.scale, {}, {}, {}, n.middle, n.half};
+  if (n.layer_norm || (n.hidden != policy::Activation::relu && n.hidden != policy::Activation::tanh))
+    throw std::invalid_argument("a network that whole numbers do not hold");
+  const bool relu = n.hidden == policy::Activation::relu;
+  QuantisedNetwork q{n.widths, relu, n.mean, n.scale, {}, {}, {}, n.middle, n.half};
   // activations in real numbers; of the inputs, those of each in units of its largest
   std::vector<float> values(rows * inputs), largest(inputs, 0);
   for (std::size_t k = 0; k < values.size(); ++k) {
@@ -72,9 +75,9 @@ QuantisedNetwork quantise(const policy::PolicyNetwork& n, const std::vector<floa
       for (std::size_t o = 0; o < out; ++o) {
         float sum = weights[o * (in + 1)];
         for (std::size_t i = 0; i < in; ++i) sum += weights[o * (in + 1) + 1 + i] * values[row * in + i];
-        next[row * out + o] = last ? sum : n.relu ? std::max(sum, 0.0F) : lane_tanh(sum);
+        next[row * out + o] = last ? sum : relu ? std::max(sum, 0.0F) : lane_tanh(sum);
       }
-    const double next_step = last ? 1 : n.relu ? best_step(next) : 1 / static_cast<double>(kLargest);
+    const double next_step = last ? 1 : relu ? best_step(next) : 1 / static_cast<double>(kLargest);
     for (std::size_t o = 0; o < out; ++o) {
       const float* w = weights + o * (in + 1);
       double most = 0;
@@ -84,7 +87,7 @@ QuantisedNetwork quantise(const policy::PolicyNetwork& n, const std::vector<floa
       const double unit = least > 0 ? least : 1;
       for (std::size_t i = 0; i < in; ++i) q.weights.push_back(rounded(static_cast<float>(w[1 + i] * step[i] / unit)));
       q.bias.push_back(static_cast<std::int32_t>(std::nearbyint(w[0] / unit)));
-      q.multiplier.push_back(static_cast<float>(last || !n.relu ? unit : unit / next_step));
+      q.multiplier.push_back(static_cast<float>(last || !relu ? unit : unit / next_step));
     }
     weights += out * (in + 1);
     values = std::move(next);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 
 #include "io/parallel.hpp"
@@ -42,12 +43,9 @@ class AlignedArray {
 
 NetworkShape network_shape(int inputs, const std::vector<int>& hidden, int outputs, policy::Activation activation,
                            bool bounded) {
-  if (hidden.size() + 1 > policy::kMaxLayers) throw std::invalid_argument("a network has at most 6 layers");
   std::vector<int> widths = {inputs};
   widths.insert(widths.end(), hidden.begin(), hidden.end());
   widths.push_back(outputs);
-  for (const int w : widths)
-    if (w < 1 || w > policy::kMaxWidth) throw std::invalid_argument("a layer is 1 to 256 wide");
   return {static_cast<int>(widths.size()) - 1, widths.data(), activation, bounded};
 }
 
@@ -62,6 +60,34 @@ void each_weight(const NetworkShape& net, const Visit& visit) {
 
 }  // namespace
 
+void check_options(const LearnerOptions& o) {
+  const bool privileged = o.shape.critic_observation > 0;
+  const Normaliser& critic_input = privileged ? o.critic_input : o.actor_input;
+  const int seen = privileged ? o.shape.critic_observation : o.shape.actor_observation;
+  const auto fits = [](const Normaliser& n, int inputs) {
+    return static_cast<int>(n.mean.size()) == inputs && static_cast<int>(n.scale.size()) == inputs && n.clip > 0;
+  };
+  if (!fits(o.actor_input, o.shape.actor_observation) || !fits(critic_input, seen))
+    throw std::invalid_argument("a normaliser has one mean and one scale for each input, and a clip above 0");
+  if (o.batch < kChunk || o.batch % kChunk != 0)
+    throw std::invalid_argument("a batch is a multiple of " + std::to_string(kChunk));
+  if (o.threads < 1 || o.policy_delay < 1) throw std::invalid_argument("threads and policy_delay are at least 1");
+  for (const auto* hidden : {&o.actor_hidden, &o.critic_hidden}) {
+    if (hidden->size() >= policy::kMaxLayers)
+      throw std::invalid_argument("a network has at most " + std::to_string(policy::kMaxLayers) + " layers");
+    for (const int w : *hidden)
+      if (w < 1 || w > policy::kMaxWidth)
+        throw std::invalid_argument("a layer is 1 to " + std::to_string(policy::kMaxWidth) + " wide");
+  }
+}
+
+double first_weight(std::uint64_t seed, int network, int layer, int inputs, std::uint32_t number, double scale) {
+  const sim::RandomKey key{seed, static_cast<std::uint32_t>(network), static_cast<std::uint32_t>(layer),
+                           sim::Stream::weights};
+  const sim::UniformPair u = sim::uniform_pair(key, number / 2);
+  return scale / std::sqrt(inputs) * (2 * (number % 2 == 0 ? u.first : u.second) - 1);
+}
+
 template <class T>
 struct Learner<T>::Storage {
   LearnerOptions options;
@@ -71,6 +97,7 @@ struct Learner<T>::Storage {
   std::size_t parts;     // of the gradients
   AlignedArray<T> input_numbers, numbers, gradients, work;
   std::vector<ChunkSums<T>> sums;  // of each chunk
+  std::vector<std::byte> parcels;  // for other ranks
   std::ptrdiff_t work_size;
   LearnerCounters counters;
   UpdateMetrics metrics;
@@ -107,16 +134,12 @@ struct Learner<T>::Storage {
 
   T* weights_at(std::ptrdiff_t at, bool target) { return numbers.data() + (target ? count : 0) + at; }
 
-  /// Uniform within +-1/sqrt(inputs), as torch's nn.Linear; no bias.
   void start(const NetworkShape& net, std::ptrdiff_t at, int network) {
     each_weight(net, [&](int l, int i, int o, std::ptrdiff_t place) {
       if (i < 0) return;
-      const sim::RandomKey key{options.seed, static_cast<std::uint32_t>(network), static_cast<std::uint32_t>(l),
-                               sim::Stream::weights};
-      const auto number = static_cast<std::uint32_t>(o * net.widths[l] + i);
-      const sim::UniformPair u = sim::uniform_pair(key, number / 2);
-      const double bound = (l + 1 == net.layers ? options.last_layer_scale : 1) / std::sqrt(net.widths[l]);
-      const double w = bound * (2 * (number % 2 == 0 ? u.first : u.second) - 1);
+      const double w =
+          first_weight(options.seed, network, l, net.widths[l], static_cast<std::uint32_t>(o * net.widths[l] + i),
+                       l + 1 == net.layers ? options.last_layer_scale : 1);
       *weights_at(at + place, false) = *weights_at(at + place, true) = static_cast<T>(w);
     });
   }
@@ -131,6 +154,30 @@ struct Learner<T>::Storage {
     const T* from = weights_at(plan.actor_at(), target);
     each_weight(plan.actor, [&](int, int, int, std::ptrdiff_t place) { a.weights.push_back(from[place]); });
     return a;
+  }
+
+  /// Parts that are worked on here.
+  std::pair<std::size_t, std::size_t> own_parts() const {
+    return options.ranks != nullptr ? options.ranks->share_of(parts, options.ranks->rank())
+                                    : std::pair{std::size_t{0}, parts};
+  }
+  /// Hands the gradients and sums of all parts to all ranks, in one message.
+  void exchange() {
+    if (options.ranks == nullptr) return;
+    const std::size_t sent = static_cast<std::size_t>(plan.actor_learns ? count : plan.actor_at());
+    const std::size_t most = (sums.size() + parts - 1) / parts, row = sent * sizeof(T) + most * sizeof sums[0];
+    parcels.resize(parts * row);
+    const auto each = [&](const auto& copy) {
+      for (std::size_t part = 0; part < parts; ++part) {
+        std::byte* const parcel = parcels.data() + part * row;
+        copy(parcel, gradients.data() + static_cast<std::ptrdiff_t>(part) * count, sent * sizeof(T));
+        const std::size_t from = part * sums.size() / parts, to = (part + 1) * sums.size() / parts;
+        copy(parcel + sent * sizeof(T), &sums[from], (to - from) * sizeof sums[0]);
+      }
+    };
+    each([](std::byte* parcel, void* here, std::size_t bytes) { std::memcpy(parcel, here, bytes); });
+    options.ranks->share(parcels.data(), parts, row);
+    each([](std::byte* parcel, void* here, std::size_t bytes) { std::memcpy(here, parcel, bytes); });
   }
 
   /// Gradients of part `part`: of the chunks that share it, one after the other.
@@ -178,18 +225,11 @@ struct Learner<T>::Storage {
 
 template <class T>
 Learner<T>::Learner(const LearnerOptions& o) {
-  const bool privileged = o.shape.critic_observation > 0;
-  const Normaliser& critic_input = privileged ? o.critic_input : o.actor_input;
-  const int seen = privileged ? o.shape.critic_observation : o.shape.actor_observation;
-  const auto fits = [](const Normaliser& n, int inputs) {
-    return static_cast<int>(n.mean.size()) == inputs && static_cast<int>(n.scale.size()) == inputs && n.clip > 0;
-  };
-  if (!fits(o.actor_input, o.shape.actor_observation) || !fits(critic_input, seen))
-    throw std::invalid_argument("a normaliser has one mean and one scale for each input, and a clip above 0");
-  if (o.batch < kChunk || o.batch % kChunk != 0)
-    throw std::invalid_argument("a batch is a multiple of " + std::to_string(kChunk));
-  if (o.threads < 1 || o.policy_delay < 1) throw std::invalid_argument("threads and policy_delay are at least 1");
-
+  check_options(o);
+  if (o.layer_norm || o.weight_decay > 0 || o.gradient_clip > 0 || o.device != "cpu" ||
+      std::max(o.actor_activation, o.critic_activation) > policy::Activation::tanh)
+    throw std::invalid_argument("lanes learn neither layer norm, decay of weights, clipped gradients, elu nor silu");
+  const int seen = o.shape.critic_observation > 0 ? o.shape.critic_observation : o.shape.actor_observation;
   UpdatePlan<T> plan;
   plan.actor = network_shape(o.shape.actor_observation, o.actor_hidden, o.shape.action, o.actor_activation, true);
   plan.critic = network_shape(seen + o.shape.action, o.critic_hidden, 1, o.critic_activation, false);
@@ -240,10 +280,13 @@ void Learner<T>::update(const Replay& replay, double actor_rate, double critic_r
   const std::ptrdiff_t critic_shards = (actor_at + kShard - 1) / kShard;
   const std::ptrdiff_t shards = critic_shards + (s.plan.actor_learns ? (s.count - actor_at + kShard - 1) / kShard : 0);
 
-  io::parallel_for(s.parts + beside.items, s.options.threads, [&](std::size_t i, int thread) {
-    if (i < s.parts) s.work_on(i, replay, thread);
-    else beside.run(i - s.parts);
+  const auto [first, last] = s.own_parts();
+  const std::size_t own = last - first;
+  io::parallel_for(own + beside.items, s.options.threads, [&, first = first](std::size_t i, int thread) {
+    if (i < own) s.work_on(first + i, replay, thread);
+    else beside.run(i - own);
   });
+  s.exchange();
   io::parallel_for(static_cast<std::size_t>(shards), s.options.threads, [&](std::size_t k) {
     const auto i = static_cast<std::ptrdiff_t>(k);
     const bool of_actor = i >= critic_shards;

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "io/ranks.hpp"
 #include "learn/replay_buffer.hpp"
 #include "policy/actor_file.hpp"
 
@@ -43,8 +44,21 @@ struct LearnerOptions {
 
   std::uint64_t seed = 0;
   int threads = 1;
+  io::Ranks* ranks = nullptr;   ///< do their shares of every batch; none: all of it is done here
   std::string instruction_set;  ///< empty: the best one
+
+  // what LibTorch alone does
+  bool layer_norm = false;                     ///< in all networks, before hidden activations
+  double weight_decay = 0, gradient_clip = 0;  ///< AdamW's; largest norm of a gradient (0: none), the critics' together
+  std::string device = "cpu";                  ///< or "cuda"
 };
+
+/// std::invalid_argument for options that make no learner.
+void check_options(const LearnerOptions& options);
+
+/// The first weight of this number, output by output, of a layer: uniform within +-scale/sqrt(inputs), as torch's nn.Linear; biases
+/// are 0. `network`: 0 the actor's, then the critics'.
+double first_weight(std::uint64_t seed, int network, int layer, int inputs, std::uint32_t number, double scale);
 
 /// Further work for the threads of an update, behind its own: run(0) to run(items - 1), each once, in any order and at the
 /// same time. run must neither throw nor touch what the update reads.

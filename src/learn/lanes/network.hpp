@@ -69,7 +69,7 @@ FLAPPY_INLINE void put_ones(const NetworkShape& net, T* values) {
 }
 
 template <class T>
-FLAPPY_INLINE void activate(policy::Activation kind, int rows, T* at) {
+FLAPPY_INLINE void activate_rows(policy::Activation kind, int rows, T* at) {
   if (kind == policy::Activation::relu)
     for_rows<T>(rows, [&](std::ptrdiff_t i) { max(L<T>::load(at + i), L<T>(0)).store(at + i); });
   else for_rows<T>(rows, [&](std::ptrdiff_t i) { tanh(L<T>::load(at + i)).store(at + i); });
@@ -97,8 +97,8 @@ void forward(const NetworkShape& net, const T* weights, T* values) {
     T* to = rows_of(net, values, l + 1);
     multiply<T>(out, kRow, 1 + net.widths[l], {weights + net.weights[l], 1, padded(out)}, values + net.values[l], kRow,
                 to, kRow);
-    if (l + 1 < net.layers) activate(net.hidden, out, to);
-    else if (net.bounded) activate(policy::Activation::tanh, out, to);
+    if (l + 1 < net.layers) activate_rows(net.hidden, out, to);
+    else if (net.bounded) activate_rows(policy::Activation::tanh, out, to);
   }
 }
 

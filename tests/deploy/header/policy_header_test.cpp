@@ -23,7 +23,8 @@ using policy::Activation;
 using Words = std::vector<std::string>;
 
 /// The escape under an actor of random weights.
-rollout::FlyConfig escape(const std::vector<int>& hidden_widths, Activation hidden, const Words& overrides = {}) {
+rollout::FlyConfig escape(const std::vector<int>& hidden_widths, Activation hidden, const Words& overrides = {},
+                          bool layer_norm = false) {
   Words all = {"flight.duration_s=0.7", "task.success.keep.until_s=0.7", "flight.threads=1"};
   all.insert(all.end(), overrides.begin(), overrides.end());
   rollout::FlyConfig config = rollout::read_fly_config(test::source_path("configs/fly/escape.toml"), all);
@@ -39,11 +40,16 @@ rollout::FlyConfig escape(const std::vector<int>& hidden_widths, Activation hidd
   a.widths.insert(a.widths.end(), hidden_widths.begin(), hidden_widths.end());
   a.widths.push_back(flight::kActions);
   a.hidden = hidden;
+  a.layer_norm = layer_norm;
   std::mt19937 engine(5);
-  for (std::size_t layer = 0; layer + 1 < a.widths.size(); ++layer)
-    for (int i = 0; i < (a.widths[layer] + 1) * a.widths[layer + 1]; ++i)
-      a.weights.push_back(
-          static_cast<float>((static_cast<double>(engine()) / 0x1p31 - 1) * std::sqrt(3.0 / a.widths[layer])));
+  const auto random = [&](double size) {
+    a.weights.push_back(static_cast<float>((static_cast<double>(engine()) / 0x1p31 - 1) * size));
+  };
+  for (std::size_t layer = 0; layer + 1 < a.widths.size(); ++layer) {
+    for (int i = 0; i < (a.widths[layer] + 1) * a.widths[layer + 1]; ++i) random(std::sqrt(3.0 / a.widths[layer]));
+    if (layer_norm && layer + 2 < a.widths.size())
+      for (int i = 0; i < 2 * a.widths[layer + 1]; ++i) random(1);
+  }
   config.actor = std::make_shared<policy::Actor>(a);
   return config;
 }
@@ -84,10 +90,13 @@ std::vector<std::uint32_t> bits(const std::vector<float>& numbers) {
 
 TEST(PolicyHeader, ActsAsTheLanesToTheBit) {
   const Folder folder;
-  for (const auto& [widths, hidden] : {std::pair{std::vector<int>{32, 32}, Activation::relu},
-                                       std::pair{std::vector<int>{7, 40, 3, 5, 9}, Activation::tanh},
-                                       std::pair{std::vector<int>{}, Activation::relu}}) {
-    const rollout::FlyConfig config = escape(widths, hidden);
+  const std::vector<int> none;
+  for (const auto& [widths, hidden, layer_norm] : {std::tuple{std::vector<int>{32, 32}, Activation::relu, false},
+                                                   {{7, 40, 3, 5, 9}, Activation::tanh, false},
+                                                   {none, Activation::relu, false},
+                                                   {{12, 9}, Activation::elu, false},
+                                                   {{9, 300, 13}, Activation::silu, true}}) {
+    const rollout::FlyConfig config = escape(widths, hidden, {}, layer_norm);
     const policy::PolicyNetwork network = network_of(config);
     const policy::PolicyVectors flown = roll_out(config, 0, 40);
     ASSERT_GT(flown.action.size(), 4000u);
@@ -98,6 +107,10 @@ TEST(PolicyHeader, ActsAsTheLanesToTheBit) {
     const policy::PolicyVectors wild = corners(network, config.fleet.task.observation());
     EXPECT_EQ(bits(acts(*policy, wild.observation)), bits(wild.action));
 
+    if (hidden == Activation::elu || layer_norm) {
+      EXPECT_THROW(quantise(network, flown.observation), std::invalid_argument);
+      continue;
+    }
     const QuantisedNetwork whole = quantise(network, flown.observation);
     folder.write("q.h", header_of(config, whole, flown));
     const auto int8 = policy::load_policy(folder / "q.h", network.inputs(), network.outputs());
@@ -256,8 +269,8 @@ TEST(QuantisedPolicy, StaysNearTheActor) {
 #ifdef FLAPPY_HAVE_TORCH
 TEST(TorchScriptExport, ActsAsTheLanesWithinRounding) {
   const Folder folder;
-  for (const Activation hidden : {Activation::relu, Activation::tanh}) {
-    const rollout::FlyConfig config = escape({32, 32}, hidden);
+  for (const Activation hidden : {Activation::relu, Activation::tanh, Activation::elu, Activation::silu}) {
+    const rollout::FlyConfig config = escape({32, 32}, hidden, {}, hidden == Activation::silu);
     const policy::PolicyNetwork network = network_of(config);
     policy::PolicyVectors all = roll_out(config, 0, 40);
     append(all, corners(network, config.fleet.task.observation()));

@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "deploy/proof/board.hpp"
+#include "full.hpp"
 #include "io/temporary_folder.hpp"
 #include "refusal.hpp"
 
@@ -400,6 +401,7 @@ std::vector<Footprint> footprints_of(const Toy& toy) {
 }
 
 TEST(Footprints, GrowWithTheWeights) {
+  if (!test::full()) GTEST_SKIP() << "takes ten seconds";
   Toy small, large, deep;
   small.hidden = 32;
   large.hidden = 64;

@@ -229,8 +229,10 @@ TEST(Learner, refuses_what_makes_no_learner) {
   refused([](LearnerOptions& o) { o.batch = 0; });
   refused([](LearnerOptions& o) { o.threads = 0; });
   refused([](LearnerOptions& o) { o.policy_delay = 0; });
-  refused([](LearnerOptions& o) { o.actor_hidden = {300}; });
-  refused([](LearnerOptions& o) { o.critic_hidden = {8, 8, 8, 8, 8, 8}; });
+  refused([](LearnerOptions& o) { o.actor_hidden = {policy::kMaxWidth + 1}; });
+  refused([](LearnerOptions& o) { o.critic_hidden = std::vector<int>(policy::kMaxLayers, 8); });
+  refused([](LearnerOptions& o) { o.layer_norm = true; });
+  refused([](LearnerOptions& o) { o.critic_activation = policy::Activation::silu; });
   refused([](LearnerOptions& o) { o.actor_input.mean.pop_back(); });
   refused([](LearnerOptions& o) { o.shape.critic_observation = 5; });
   refused([](LearnerOptions& o) { o.instruction_set = "mips"; });

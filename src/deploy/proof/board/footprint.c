@@ -2,7 +2,7 @@
 #include FOOTPRINT_HEADER
 
 /* The caller's own, in every one of the programs. */
-float observation[64], action[4];
+float observation[320], action[4];
 float *volatile kept;
 volatile int result;
 
