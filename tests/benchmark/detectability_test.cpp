@@ -132,6 +132,7 @@ std::array<double, 6> left(const gap::PredictedFlight& flight, const Perturbatio
 // drifts in them, and what the record gets wrong of the torso's motion, adds half of that. Without the effect that it flew
 // with, what is left is several times as much.
 TEST(ResetPrediction, KnowsItsOwnFlight) {
+  if (!test::full()) GTEST_SKIP() << "takes ten seconds: with --full";
   for (const std::vector<BlindEffect>& effects : {std::vector<BlindEffect>{{"coulomb_friction", 1}, {"body_drag", 1}},
                                                   {{"wind", 2}},            // its gusts come as they came
                                                   {{"battery_sag", 4}}}) {  // empty by as much as the trim took

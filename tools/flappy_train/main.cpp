@@ -130,16 +130,15 @@ void train_seeds(io::Program& program, const std::vector<std::uint64_t>& seeds, 
   if (!program.writes()) return;
   std::vector<SeedCurve> curves;
   Json all = Json::array();
-  bool stopped = false;
   for (const std::uint64_t seed : seeds) {
     const fs::path summary = folder_of(seed) / "summary.json";
     if (!fs::exists(summary)) continue;
     all.push_back(Json::parse(io::read_text(summary)));
-    stopped |= all.back().at("stopped").get<bool>();
+    if (all.back().at("stopped").get<bool>()) continue;
     curves.push_back(read_seed_curve(folder_of(seed), seed, "success_rate"));
   }
   program.write_json(all);
-  if (stopped || curves.size() < seeds.size()) {
+  if (curves.size() < seeds.size()) {
     std::printf("stopped with %zu of %zu seeds; go on: the same command\n", curves.size(), seeds.size());
     return;
   }

@@ -233,6 +233,7 @@ const std::string kTurns =
     "{t_s=2.5,x_m=0.4,y_m=0.1,z_m=0.4,heading_rad=-2.0},{t_s=3.5,x_m=0.4,y_m=-0.2,z_m=0.4,heading_rad=-4.0}]";
 
 TEST(ControllerHeader, FollowsAPathThroughLosses) {
+  if (!test::full()) GTEST_SKIP() << "onboard_test flies losses and late samples, too: with --full";
   const Seen seen =
       fly_beside(config_of("waypoints",
                            {kEveryPart, kTurns, "sensors.mocap.loss_probability=0.05", "sensors.mocap.loss_length=4.0",
@@ -243,6 +244,7 @@ TEST(ControllerHeader, FollowsAPathThroughLosses) {
 }
 
 TEST(ControllerHeader, WaitsForALateImu) {
+  if (!test::full()) GTEST_SKIP() << "onboard_test flies losses and late samples, too: with --full";
   fly_beside(config_of("figure_eight",
                        {"sensors.imu.latency_s=0.004", "sensors.mocap.latency_s=0.0", "sensors.imu.rate_hz=400.0"}),
              4, 1500);

@@ -232,6 +232,7 @@ TEST(Proof, ContractionIsSeen) {
 }
 
 TEST(Proof, WhatGoesWrongIsARow) {
+  if (!test::full()) GTEST_SKIP() << "takes ten seconds: with --full";
   Toy wrong;
   wrong.off = 0.01F;
   for (const auto& row : proof_of(wrong, vectors_of(wrong, 3))) {

@@ -8,6 +8,7 @@
 
 #include "blind/flights.hpp"
 #include "flightlog/check/synthetic_log.hpp"
+#include "full.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::flightlog {
@@ -243,6 +244,7 @@ TEST(DataFaults, OfFlights) {
 }
 
 TEST(DataFaults, AreNotEffects) {
+  if (!test::full()) GTEST_SKIP() << "takes ten seconds: with --full";
   for (const char* effect : {"vibration_rectification", "stop_compliance", "com_offset", "driver_dead_zone"})
     EXPECT_EQ(describe(data_faults(blind_log(7, 0, effect), "a")), "") << effect;
   // where what is thought plausible of sensors ends; a rectification that large bends the mean force as another attitude would
