@@ -31,12 +31,12 @@ class Maker {
     io::make_folder(sealed_);
     io::make_folder(command_.out / "cases");
     std::optional<io::FolderLock> lock;
-    if (writes()) {
+    if (io::writes(command_.ranks)) {
       lock.emplace(command_.out);
       agree_with_what_is_there();
     }
-    if (command_.ranks != nullptr) command_.ranks->wait();
-    agree_with_what_is_there();
+    io::wait(command_.ranks);
+    if (!lock) agree_with_what_is_there();
     if (fs::exists(command_.out / "manifest.json")) {
       std::printf("%s: made already\n", command_.out.c_str());
       return true;
@@ -46,12 +46,11 @@ class Maker {
       if (!fs::exists(label_file(p))) open.push_back(&p);
     const bool all =
         work_through("flying", open.size(), command_.threads, command_.ranks, [&](std::size_t i) { make(*open[i]); });
-    if (all && writes()) seal();
+    if (all && io::writes(command_.ranks)) seal();
     return all;
   }
 
  private:
-  bool writes() const { return command_.ranks == nullptr || command_.ranks->rank() == 0; }
   fs::path label_file(const PlannedCase& p) const { return sealed_ / (number_text(p.number) + ".json"); }
   fs::path case_folder(const PlannedCase& p) const { return command_.out / "cases" / number_text(p.number); }
 

@@ -24,8 +24,6 @@ namespace fs = std::filesystem;
 /// Made when the labels are opened: no prediction is accepted any more.
 fs::path true_fits(const ScoreCommand& command) { return command.folder / "true_fits"; }
 
-bool writes(const ScoreCommand& command) { return command.ranks == nullptr || command.ranks->rank() == 0; }
-
 // ---- phase 1: nothing below reads what is sealed
 
 class Predictions {
@@ -68,8 +66,8 @@ class Predictions {
       io::write_atomically(file_of(c.number), json.dump(1) + "\n");
     });
     if (!all) return false;
-    if (writes(command_)) seal();
-    if (command_.ranks != nullptr) command_.ranks->wait();  // before anybody opens a label
+    if (io::writes(command_.ranks)) seal();
+    io::wait(command_.ranks);  // before anybody opens a label
     return true;
   }
 
@@ -194,7 +192,7 @@ std::string case_list(const Manifest& manifest, const std::map<std::size_t, Labe
 
 Json score_bench(const ScoreCommand& command) {
   std::optional<io::FolderLock> lock;
-  if (writes(command)) lock.emplace(command.folder);
+  if (io::writes(command.ranks)) lock.emplace(command.folder);
   const Manifest manifest = read_manifest(command.folder);
   const Predictions predictions(command, manifest);
   predictions.check_inputs();
@@ -235,7 +233,7 @@ Json score_bench(const ScoreCommand& command) {
           (undetectable.empty() ? "" : " (" + io::joined(undetectable) + ")") + ".\n";
   if (commits.size() > 1) text += "Predicted by " + std::to_string(commits.size()) + " different versions.\n";
   std::fputs(text.c_str(), stdout);
-  if (!writes(command)) return nullptr;
+  if (!io::writes(command.ranks)) return nullptr;
   io::write_atomically(command.folder / "score.md", text);
   io::write_atomically(command.folder / "score.csv", case_list(manifest, labels, cases, predictions));
 

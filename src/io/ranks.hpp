@@ -60,6 +60,23 @@ class Ranks {
   std::vector<std::vector<std::byte>> gather(std::span<const std::byte> mine);
 };
 
+// What a process asks of its ranks, where none stand for itself alone.
+
+/// Whether it is the one that writes what all have found.
+inline bool writes(const Ranks* ranks) { return ranks == nullptr || ranks->rank() == 0; }
+/// Its share of `count` things: from first to last.
+inline std::pair<std::size_t, std::size_t> own_share(const Ranks* ranks, std::size_t count) {
+  return ranks == nullptr ? std::pair{std::size_t{0}, count} : ranks->share_of(count, ranks->rank());
+}
+/// Whether piece `i` of many, which are dealt out in turn, is its.
+inline bool is_own(const Ranks* ranks, std::size_t i) {
+  return ranks == nullptr || i % static_cast<std::size_t>(ranks->size()) == static_cast<std::size_t>(ranks->rank());
+}
+inline void wait(Ranks* ranks) {
+  if (ranks != nullptr) ranks->wait();
+}
+inline bool any(Ranks* ranks, bool here) { return ranks == nullptr ? here : ranks->any(here); }
+
 /// Meets the other ranks at the address and one above the port of `rank`: a launcher of its own may serve at the port itself. The
 /// rendezvous listens on every interface of rank 0's machine, whatever its address says, with nothing that keeps strangers out.
 /// A rank that is not heard of any more ends this process: one line, exit code kRankLost. InputError where the address is

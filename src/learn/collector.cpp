@@ -26,7 +26,6 @@ Collector::Collector(const TrainConfig& config, io::Ranks* ranks)
       ranks_(ranks),
       fly_(of_training(config)),
       fleet_(config.flappers, fly_.vehicle, fly_.fleet),
-      last_item_(fleet_.blocks()),
       inputs_(fly_.fleet.task.observation().size()),
       kept_(config.return_steps),
       paid_ticks_(static_cast<std::uint32_t>(
@@ -37,7 +36,7 @@ Collector::Collector(const TrainConfig& config, io::Ranks* ranks)
       rewards_(config.flappers * kept_),
       staged_(fleet_.blocks()),
       seconds_(fleet_.blocks()) {
-  if (ranks_ != nullptr) std::tie(first_item_, last_item_) = ranks_->share_of(fleet_.blocks(), ranks_->rank());
+  std::tie(first_item_, last_item_) = io::own_share(ranks_, fleet_.blocks());
   if (fly_.fleet.task.start.settled)
     pool_ = rollout::settle<float>(fly_.fleet, config.vehicles, rollout::kHover_s,
                                    [&](std::uint32_t flapper) { return fly_.vehicle_of(flapper); });

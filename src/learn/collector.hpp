@@ -58,7 +58,7 @@ class Collector {
   io::Ranks* ranks_;
   rollout::FlyConfig fly_;
   flight::Fleet<float> fleet_;
-  std::size_t first_item_ = 0, last_item_;  // blocks that are flown here
+  std::size_t first_item_ = 0, last_item_ = 0;  // blocks that are flown here
   std::vector<flight::Snapshot<float>> pool_;
   std::size_t inputs_, kept_;
   std::uint32_t paid_ticks_;

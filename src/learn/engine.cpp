@@ -84,8 +84,7 @@ class TorchEngine : public LearnerEngine {
     const auto step = [](double rate, double beta1, double beta2) {
       return TorchLearner::Step{rate, 1 / (1 - beta1), 1 / std::sqrt(1 - beta2)};
     };
-    const auto [first, last] =
-        o_.ranks != nullptr ? o_.ranks->share_of(o_.batch, o_.ranks->rank()) : std::pair{std::size_t{0}, o_.batch};
+    const auto [first, last] = io::own_share(o_.ranks, o_.batch);
     const std::size_t actions = noise_.size() / o_.batch;
     const TorchLearner::Batch batch{
         std::span(rows_).subspan(first, last - first),

@@ -112,7 +112,7 @@ class Trainer {
     options.ranks = ranks;
     return options;
   }
-  bool writes() const { return ranks_ == nullptr || ranks_->rank() == 0; }
+  bool writes() const { return io::writes(ranks_); }
   /// One action of every flapper, and meanwhile the updates of this step. False: a rank wants it to be the last.
   bool step() {
     const auto from = Clock::now();
@@ -432,7 +432,7 @@ std::optional<fs::path> unfinished_run_in(const fs::path& folder) {
 
 TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
   io::make_folder(options.folder);
-  const bool writes = options.ranks == nullptr || options.ranks->rank() == 0;
+  const bool writes = io::writes(options.ranks);
   std::optional<io::FolderLock> lock;
   if (writes) lock.emplace(options.folder);
   if (writes && !options.from) refuse_run_in(options.folder);

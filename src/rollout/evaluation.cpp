@@ -147,8 +147,7 @@ Evaluator::Evaluator(FlyConfig config, const EvaluationOptions& options)
   if (c.duration_s < needs_s - 1e-9)
     refuse("is judged until " + io::shortest_digits(needs_s) + " s, but flown for " + io::shortest_digits(c.duration_s),
            "flight.duration_s of " + io::shortest_digits(needs_s) + " or more");
-  if (options_.ranks == nullptr) return;
-  const auto [first, last] = options_.ranks->share_of(options_.count, options_.ranks->rank());
+  const auto [first, last] = io::own_share(options_.ranks, options_.count);
   options_.count = last - first;
   options_.first_flapper += static_cast<std::uint32_t>(first);
 }

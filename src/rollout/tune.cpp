@@ -98,8 +98,7 @@ double cost_of_trial(const TuneConfig& config, const Trial& trial, const flight:
   fly.fleet.controller = controller;
   fly.fleet.seed = config.seed;
   fly.duration_s = config.duration_s;
-  const auto [first, last] = config.ranks != nullptr ? config.ranks->share_of(trial.count, config.ranks->rank())
-                                                     : std::pair{std::size_t{0}, trial.count};
+  const auto [first, last] = io::own_share(config.ranks, trial.count);
   fly.fleet.first_flapper += static_cast<std::uint32_t>(first);
   std::vector<Score> scores(trial.count);
   if (last > first) judge(config, std::move(fly), std::span(scores).subspan(first, last - first));

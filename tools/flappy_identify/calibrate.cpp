@@ -40,8 +40,7 @@ Json run(const Settings& s, io::Program& program) {
                                          io::sha256(io::read_text(s.truth) + io::read_text(s.source.vehicle) +
                                                     io::read_text(s.fit.config) + s.fit.method) +
                                          "\n");
-  const auto [first, last] =
-      ranks != nullptr ? ranks->share_of(s.seeds, ranks->rank()) : std::pair{std::size_t{0}, std::size_t{s.seeds}};
+  const auto [first, last] = io::own_share(ranks, s.seeds);
   io::stop_on_interrupt();
   io::ProgressLine line("fitted");
   for (std::size_t k = first; k < last && !io::interrupted(); ++k) {

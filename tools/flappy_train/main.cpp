@@ -86,7 +86,7 @@ TrainSummary train_one(const TrainConfig& config, TrainOptions options) {
   bool said = false;
   options.keep_going = [&](const TrainProgress& p) {
     if (!std::exchange(said, true)) {
-      if (options.ranks == nullptr || options.ranks->rank() == 0) io::log_into(options.folder);
+      if (io::writes(options.ranks)) io::log_into(options.folder);
       const TrainCosts costs = costs_of(config);
       std::printf("%s: seed %llu, %d threads, %.0f MB of memory, at most %.0f MB on disk\n", options.folder.c_str(),
                   static_cast<unsigned long long>(config.seed), config.threads,
@@ -118,15 +118,14 @@ void train_seeds(io::Program& program, const std::vector<std::uint64_t>& seeds, 
   }
   io::Ranks* const ranks = program.ranks(agreed);
   for (std::size_t i = 0; i < seeds.size() && !io::interrupted(); ++i) {
-    if (ranks != nullptr && i % static_cast<std::size_t>(ranks->size()) != static_cast<std::size_t>(ranks->rank()))
-      continue;
+    if (!io::is_own(ranks, i)) continue;
     options.folder = folder_of(seeds[i]);
     options.from = unfinished_run_in(options.folder);
     if (fs::exists(options.folder / "summary.json") && !options.from) continue;
     train_one(config_of(seeds[i]), options);
     options.started = std::chrono::steady_clock::now();
   }
-  if (ranks != nullptr) ranks->wait();
+  io::wait(ranks);
   if (!program.writes()) return;
   std::vector<SeedCurve> curves;
   Json all = Json::array();

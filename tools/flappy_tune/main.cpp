@@ -50,7 +50,7 @@ int main(int argc, char** argv) {
       if (program.writes())
         io::write_atomically(
             out, controller_text(r.best, "Tuned by flappy-tune, generation " + std::to_string(r.generations) + "."));
-      return !(config.ranks != nullptr ? config.ranks->any(io::interrupted()) : io::interrupted());
+      return !io::any(config.ranks, io::interrupted());
     });
     program.write_json({{"start_cost", before}, {"cost", result.cost}, {"generations", generation}});
   });

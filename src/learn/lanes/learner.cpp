@@ -157,10 +157,7 @@ struct Learner<T>::Storage {
   }
 
   /// Parts that are worked on here.
-  std::pair<std::size_t, std::size_t> own_parts() const {
-    return options.ranks != nullptr ? options.ranks->share_of(parts, options.ranks->rank())
-                                    : std::pair{std::size_t{0}, parts};
-  }
+  std::pair<std::size_t, std::size_t> own_parts() const { return io::own_share(options.ranks, parts); }
   /// Hands the gradients and sums of all parts to all ranks, in one message.
   void exchange() {
     if (options.ranks == nullptr) return;
