@@ -352,6 +352,13 @@ std::array<double, 3> Fleet<T>::gyro_bias_rad_s(std::size_t i) const {
 }
 
 template <class T>
+std::pair<std::array<double, 3>, std::array<double, 3>> Fleet<T>::felt(std::size_t i) const {
+  const auto [f, lane] = storage_->at(i);
+  const auto [gyro, accel] = get<Imu<double>>(f.imu, lane).low_passed;
+  return {{gyro.x, gyro.y, gyro.z}, {accel.x, accel.y, accel.z}};
+}
+
+template <class T>
 void Fleet<T>::count_cycles(std::uint64_t* cycles) {
   storage_->plan.cycles = cycles;
 }

@@ -119,6 +119,8 @@ class Fleet {
   /// Squared innovations of the last pose over their variance: angle and position, three degrees of freedom each.
   std::pair<double, double> innovation(std::size_t i) const;
   std::array<double, 3> gyro_bias_rad_s(std::size_t i) const;  ///< true
+  /// What the IMU means of late, without noise and bias: rates, rad/s, and specific force, m/s^2, in B.
+  std::pair<std::array<double, 3>, std::array<double, 3>> felt(std::size_t i) const;
 
   sim::Batch<T>& batch();
   const sim::Batch<T>& batch() const;

@@ -548,4 +548,10 @@ Table Config::root() const { return Table({document_, &document_->section(docume
 
 std::string Config::resolved() const { return toml_text(document_->root); }
 
+std::string Config::resolved_without(std::string_view table) const {
+  toml::table rest = document_->root;
+  rest.erase(table);
+  return toml_text(rest);
+}
+
 }  // namespace flappy::io

@@ -107,6 +107,8 @@ class Config {
   /// TOML text of everything, overrides applied and defaults filled in; it reads identically when parsed
   /// under the same name. Relative file names stay as written.
   std::string resolved() const;
+  /// The same without a table of the root, which is no part of what is done.
+  std::string resolved_without(std::string_view table) const;
 
  private:
   explicit Config(std::shared_ptr<detail::Document> document);

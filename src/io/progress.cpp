@@ -3,9 +3,11 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <thread>
 #include <utility>
 
 namespace flappy::io {
@@ -48,6 +50,12 @@ bool interrupted() { return interrupted_flag != 0; }
 
 double steady_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void sleep_until(double steady_s) {
+  constexpr double kLook_s = 0.1;
+  for (double left_s; (left_s = steady_s - steady_seconds()) > 0 && !interrupted();)
+    std::this_thread::sleep_for(std::chrono::duration<double>(std::min(left_s, kLook_s)));
 }
 
 void TimeLeft::add(double now_s, double done) {

@@ -32,6 +32,8 @@ class TimeLeft {
 
 /// Seconds since some moment, on a clock that nobody sets.
 double steady_seconds();
+/// On that clock; returns at once where it has passed, and early upon an interrupt.
+void sleep_until(double steady_s);
 
 /// "flown 43 %, 12 s left": one line on a terminal that is written over at most 5 times a second; elsewhere a line of its
 /// own at most every `plain_every_s`, none with infinity.

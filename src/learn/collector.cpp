@@ -135,6 +135,7 @@ void Collector::emit(std::size_t i, std::size_t item, const float* next, bool te
 
 bool Collector::end(Replay& replay, bool wants_end) {
   fleet_.end();
+  if (fly_.watch) rollout::show(*fly_.watch, fleet_);
   const TransitionLayout& at = replay.layout();
   const auto add = [&](std::span<const float> rows) {
     for (const float* row = rows.data(); row != rows.data() + rows.size(); row += at.row)

@@ -15,7 +15,7 @@ using Overrides = std::vector<std::string>;
 
 /// What a training configuration says itself; overrides of other keys go to what it flies.
 const Overrides kOwn = {"schema",  "fly",    "seed",  "threads",  "observation", "networks",
-                        "collect", "reward", "learn", "evaluate", "checkpoint"};
+                        "collect", "reward", "learn", "evaluate", "checkpoint",  "dds"};
 
 std::pair<Overrides, Overrides> routed(const Overrides& overrides) {
   std::pair<Overrides, Overrides> own_and_flown;
@@ -44,7 +44,7 @@ class Reader {
       : main_(io::Config::load(path, own)), root_(main_.root()) {
     root_.schema(1);
     root_.accept({"schema", "fly", "seed", "threads", "networks", "observation", "collect", "reward", "learn",
-                  "evaluate", "checkpoint"});
+                  "evaluate", "checkpoint", "dds"});
     c_.fly = rollout::read_fly_config(root_.file("fly"), flown);
   }
 
@@ -58,6 +58,7 @@ class Reader {
     read_networks();
     read_collection();
     read_learning();
+    if (root_.has("dds")) c_.fly.dds = io::read_dds_config(root_);
     root_.finish();
     c_.fly.fleet.batch.threads = c_.threads;
     c_.learner.seed = c_.seed;
@@ -176,7 +177,7 @@ class Reader {
     };
     c_.resolved["fly.toml"] = with(c_.resolved["fly.toml"], "fly.toml", {"actor=\"../best.json\""});
     std::string all;
-    c_.resolved["train.toml"] = with(main_.resolved(), "train.toml", {"fly=\"fly.toml\"", "threads=0"});
+    c_.resolved["train.toml"] = with(main_.resolved_without("dds"), "train.toml", {"fly=\"fly.toml\"", "threads=0"});
     for (const auto& [name, text] : c_.resolved) all += name + "\n" + text;
     c_.sha256 = io::sha256(all);
   }

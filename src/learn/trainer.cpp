@@ -35,7 +35,8 @@ class Trainer {
         engine_(make_engine(config.engine, with_ranks(config.learner, options.ranks))),
         learner_(*engine_),
         replay_(config.learner.shape, config.replay),
-        evaluator_(config.fly, {config.evaluate_vehicles, rollout::kValidationFlappers, 1024, options.ranks}),
+        evaluator_(rollout::unwatched(config.fly),
+                   {config.evaluate_vehicles, rollout::kValidationFlappers, 1024, options.ranks}),
         collector_(config, options.ranks) {
     if (options.init) start_from(*options.init);
     actor_ = std::make_shared<policy::Actor>(named(learner_.actor()));

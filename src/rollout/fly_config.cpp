@@ -99,12 +99,13 @@ class Reader {
   FlyConfig read() {
     root_.schema(1);
     root_.accept({"schema", "precision", "flight", "world", "constant_input", "excitation", "log", "vehicle", "task",
-                  "sensors", "controller", "randomisation", "actor"});
+                  "sensors", "controller", "randomisation", "actor", "dds"});
     c_.precision = root_.choice("precision", {"float", "double"});
     read_flight();
     c_.fleet.batch.world = read_world(root_);
     c_.excitation = flight::read_excitation(root_, c_.duration_s);
     c_.log = read_log(root_, c_.fleet.control_hz);
+    c_.dds = io::read_dds_config(root_);
     read_files();
     if (root_.has("actor")) c_.actor = fitting_actor(root_, c_.fleet.task);
     root_.finish();
@@ -213,7 +214,7 @@ class Reader {
       c_.resolved["task.toml"] =
           io::Config::parse(c_.resolved["task.toml"], "task.toml", {"path.file=" + io::toml_string(name)}).resolved();
     }
-    c_.resolved["fly.toml"] = io::Config::parse(main_.resolved(), "fly.toml", names).resolved();
+    c_.resolved["fly.toml"] = io::Config::parse(main_.resolved_without("dds"), "fly.toml", names).resolved();
   }
 
   std::map<std::string, Overrides> to_;
@@ -230,6 +231,8 @@ model::Vehicle FlyConfig::vehicle_of(std::uint32_t flapper, std::uint32_t episod
   for (const auto& [id, values] : added_effects) v.effects[id] = values;
   return v;
 }
+
+FlyConfig unwatched(FlyConfig config) { return config.watch.reset(), config; }
 
 FlyConfig read_fly_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
   return Reader(path, overrides).read();

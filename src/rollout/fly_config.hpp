@@ -10,6 +10,7 @@
 //   [constant_input]  and [[excitation]]: excitation.hpp
 //   [log.power]       battery_nominal_V, rate_hz, latency_s, voltage_noise_V, current_noise_A
 //   [log.wings]       rate_hz, noise_rad
+//   [dds]             io/dds_config.hpp; no part of what is flown, so `resolved` leaves it out
 //
 // An override "controller.attitude.pitch.p=4" belongs to the file of that name; "controller=other.toml" replaces it.
 #pragma once
@@ -21,6 +22,8 @@
 #include "flight/excitation.hpp"
 #include "flight/fleet.hpp"
 #include "flightlog/flight_log.hpp"
+#include "io/dds_config.hpp"
+#include "rollout/watch.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::rollout {
@@ -46,6 +49,8 @@ struct FlyConfig {
   flight::Excitation excitation;
   LogOptions log;
   std::shared_ptr<const policy::Actor> actor;
+  io::DdsConfig dds;
+  std::shared_ptr<Watch> watch;  ///< is shown flappers as they fly
   /// Texts of the files that were read, overrides applied and defaults filled in, by name; fly.toml names the others.
   /// Actors and scripts stay where they are.
   std::map<std::string, std::string> resolved;
@@ -53,6 +58,9 @@ struct FlyConfig {
   /// The vehicle of a flapper: another one each, in each of its episodes, where they are randomised.
   model::Vehicle vehicle_of(std::uint32_t flapper, std::uint32_t episode = 0) const;
 };
+
+/// The same, shown to nobody.
+FlyConfig unwatched(FlyConfig config);
 
 /// io::InputError for whatever is missing, unknown, out of range or does not fit together.
 FlyConfig read_fly_config(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});

@@ -331,6 +331,11 @@ void Recorder<T>::record() {
 }
 
 template <class T>
+const flightlog::FlightLog& Recorder<T>::so_far() const {
+  return storage_->log;
+}
+
+template <class T>
 std::optional<flightlog::FlightLog> Recorder<T>::log() const {
   if (!storage_->complete()) return {};
   return storage_->log;

@@ -36,6 +36,8 @@ class Recorder {
 
   /// After each control period.
   void record();
+  /// All samples so far.
+  const flightlog::FlightLog& so_far() const;
   /// What was recorded so far; nothing before every stream has samples at one time.
   std::optional<flightlog::FlightLog> log() const;
   /// Writes log and truth. False, and no log, if the flight ended before every stream had samples at one time.

@@ -64,6 +64,7 @@ void Rollout<T>::step() {
   if (policy_ != nullptr && tick_ % config_.fleet.task.action_repeat == 0) act();
   fleet_.step();
   ++tick_;
+  if (config_.watch) show(*config_.watch, fleet_);
   if (!recorders_.empty()) each([&](std::size_t i) { recorders_[i].record(); });
 }
 

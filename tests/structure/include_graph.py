@@ -33,6 +33,9 @@ ROOMS = {
     "gap/evidence": BASE | {"flightlog", "gap/replay"},
     "gap/localise": BASE | {"flightlog", "gap/replay", "gap/evidence"},
     "gap/diagnose": ROLLOUT | {"gap/replay", "gap/evidence", "gap/localise"},
+    "server/dds": {"io", "flightlog", "flightlog/ros"},
+    "server/telemetry": ROLLOUT | {"server/dds"},
+    "server/sitl": ROLLOUT | {"server/dds", "server/telemetry"},
     "blind": FLIGHT | {"flightlog"},
     "benchmark": GAP | {"blind", "benchmark/predict"},
     "benchmark/predict": GAP,  # answers the benchmark's questions, and knows nothing of who makes them

@@ -14,6 +14,7 @@
 #include "io/toml_writer.hpp"
 #include "model/effects/registry.hpp"
 #include "rollout/evaluation.hpp"
+#include "server/telemetry/telemetry.hpp"
 
 namespace flappy::eval {
 namespace {
@@ -90,14 +91,14 @@ class Evaluation {
                  .first_flapper = request.stream == "test" ? rollout::kTestFlappers : rollout::kValidationFlappers,
                  .ranks = request.ranks},
         evaluator_(config, options_),
-        nominal_(rollout::nominal(config), nominal_options()) {}
+        nominal_(rollout::nominal(rollout::unwatched(config)), nominal_options()) {}
 
   Column fly_policy(const rollout::Agent& agent) { return fly("policy", evaluator_, nominal_, agent); }
 
   /// The vehicles of the policy, hovering under this controller and flown by it alone.
   Column fly_alone(const char* name, const Controller& controller) {
     if (controller.kind == config_.fleet.controller.kind) return fly(name, evaluator_, nominal_, {});
-    FlyConfig other = config_;
+    FlyConfig other = rollout::unwatched(config_);
     other.fleet.controller = controller;
     rollout::Evaluator evaluator(other, options_), nominal(rollout::nominal(other), nominal_options());
     return fly(name, evaluator, nominal, {});
@@ -394,12 +395,13 @@ void evaluate(Request request, io::Program& program) {
     if (kind != ".json" && kind != ".pt" && kind != ".h")
       throw io::InputError(request.policy + ": is no policy; accepted: " + kPolicies);
   }
-  const FlyConfig config = read_config(request);
+  FlyConfig config = read_config(request);
   std::string agreed = "episodes: " + std::to_string(request.episodes) + "\n";
   if (const fs::path file = fs::is_directory(path) ? path / "best.json" : path; fs::exists(file))
     agreed += "policy: " + io::sha256(io::read_text(file)) + "\n";
   for (const auto& [name, text] : config.resolved) agreed += name + ": " + io::sha256(text) + "\n";
   request.ranks = program.ranks(agreed);
+  if (program.writes()) config.watch = server::telemetry_of(config.dds, config.fleet.sensors);
   const flight::Task& task = config.fleet.task;
   std::unique_ptr<const policy::Policy> policy;
   if (kind == ".pt" || kind == ".h")

@@ -8,6 +8,7 @@
 #include "io/progress.hpp"
 #include "io/statistics.hpp"
 #include "rollout/fly.hpp"
+#include "server/telemetry/telemetry.hpp"
 
 namespace flappy::fly {
 namespace {
@@ -160,11 +161,14 @@ int main(int argc, char** argv) {
       app.option("--seed", seed, "in place of flight.seed").range(std::uint64_t{0}, std::uint64_t{INT64_MAX});
   return program.run(argc, argv, [&] {
     if (seeded.given()) overrides.push_back("flight.seed=" + std::to_string(seed));
-    const rollout::FlyConfig config = rollout::read_fly_config(config_name, overrides);
+    rollout::FlyConfig config = rollout::read_fly_config(config_name, overrides);
+    config.watch = server::telemetry_of(config.dds, config.fleet.sensors);
     options.log_folder = log;
     io::ProgressLine progress("flown");
+    const double started_s = io::steady_seconds();
     options.keep_going = [&](double done) {
       progress.show(done);
+      if (config.watch && config.dds.pace > 0) io::sleep_until(started_s + done * config.duration_s / config.dds.pace);
       return !io::interrupted();
     };
     io::stop_on_interrupt();

@@ -15,6 +15,7 @@
 #include "learn/checkpoint.hpp"
 #include "learn/learning_curve.hpp"
 #include "learn/trainer.hpp"
+#include "server/telemetry/telemetry.hpp"
 
 namespace flappy::train {
 namespace {
@@ -81,7 +82,15 @@ fs::path config_of(const fs::path& run) {
   return config;
 }
 
-TrainSummary train_one(const TrainConfig& config, TrainOptions options) {
+server::TrainingSample sample_of(const fs::path& run, const TrainProgress& p) {
+  return {run.filename().string(), p.update,  p.updates,       p.episodes,       p.env_steps,
+          p.mean_return,           p.success, p.updates_per_s, p.env_steps_per_s};
+}
+
+TrainSummary train_one(TrainConfig config, TrainOptions options) {
+  const auto telemetry =
+      io::writes(options.ranks) ? server::telemetry_of(config.fly.dds, config.fly.fleet.sensors) : nullptr;
+  config.fly.watch = telemetry;
   io::ProgressLine line("trained");
   bool said = false;
   options.keep_going = [&](const TrainProgress& p) {
@@ -93,6 +102,7 @@ TrainSummary train_one(const TrainConfig& config, TrainOptions options) {
                   static_cast<double>(costs.memory_bytes) / 1e6, static_cast<double>(costs.disk_bytes) / 1e6);
       std::fflush(stdout);
     }
+    if (telemetry) telemetry->show(sample_of(options.folder, p));
     if (p.evaluated) io::log(io::LogLevel::info, "update " + std::to_string(p.update) + ": " + words(p));
     if (line.due()) line.show(static_cast<double>(p.update) / static_cast<double>(p.updates), words(p));
     return !io::interrupted();

@@ -1,0 +1,43 @@
+#include "rollout/watch.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace flappy::rollout {
+namespace {
+
+constexpr std::uint32_t kStream = std::uint32_t{1}
+                                  << 30;  // numbers of flappers in a stream, as evaluation.hpp deals them out
+
+}  // namespace
+
+Watch::Watch(const std::vector<std::uint32_t>& flappers) : size_(flappers.size()) {
+  if (size_ > kMost) throw std::invalid_argument("too many flappers to watch");
+  for (std::size_t i = 0; i < size_; ++i) flappers_[i] = flappers[i];
+}
+
+template <class T>
+void show(Watch& watch, const flight::Fleet<T>& fleet) {
+  const std::uint32_t first = fleet.options().first_flapper % kStream;
+  for (std::size_t slot = 0; slot < watch.size(); ++slot) {
+    const std::uint32_t number = watch.flapper(slot);
+    if (number < first || number - first >= fleet.size()) continue;
+    const std::size_t i = number - first;
+    FlightSample s;
+    s.slot = static_cast<std::uint32_t>(slot);
+    s.flapper = number;
+    s.tick = fleet.tick(i);
+    s.t_s = static_cast<double>(s.tick) * fleet.period_s();
+    s.state = fleet.batch().state(i);
+    const auto [gyro, accel] = fleet.felt(i);
+    std::ranges::copy(gyro, s.gyro_rad_s);
+    std::ranges::copy(accel, s.accel_m_s2);
+    s.input = fleet.input(i);
+    watch.see(s);
+  }
+}
+
+template void show(Watch&, const flight::Fleet<float>&);
+template void show(Watch&, const flight::Fleet<double>&);
+
+}  // namespace flappy::rollout

@@ -1,0 +1,65 @@
+// The topics of one flapper, under /flappy, /flappy_1 and on:
+//
+//   pose           PoseStamped   torso origin and attitude in "world"          best effort, as sensor data are
+//   imu            Imu           rates and specific force in the torso's frame, covariances as the sensors declare; no attitude
+//   joint_states   JointState    left_stroke, left_rotation, right_stroke, right_rotation: rad, rad/s
+//   wing_input     WingInput     as controller and actor set it
+//   battery        BatteryState  where it is known
+//   /tf            TFMessage     "world" to the torso's frame: "flappy/torso"
+//
+// World z up, x and y level; torso x forward, y left, z up (REP 103). Stamps are times of the flight.
+#pragma once
+
+#include <array>
+#include <limits>
+
+#include "flight/setup.hpp"
+#include "rollout/watch.hpp"
+#include "server/dds/participant.hpp"
+
+namespace flappy::server {
+
+struct BatterySample {
+  double t_s, voltage_V, left_current_A, right_current_A;  // of the motors, signed
+};
+
+struct PoseSample {
+  double t_s, position_m[3], attitude[4];
+};
+
+struct ImuReading {
+  double t_s, gyro_rad_s[3], accel_m_s2[3];
+};
+
+class FlapperTopics {
+ public:
+  /// `slot`: place in the list of flappers that are shown.
+  FlapperTopics(const Participant& participant, const std::string& name_space, std::size_t slot,
+                const flight::Sensors& sensors, const Quality& samples = kSensorData);
+
+  /// True pose and joints, IMU without noise, inputs.
+  void write(const rollout::FlightSample& sample) const;
+  void write(const PoseSample& pose) const;
+  void write(const ImuReading& imu) const;
+  void write(const BatterySample& battery) const;
+  void write(double t_s, const sim::FlapperState& joints) const;
+  void write(double t_s, std::uint64_t tick, const sim::Input& input,
+             double left_V = std::numeric_limits<double>::quiet_NaN(),
+             double right_V = std::numeric_limits<double>::quiet_NaN()) const;
+  void write_transform(const PoseSample& pose) const;
+
+ private:
+  std::string frame_;
+  double imu_covariance_[2];  // of rate and of specific force, each axis
+  Writer<PoseStamped> pose_;
+  Writer<Imu> imu_;
+  Writer<JointState> joints_;
+  Writer<WingInput> input_;
+  Writer<BatteryState> battery_;
+  Writer<TFMessage> tf_;
+};
+
+/// "/flappy/pose" of the first flapper, "/flappy_3/pose" of the fourth.
+std::string topic_name(const std::string& name_space, std::size_t slot, const std::string& name);
+
+}  // namespace flappy::server
