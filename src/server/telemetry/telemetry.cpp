@@ -22,7 +22,6 @@ Telemetry::Telemetry(const io::DdsConfig& config, const flight::Sensors& sensors
       config_(config),
       participant_(config),
       clock_(participant_, "/clock", kSensorData),
-      training_(participant_, "/" + config.name_space + "/training", kLatched),
       diagnostics_(participant_, "/diagnostics", kReliable) {
   flappers_.reserve(size());
   for (std::size_t slot = 0; slot < size(); ++slot)
@@ -65,7 +64,8 @@ void Telemetry::serve() {
     m.update = training->update, m.updates = training->updates, m.episodes = training->episodes;
     m.env_steps = training->env_steps, m.mean_return = training->mean_return, m.success = training->success;
     m.updates_per_s = training->updates_per_s, m.env_steps_per_s = training->env_steps_per_s;
-    training_.write(m);
+    if (!training_) training_.emplace(participant_, "/" + config_.name_space + "/training", kLatched);
+    training_->write(m);
   }
   if (watch_) watch_->take([&](const server::Watch& w, const dds_sample_info_t&) { set_flapper(0, w.flapper); });
   if (io::steady_seconds() - last_diagnosed_s_ < kDiagnosed_s) return;

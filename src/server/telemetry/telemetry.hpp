@@ -49,7 +49,7 @@ class Telemetry : public rollout::Watch {
   Participant participant_;
   std::vector<FlapperTopics> flappers_;
   Writer<Clock> clock_;
-  Writer<TrainingMetrics> training_;
+  std::optional<Writer<TrainingMetrics>> training_;  // of what trains
   Writer<DiagnosticArray> diagnostics_;
   std::optional<Reader<server::Watch>> watch_;
   Ring<rollout::FlightSample, kRing> ring_;
