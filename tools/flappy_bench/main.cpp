@@ -21,6 +21,7 @@
 #include "model/effects/registry.hpp"
 #include "roof.hpp"
 #include "speed.hpp"
+#include "telemetry.hpp"
 #ifdef FLAPPY_HAVE_PEERS
 #include <mujoco/mujoco.h>
 
@@ -352,6 +353,27 @@ Json engines(int seeds) {
   return {{"engines", list}, {"processors", io::processors()}, {"instruction_set", sim::best_instruction_set()}};
 }
 
+Json telemetry(double duration_s) {
+  std::printf("shown to another process at 500 Hz for %g s, five topics each\n", duration_s);
+  std::printf("  %8s %10s %8s %28s %10s %20s\n", "flappers", "shown", "dropped", "late: median, 99 %, most", "heard",
+              "of a core, each");
+  Json list = Json::array();
+  for (const std::size_t flappers : {std::size_t{1}, std::size_t{16}}) {
+    const TelemetryCost c = measure_telemetry(flappers, duration_s);
+    std::printf("  %8zu %10zu %8zu %7.0f us %7.0f us %7.0f us %10zu %18.2f %%\n", c.flappers, c.shown, c.dropped,
+                1e6 * c.latency_median_s, 1e6 * c.latency_p99_s, 1e6 * c.latency_most_s, c.heard, 100 * c.cpu_share);
+    list.push_back({{"flappers", c.flappers},
+                    {"shown", c.shown},
+                    {"dropped", c.dropped},
+                    {"heard", c.heard},
+                    {"late_median_s", c.latency_median_s},
+                    {"late_p99_s", c.latency_p99_s},
+                    {"late_most_s", c.latency_most_s},
+                    {"cpu_share", c.cpu_share}});
+  }
+  return {{"telemetry", list}};
+}
+
 }  // namespace
 }  // namespace flappy::bench
 
@@ -377,6 +399,10 @@ int main(int argc, char** argv) {
       app.command("engines", "training on lanes and on LibTorch: start, memory, updates/s, time to 90 %");
   int seeds = 5;
   engines.option("--seeds", seeds, "of each engine").range(1, 100).shows_default();
+  io::Command telemetry =
+      app.command("telemetry", "what it costs to show 1 and 16 flappers over DDS, and how late they are");
+  double telemetry_s = 10;
+  telemetry.option("--duration", telemetry_s, "seconds").range(0.1, 1000.0).shows_default();
   io::Command busy = app.command("busy", "work per second of processor time while others hold all processors");
   io::Command batch = app.command("batch", "fly a batch at one input and summarise it");
   std::string config;
@@ -388,6 +414,7 @@ int main(int argc, char** argv) {
   return program.run(argc, argv, [&] {
     if (batch.given()) return program.write_json(bench::fly_batch(config, overrides));
     if (learner.given()) return program.write_json(bench::learner(options));
+    if (telemetry.given()) return program.write_json(bench::telemetry(telemetry_s));
     if (engines.given()) return program.write_json(bench::engines(seeds));
     const model::Vehicle v = model::read_vehicle(vehicle);
     program.write_json(convergence.given()      ? bench::convergence(v)
