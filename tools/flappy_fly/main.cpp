@@ -91,6 +91,8 @@ void print(const rollout::FlyConfig& config, const rollout::FlyOptions& options,
     std::printf("  %zu logs in %s\n", r.logs, options.log_folder.c_str());
     if (r.logs < s.flights) std::printf("  %zu flights were too short for a log\n", s.flights - r.logs);
   }
+  if (r.mcap) std::printf("  topics in %s\n", options.mcap.c_str());
+  else if (!options.mcap.empty()) std::printf("  the flight was too short for topics\n");
   std::printf("  %.2f s, %.1f million steps/s, %.0f times real time, hash %s\n", r.wall_s, r.steps / r.wall_s / 1e6,
               r.steps * config.fleet.batch.step_s / r.wall_s, hexadecimal(r.hash).c_str());
 }
@@ -148,13 +150,14 @@ int main(int argc, char** argv) {
   io::Program program("flappy-fly", "Flies a configuration in closed loop, scores the flights, writes their logs.",
                       {"instruction set " + sim::best_instruction_set()});
   const io::Command& app = program.app();
-  std::string config_name, log;
+  std::string config_name, log, mcap;
   std::vector<std::string> overrides;
   std::uint64_t seed = 0;
   rollout::FlyOptions options;
   app.option("config", config_name, "what to fly: configs/fly/*.toml").required();
   app.option("--count", options.count, "flights, each with noise of its own").range(1, 1'000'000).shows_default();
   app.option("--log", log, "folder for the log of the flight, or one folder in it for each of several");
+  app.option("--mcap", mcap, "file for the flight as topics of ROS 2, for Foxglove and PlotJuggler");
   app.option("--set", overrides, "override a key: flight.duration_s=2, controller.attitude.pitch.p=4").one_at_a_time();
   io::Option seeded =
       app.option("--seed", seed, "in place of flight.seed").range(std::uint64_t{0}, std::uint64_t{INT64_MAX});
@@ -162,6 +165,7 @@ int main(int argc, char** argv) {
     if (seeded.given()) overrides.push_back("flight.seed=" + std::to_string(seed));
     const rollout::FlyConfig config = rollout::read_fly_config(config_name, overrides);
     options.log_folder = log;
+    options.mcap = mcap;
     io::ProgressLine progress("flown");
     options.keep_going = [&](double done) {
       progress.show(done);
