@@ -133,6 +133,7 @@ Json json_of(const rollout::FlyConfig& config, const rollout::FlyOptions& option
   }
   json["hash"] = hexadecimal(r.hash);
   json["logs"] = options.log_folder.empty() ? Json(nullptr) : Json(r.logs);
+  json["mcap"] = options.mcap.empty() ? Json(nullptr) : Json(r.mcap);
   json["wall"] = {{"total_s", r.wall_s},
                   {"scoring_s", r.scoring_s},
                   {"steps_per_s", r.steps / r.wall_s},

@@ -207,9 +207,10 @@ void tidy(Stream& s, const std::vector<double>* sequence) {
     rows.push_back(i);
   }
   std::ranges::stable_sort(rows, {}, [&](std::size_t i) { return s.t_ns[i]; });
-  const auto again = std::ranges::unique(rows, {}, [&](std::size_t i) { return s.t_ns[i]; });
-  s.report.twice = again.size();
-  rows.erase(again.begin(), again.end());
+  const auto again =
+      std::unique(rows.begin(), rows.end(), [&](std::size_t i, std::size_t k) { return s.t_ns[i] == s.t_ns[k]; });
+  s.report.twice = static_cast<std::size_t>(rows.end() - again);
+  rows.erase(again, rows.end());
   const auto kept = [&](const auto& all) {
     std::remove_cvref_t<decltype(all)> some;
     for (const std::size_t i : rows) some.push_back(all[i]);
@@ -283,9 +284,10 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
   tidy(s, counted.empty() ? nullptr : &field_of(channel, mapping.table, "sequence", counted));
   if (s.t_ns.size() < 2)
     mapping.table.fail("channel",
-                       "\"" + mapping.channel + "\" has " + std::to_string(s.t_ns.size()) + " usable samples" +
-                           (s.report.unusable > 0 ? " and " + std::to_string(s.report.unusable) + " others" : ""),
-                       "at least 2");
+                       "\"" + mapping.channel + "\" has " + std::to_string(s.t_ns.size()) + " usable samples, " +
+                           std::to_string(s.report.unusable) + " that are not, and " + std::to_string(s.report.twice) +
+                           " at the time of another",
+                       "at least 2 usable ones");
   s.turn();
   return s;
 }
@@ -378,7 +380,7 @@ std::string report_text(const ImportReport& report) {
     }
     add("  clock %s: the receiver's is ahead by %.9g s", c.name.c_str(), c.offset_s);
     if (c.measured) add(", drifting by %.1f us/s, by %zu stamps over %.1f s\n", 1e6 * c.drift, c.stamps, c.span_s);
-    else add(", as the mapping says\n");
+    else text += ", as the mapping says\n";
   }
   return text;
 }

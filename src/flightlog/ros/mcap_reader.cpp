@@ -15,6 +15,8 @@ using namespace mcap;
 
 /// Of an uncompressed chunk, which writers make of some MB; more is a damaged length.
 constexpr std::uint64_t kLargestChunk = 256u << 20;
+/// A block of 128 KiB takes 4 bytes at least, in zstd as in lz4.
+constexpr std::uint64_t kMostCompressed = 1u << 15;
 constexpr std::size_t kMostWarnings = 20;
 
 void unpack_zstd(std::string_view packed, std::string& out) {
@@ -127,7 +129,8 @@ void McapReader::open_chunk(std::string_view content) {
   const auto expected = parts.number<std::uint32_t>();
   const std::string_view compression = parts.string();
   const std::string_view records = parts.raw(parts.number<std::uint64_t>());
-  if (size > kLargestChunk) throw MessageError("is a chunk of " + std::to_string(size) + " bytes");
+  if (size > kLargestChunk || (!compression.empty() && size / kMostCompressed > records.size()))
+    throw MessageError("is a chunk of " + std::to_string(size) + " bytes");
   if (compression.empty()) {
     chunk_rest_ = records;
   } else {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
+#include <numbers>
 
 #include "flightlog/import/sources.hpp"
 #include "flightlog/ros/flight_mcap.hpp"
@@ -283,6 +285,17 @@ TEST(Import, RefusesWhatIsNotThere) {
             "samples");
 }
 
+TEST(Import, RefusesAChannelWithoutSamplesToUse) {
+  Robot robot;
+  for (int i = 0; i < 200; ++i) robot.command(i), robot.pose(0), robot.imu(i);
+  robot.pose(7, std::nan(""));
+  const std::string line = test::refusal([&] { assemble(robot.channels, mapping_of("ros2.toml")); });
+  EXPECT_TRUE(line.ends_with(
+      "ros2.toml:28:11: mocap.channel: \"/pose\" has 1 usable samples, 1 that are not, and 199 at the time of "
+      "another; accepted: at least 2 usable ones"))
+      << line;
+}
+
 TEST(Import, RefusesTimesThatCannotBeHad) {
   const io::TemporaryFolder folder;
   std::ofstream(folder / "motors.csv") << "time_us,left_V,right_V\n0,1,2\n1000,1,2\n";
@@ -321,9 +334,10 @@ TEST(Import, RefusesTimesThatCannotBeHad) {
     const std::string line = test::refusal([&] { assemble(channels, read); });
     return line.substr(folder.path().string().size() + 1);
   };
-  EXPECT_EQ(refused(""),
-            "other.toml:17:1: command.time: samples of this channel have no stamp; accepted: \"received\", or \"field\" "
-            "with time_field");
+  EXPECT_EQ(
+      refused(""),
+      "other.toml:17:1: command.time: samples of this channel have no stamp; accepted: \"received\", or \"field\" "
+      "with time_field");
   EXPECT_EQ(refused("time = \"received\"\n"),
             "other.toml:19:8: command.time: samples of this channel do not say when they were received; accepted: "
             "\"stamp\", or "
