@@ -3,6 +3,7 @@
 bytes of messages, by both: bags_test.py BIN SOURCE WORK
 """
 import filecmp
+import json
 import os
 import random
 import shutil
@@ -127,6 +128,36 @@ def cut_short(file):
     assert rows > 100
 
 
+def disturbed(types, messages):
+    """A flight as a recorder gets it over a network, from a robot whose clock is off: what was done to it must be said of it."""
+    offset_ns, drift, least_ns = 1_700_000_000_123_456_789, 12e-6, 300_000
+    dice, held = random.Random(2), []
+    poses = 0
+    for topic, name, logged, data in messages:
+        delay = least_ns + int(dice.expovariate(1 / 400e3))
+        arrived = logged + offset_ns + int(drift * logged) + delay
+        if topic == "/pose":
+            poses += 1
+            if poses in (500, 900, 901):
+                continue  # never
+            if poses % 600 == 0:
+                arrived += 60_000_000  # late
+            if poses == 700:
+                held.append((topic, name, arrived + 1000, data))  # twice
+        held.append((topic, name, arrived, data))
+    held.sort(key=lambda message: message[2])
+    bag = write_bag(WORK / "disturbed", types, 9, StoragePlugin.MCAP, held)
+    report = WORK / "disturbed.json"
+    said = run(BIN / "flappy-gap", "import", bag, "--mapping", MAPPING, "--out", WORK / "disturbed_log", "--json", report)
+    found = json.loads(report.read_text())
+    mocap, clock = found["streams"][1], found["clocks"][0]
+    assert (mocap["never"], mocap["twice"], mocap["late"]) == (3, 1, poses // 600), mocap
+    assert mocap["out_of_order"] >= poses // 600, mocap
+    assert abs(clock["drift"] - drift) < 0.3e-6, clock
+    assert abs(clock["offset_s"] - 1e-9 * (offset_ns + least_ns)) < 20e-6, clock
+    return said
+
+
 def any_message(types, name, dice):
     """With numbers and lengths at random."""
     numbers = {"bool": lambda: dice.random() < 0.5, "byte": lambda: dice.randrange(128), "char": lambda: dice.randrange(256),
@@ -187,6 +218,9 @@ def main():
                 same_logs(log, imported(folder.name + "_log", bag))
                 same_logs(log, imported(folder.name + "_log", next(p for p in bag.iterdir() if p.suffix in (".db3", ".mcap"))))
         all_messages(types, WORK / f"{release}_all")
+    long = WORK / "long.mcap"
+    run(BIN / "flappy-fly", SOURCE / "configs/fly/open_loop.toml", "--set", "flight.duration_s=30", "--mcap", long)
+    print(disturbed(RELEASES["jazzy"], read_by_rosbags(long)))
     print(f"{len(by_mcap)} messages there and back")
 
 

@@ -16,7 +16,7 @@ expect_equal("exit code" "${code}" 0)
 expect_match("stdout" "${out}" "^${WORK}/imported: bird.toml, 34 Hz\n  stream +samples +Hz +never +twice +late +order +unusable")
 expect_match("stdout" "${out}" "\n  command +500 +1000.00 +0 +0 +0 +0 +0 +0.000 +0.000  /wing_input\n")
 expect_match("stdout" "${out}" "\n  mocap +7[0-9] +150.0[0-9] +0 +0 +0 +0 +0 +30.000 +30.000  /pose\n")
-expect_match("stdout" "${out}" "\n  clock robot: the receiver's is ahead by 0 s, drifting by 0.0 us/s, by [0-9]+ stamps over 0.5 s\n$")
+expect_match("stdout" "${out}" "\n  clock robot: the receiver's is ahead by 0.000000 s, drifting by 0.0 us/s, by [0-9]+ stamps over 0.5 s\n$")
 expect_keys(${WORK}/import.json folder=STRING start_ns=NUMBER warnings=ARRAY streams.0.samples=NUMBER streams.4.name=STRING
   streams.1.delay_median_s=NUMBER clocks.0.offset_s=NUMBER clocks.0.measured=BOOLEAN)
 foreach(file IN ITEMS command wings)  # no latency there, so the same to the last digit

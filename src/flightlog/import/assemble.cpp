@@ -374,11 +374,11 @@ std::string report_text(const ImportReport& report) {
   for (const ClockReport& c : report.clocks) {
     if (c.name == kReceiver) {
       const bool odd = c.offset_s < 0 || c.offset_s > kOddOffset_s;
-      add("  stamps of the receiver's clock: the quickest of %zu came %.9g s later%s\n", c.stamps, c.offset_s,
+      add("  stamps of the receiver's clock: the quickest of %zu came %.6f s later%s\n", c.stamps, c.offset_s,
           odd ? ", so they may be of another clock" : "");
       continue;
     }
-    add("  clock %s: the receiver's is ahead by %.9g s", c.name.c_str(), c.offset_s);
+    add("  clock %s: the receiver's is ahead by %.6f s", c.name.c_str(), c.offset_s);
     if (c.measured) add(", drifting by %.1f us/s, by %zu stamps over %.1f s\n", 1e6 * c.drift, c.stamps, c.span_s);
     else text += ", as the mapping says\n";
   }

@@ -353,7 +353,8 @@ TEST(Import, ReportsInLines) {
       std::string::npos)
       << text;
   EXPECT_NE(
-      text.find("  clock robot: the receiver's is ahead by 0.003 s, drifting by 0.0 us/s, by 600 stamps over 2.0 s\n"),
+      text.find(
+          "  clock robot: the receiver's is ahead by 0.003000 s, drifting by 0.0 us/s, by 600 stamps over 2.0 s\n"),
       std::string::npos)
       << text;
 }

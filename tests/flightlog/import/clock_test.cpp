@@ -16,7 +16,7 @@ Pairs received(double duration_s, double drift) {
   std::uint32_t random = 1;
   for (int i = 0; i < 100 * duration_s; ++i) {
     random = 1664525 * random + 1013904223;
-    const double late = std::pow(random / 4294967296.0, 8) * 0.02;
+    const double late = i == 0 ? 0.01 : std::pow(random / 4294967296.0, 8) * 0.02;
     const std::int64_t stamp = 10'000'000ll * i + 5'000'000'000;
     pairs.emplace_back(
         stamp, 1'760'000'000'123'456'789 + std::llround(1e7 * i * (1 + drift)) + 200'000 + std::llround(1e9 * late));

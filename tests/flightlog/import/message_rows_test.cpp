@@ -56,6 +56,17 @@ TEST(MessageRows, LeavesOtherIndicesAndHasNoStampWhereThereIsNone) {
   EXPECT_TRUE(row_of("sensor_msgs/Imu", {}).contains("angular_velocity_covariance[4]"));
 }
 
+TEST(MessageRows, NamesNothingInside) {
+  ros::Definitions d;
+  d.add("p/msg/M",
+        "string[] name\nInner inner\nfloat32[2] own\n" + std::string(80, '=') + "\nMSG: p/Inner\nfloat32[2] x\n");
+  MessageRows rows(d.layout("p/M"));
+  std::vector<std::string> names;
+  for (const Item& item : rows.read(encode(*d.layout("p/M"), {{"name[0]", "a"}, {"name[1]", "b"}})))
+    names.push_back(item.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"inner.x[0]", "inner.x[1]", "own[a]", "own[b]"}));
+}
+
 TEST(MessageRows, StampsOfTheStartOf1970) {
   std::int64_t stamp_ns = kNoTime;
   row_of("sensor_msgs/Imu",
