@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
 #include "flightlog/ros/cdr.hpp"
 
 namespace flappy::flightlog {
 namespace {
 
-constexpr double kSecond_ns = 1e9;
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr double kMostSeconds = 4e9;  // of 32 bits
 
 /// "transforms[0]" of "transforms[0].child_frame_id"; empty where `path` is not the `member` of an element.
 std::string_view element_of(std::string_view path, std::string_view member) {
@@ -35,12 +37,13 @@ const Row& MessageRows::read(std::string_view bytes) {
       return;
     }
     const double number = ros::to_number(value);
-    if (stamp_ns_ == kNoTime && path.ends_with("stamp.sec")) {
+    // whatever a definition takes for seconds
+    const bool fits = std::abs(number) < kMostSeconds;
+    if (stamp_ns_ == kNoTime && fits && path.ends_with("stamp.sec")) {
       sec = number;
       open_stamp = true;
-    } else if (open_stamp && path.ends_with("stamp.nanosec")) {
-      stamp_ns_ =
-          static_cast<std::int64_t>(sec) * static_cast<std::int64_t>(kSecond_ns) + static_cast<std::int64_t>(number);
+    } else if (open_stamp && fits && path.ends_with("stamp.nanosec")) {
+      stamp_ns_ = static_cast<std::int64_t>(sec) * kSecond_ns + static_cast<std::int64_t>(number);
       open_stamp = false;
     }
     // the memory of the row before is used again

@@ -1,12 +1,15 @@
 #include "flightlog/import/assemble.hpp"
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include <algorithm>
 #include <fstream>
 #include <numbers>
 
 #include "flightlog/import/sources.hpp"
+#include "flightlog/import/ulogs.hpp"
+#include "flightlog/ros/bag.hpp"
 #include "flightlog/ros/flight_mcap.hpp"
 #include "flightlog/some_log.hpp"
 #include "io/temporary_folder.hpp"
@@ -96,6 +99,133 @@ TEST(Import, DoesWithoutPowerAndWingsThatAreNotRecorded) {
   EXPECT_FALSE(back.log.power || back.log.header.power || back.log.wings || back.log.header.wings);
   EXPECT_EQ(back.report.warnings, (Lines{"power: /battery is not recorded: done without",
                                          "wings: /joint_states is not recorded: done without"}));
+}
+
+/// The messages of an MCAP file as one of rosbag2's databases.
+void write_database(const fs::path& from, const fs::path& to) {
+  std::string topics, messages;
+  std::map<std::string, int> ids;
+  const auto bag = ros::Bag::open(from);
+  while (const auto m = bag->next()) {
+    const auto [id, fresh] = ids.try_emplace(m->topic->name, static_cast<int>(ids.size()) + 1);
+    const std::string number = std::to_string(id->second);
+    if (fresh)
+      topics += (topics.empty() ? "" : ",") + std::string("(") + number + ",'" + m->topic->name + "','" +
+                m->topic->type + "','cdr','')";
+    messages +=
+        (messages.empty() ? "" : ",") + std::string("(") + number + "," + std::to_string(m->received_ns) + ",x'";
+    for (const char c : m->bytes) {
+      char digits[3];
+      std::snprintf(digits, sizeof digits, "%02x", static_cast<unsigned char>(c));
+      messages += digits;
+    }
+    messages += "')";
+  }
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(to.c_str(), &database), SQLITE_OK);
+  const std::string statements =
+      "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT, "
+      "offered_qos_profiles TEXT);"
+      "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);"
+      "INSERT INTO topics VALUES" +
+      topics + "; INSERT INTO messages(topic_id, timestamp, data) VALUES" + messages + ";";
+  EXPECT_EQ(sqlite3_exec(database, statements.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
+      << sqlite3_errmsg(database);
+  sqlite3_close(database);
+}
+
+TEST(Import, GivesTheSameLogOfADatabase) {
+  const io::TemporaryFolder folder;
+  ros::write_flight_mcap(folder / "f.mcap", test::some_log(0.1));
+  write_database(folder / "f.mcap", folder / "f.db3");
+  const Mapping mapping = mapping_of("ros2.toml");
+  std::vector<Imported> both;
+  for (const char* name : {"f.mcap", "f.db3"}) {
+    Channels channels(mapping.wanted());
+    Lines warnings;
+    read_source(folder / name, channels, warnings);
+    EXPECT_EQ(warnings, Lines());
+    both.push_back(assemble(channels, mapping));
+  }
+  EXPECT_EQ(both[0].log.command.t_s.size(), 100u);
+  EXPECT_EQ(both[0].log, both[1].log);
+}
+
+/// A flight as PX4 would log it: floats, north east down, forward right down, microseconds since the start of the processor.
+std::string px4_log(const FlightLog& log) {
+  using test::UlogText;
+  constexpr double kBoot_us = 5e6;
+  const auto t_us = [&](double t_s) { return static_cast<std::uint64_t>(std::llround(kBoot_us + 1e6 * t_s)); };
+  const auto floats = [](std::initializer_list<double> values) {
+    std::string text;
+    for (const double v : values) text += UlogText::bytes(static_cast<float>(v));
+    return text;
+  };
+  UlogText u;
+  u.format(
+      "actuator_motors:uint64_t timestamp;uint64_t timestamp_sample;float[12] control;uint16_t flags;uint8_t[6] "
+      "_padding0;");
+  u.format("sensor_combined:uint64_t timestamp;float[3] gyro_rad;uint32_t dt;float[3] accelerometer_m_s2;");
+  u.format("battery_status:uint64_t timestamp;float voltage_v;float current_a;");
+  u.format("vehicle_visual_odometry:uint64_t timestamp;uint64_t timestamp_sample;float[3] position;float[4] q;");
+  u.topic(0, 1, "actuator_motors")
+      .topic(0, 2, "sensor_combined")
+      .topic(0, 3, "vehicle_visual_odometry")
+      .topic(0, 4, "battery_status");
+  const CommandStream& c = log.command;
+  for (std::size_t i = 0; i < c.t_s.size(); ++i)
+    u.data(1, UlogText::bytes(t_us(c.t_s[i])) + UlogText::bytes(std::uint64_t{0}) +
+                  floats({c.left_voltage_V[i] / 18, c.right_voltage_V[i] / 18, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}) +
+                  std::string(2, '\0'));
+  const ImuStream& m = log.imu;
+  for (std::size_t i = 0; i < m.t_s.size(); ++i)
+    u.data(2, UlogText::bytes(t_us(m.t_s[i])) + floats({m.gyro_x_rad_s[i], -m.gyro_y_rad_s[i], -m.gyro_z_rad_s[i]}) +
+                  UlogText::bytes(std::uint32_t{2000}) +
+                  floats({m.accel_x_m_s2[i], -m.accel_y_m_s2[i], -m.accel_z_m_s2[i]}));
+  const MocapStream& p = log.mocap;
+  constexpr double kHalf = std::numbers::sqrt2 / 2;
+  for (std::size_t i = 0; i < p.t_s.size(); ++i) {
+    // q_NED_FRD = q_NED_ENU q_ENU_FLU q_FLU_FRD, with q_NED_ENU = (0, 1, 1, 0)/sqrt(2) and q_FLU_FRD = (0, 1, 0, 0)
+    const double w = -kHalf * (p.qx[i] + p.qy[i]), x = kHalf * (p.qw[i] + p.qz[i]), y = kHalf * (p.qw[i] - p.qz[i]),
+                 z = kHalf * (p.qy[i] - p.qx[i]);
+    u.data(3, UlogText::bytes(t_us(p.t_s[i])) + UlogText::bytes(t_us(p.t_s[i] - log.header.mocap.latency_s)) +
+                  floats({p.y_m[i], p.x_m[i], -p.z_m[i], -x, w, z, -y}));
+  }
+  for (std::size_t i = 0; i < log.power->t_s.size(); ++i)
+    u.data(4, UlogText::bytes(t_us(log.power->t_s[i])) +
+                  floats({log.power->battery_V[i], log.power->left_current_A[i] + log.power->right_current_A[i]}));
+  return u.text;
+}
+
+TEST(Import, GivesBackALogThatPx4Wrote) {
+  const io::TemporaryFolder folder;
+  const FlightLog log = test::some_log();
+  std::ofstream(folder / "f.ulg") << px4_log(log);
+  const Mapping mapping = mapping_of("px4.toml");
+  Channels channels(mapping.wanted());
+  Lines warnings;
+  read_source(folder / "f.ulg", channels, warnings);
+  EXPECT_EQ(warnings, Lines());
+  const FlightLog back = assemble(channels, mapping).log;
+  Column measured_s = log.mocap.t_s;
+  for (double& t : measured_s) t -= log.header.mocap.latency_s;
+  expect_near(back.command.t_s, log.command.t_s, 1e-9);
+  expect_near(back.command.right_voltage_V, log.command.right_voltage_V, 1e-5);
+  expect_near(back.mocap.t_s, measured_s, 1e-9);
+  expect_near(back.mocap.x_m, log.mocap.x_m, 1e-6);
+  expect_near(back.mocap.y_m, log.mocap.y_m, 1e-6);
+  expect_near(back.mocap.z_m, log.mocap.z_m, 1e-6);
+  const double sign = back.mocap.qw[0] * log.mocap.qw[0] < 0 ? -1 : 1;  // either is the same rotation
+  for (const auto q : {&MocapStream::qw, &MocapStream::qx, &MocapStream::qy, &MocapStream::qz}) {
+    Column turned = back.mocap.*q;
+    for (double& value : turned) value *= sign;
+    expect_near(turned, log.mocap.*q, 1e-6);
+  }
+  expect_near(back.imu.gyro_y_rad_s, log.imu.gyro_y_rad_s, 1e-6);
+  expect_near(back.imu.accel_z_m_s2, log.imu.accel_z_m_s2, 1e-6);
+  expect_near(back.imu.t_s, log.imu.t_s, 1e-9);
+  expect_near(back.power->battery_V, log.power->battery_V, 1e-5);
+  EXPECT_NEAR(back.power->left_current_A[3], 0.25, 1e-6);
 }
 
 // ---- channels that a test, or a recorder, fills itself
