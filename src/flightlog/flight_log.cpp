@@ -87,25 +87,7 @@ FlightHeader parse_header(const io::Table& root) {
   h.flapping_Hz = root.number("flapping_Hz", positive(1e3));
   h.gravity_m_s2 = root.number("gravity_m_s2", non_negative(100));
 
-  const io::Range place = {-1e6, 1e6};
-  const io::Table ambient = root.table("ambient");
-  h.ambient.air_density_kg_m3 = ambient.number("air_density_kg_m3", positive(100));
-  h.ambient.ground_z_m = ambient.number("ground_z_m", place);
-  h.ambient.ceiling_z_m = ambient.number("ceiling_z_m", place);
-  if (h.ambient.ceiling_z_m <= h.ambient.ground_z_m)
-    ambient.fail("ceiling_z_m", shortest_digits(h.ambient.ceiling_z_m) + " is not above the ground",
-                 "a number above " + shortest_digits(h.ambient.ground_z_m));
-  for (const auto& row : ambient.rows("walls", 4, place)) {
-    LogWall wall = {row[0], row[1], row[2], row[3]};
-    const double length = std::hypot(wall.normal_x, wall.normal_y);
-    if (std::abs(length - 1) > kUnitTolerance)
-      ambient.fail(
-          "walls",
-          "normal of wall " + std::to_string(h.ambient.walls.size()) + " has length " + shortest_digits(length),
-          "[x_m, y_m, normal_x, normal_y], the normal of length 1");
-    normalise(length, {&wall.normal_x, &wall.normal_y});
-    h.ambient.walls.push_back(wall);
-  }
+  h.ambient = read_ambient(root.table("ambient"));
 
   const io::Range rate = positive(1e6), latency = non_negative(10);
   const io::Table mocap = root.table("mocap");
@@ -357,6 +339,28 @@ std::optional<Stream> parse_optional(const LogFiles& files, const std::string& n
 }
 
 }  // namespace
+
+LogAmbient read_ambient(const io::Table& ambient) {
+  LogAmbient a;
+  const io::Range place = {-1e6, 1e6};
+  a.air_density_kg_m3 = ambient.number("air_density_kg_m3", positive(100));
+  a.ground_z_m = ambient.number("ground_z_m", place);
+  a.ceiling_z_m = ambient.number("ceiling_z_m", place);
+  if (a.ceiling_z_m <= a.ground_z_m)
+    ambient.fail("ceiling_z_m", shortest_digits(a.ceiling_z_m) + " is not above the ground",
+                 "a number above " + shortest_digits(a.ground_z_m));
+  for (const auto& row : ambient.rows("walls", 4, place)) {
+    LogWall wall = {row[0], row[1], row[2], row[3]};
+    const double length = std::hypot(wall.normal_x, wall.normal_y);
+    if (std::abs(length - 1) > kUnitTolerance)
+      ambient.fail("walls",
+                   "normal of wall " + std::to_string(a.walls.size()) + " has length " + shortest_digits(length),
+                   "[x_m, y_m, normal_x, normal_y], the normal of length 1");
+    normalise(length, {&wall.normal_x, &wall.normal_y});
+    a.walls.push_back(wall);
+  }
+  return a;
+}
 
 FlightLog parse_flight_log(const LogFiles& files, const fs::path& folder) {
   const io::Table root = io::Config::parse(text_of(files, kHeader, folder), (folder / kHeader).string()).root();

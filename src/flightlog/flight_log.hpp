@@ -21,6 +21,10 @@
 
 #include "io/files.hpp"
 
+namespace flappy::io {
+class Table;
+}
+
 namespace flappy::flightlog {
 
 /// A vertical wall through (x, y); its normal points into the free space and has length 1.
@@ -161,6 +165,9 @@ inline const std::vector<std::string> kMotionNames = {"t_s",
                                                       "gyro_bias_x_rad_s",
                                                       "gyro_bias_y_rad_s",
                                                       "gyro_bias_z_rad_s"};
+
+/// Reads the keys of [ambient].
+LogAmbient read_ambient(const io::Table& ambient);
 
 /// Texts of the files of a log by name, truth.csv left out.
 using LogFiles = std::map<std::string, std::string>;

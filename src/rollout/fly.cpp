@@ -5,6 +5,7 @@
 #include <chrono>
 #include <set>
 
+#include "flightlog/ros/flight_mcap.hpp"
 #include "io/parallel.hpp"
 #include "rollout/rollout.hpp"
 #include "sim/storage.hpp"
@@ -67,6 +68,13 @@ std::size_t write_logs(const Rollout<T>& flights, std::size_t first, const FlyOp
 template <class T>
 FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
   const bool logged = !options.log_folder.empty();
+  const bool recorded = logged || !options.mcap.empty();
+  if (!options.mcap.empty()) {
+    if (options.count > 1)
+      throw io::InputError("--mcap: is of one flight, not of " + std::to_string(options.count) +
+                           "; accepted: --count 1");
+    io::check_output(options.mcap);
+  }
   std::size_t at_a_time = options.count;
   if (logged) {
     prepare_log_folder(options.log_folder, options.count, config.vehicle_file_name);
@@ -85,7 +93,7 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
     const std::size_t count = std::min(at_a_time, options.count - first);
     Rollout<T> flights(std::move(part), count);
     const flight::Fleet<T>& fleet = flights.fleet();
-    if (logged) flights.record();
+    if (recorded) flights.record();
     std::vector<FlightScore> scores(count);
     std::vector<std::uint32_t> ended(count);  // the bits that came first
     while (!flights.over() && !result.stopped) {
@@ -111,6 +119,11 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
     result.flown_s = flights.t_s();
     result.steps += flights.physics_steps();
     if (logged) result.logs += write_logs(flights, first, options);
+    if (!options.mcap.empty())
+      if (const auto log = flights.recorders().front().log()) {
+        flightlog::ros::write_flight_mcap(options.mcap, *log);
+        result.mcap = true;
+      }
     all_scores.insert(all_scores.end(), scores.begin(), scores.end());
   }
   result.summary = summarise(all_scores);

@@ -14,6 +14,8 @@ struct FlyOptions {
   std::size_t count = 1;
   /// Where logs go: the folder itself is the log of a single flight, else it has one folder each, 0000 and on.
   std::filesystem::path log_folder;
+  /// Where the log of a single flight goes as topics of ROS 2; empty: nowhere.
+  std::filesystem::path mcap;
   /// Memory for logs: flights are flown in parts whose logs need no more, or one by one.
   double log_bytes = 512e6;
   /// Asked every control period, with the share that is done; false ends the flights where they are.
@@ -29,6 +31,7 @@ struct FlyResult {
   std::vector<double> capture_s;  ///< when each flight that captured its goal did so
   std::size_t successes = 0;      ///< captured it, kept it as the task asks, and did not crash
   std::size_t logs = 0;
+  bool mcap = false;       ///< whether it was long enough for one
   std::uint64_t hash = 0;  ///< of how each vehicle moves, at the end, in order
   double wall_s = 0, scoring_s = 0, steps = 0;
 };

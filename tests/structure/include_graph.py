@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 
 BASE = {"io", "model", "sim"}
 FLIGHT = BASE | {"policy", "flight"}
-ROLLOUT = FLIGHT | {"flightlog", "flightlog/check", "rollout"}
+ROLLOUT = FLIGHT | {"flightlog", "flightlog/check", "flightlog/ros", "rollout"}
 GAP = ROLLOUT | {"gap/replay", "gap/evidence", "gap/localise", "gap/diagnose"}
 # What a room may include besides itself. A folder is a room; a folder in it that is named here is a room of its own.
 ROOMS = {
@@ -21,8 +21,10 @@ ROOMS = {
     "policy": BASE,
     "flightlog": BASE,
     "flightlog/check": {"io", "flightlog"},
+    "flightlog/ros": {"io", "flightlog"},
+    "flightlog/import": {"io", "flightlog", "flightlog/ros"},
     "flight": BASE | {"policy"},
-    "rollout": FLIGHT | {"flightlog"},
+    "rollout": FLIGHT | {"flightlog", "flightlog/ros"},
     "learn/lanes": BASE | {"policy", "learn"},
     "learn": ROLLOUT | {"learn/lanes"},
     "deploy": {"io"},

@@ -92,6 +92,8 @@ void print(const rollout::FlyConfig& config, const rollout::FlyOptions& options,
     std::printf("  %zu logs in %s\n", r.logs, options.log_folder.c_str());
     if (r.logs < s.flights) std::printf("  %zu flights were too short for a log\n", s.flights - r.logs);
   }
+  if (r.mcap) std::printf("  topics in %s\n", options.mcap.c_str());
+  else if (!options.mcap.empty()) std::printf("  the flight was too short for topics\n");
   std::printf("  %.2f s, %.1f million steps/s, %.0f times real time, hash %s\n", r.wall_s, r.steps / r.wall_s / 1e6,
               r.steps * config.fleet.batch.step_s / r.wall_s, hexadecimal(r.hash).c_str());
 }
@@ -132,6 +134,7 @@ Json json_of(const rollout::FlyConfig& config, const rollout::FlyOptions& option
   }
   json["hash"] = hexadecimal(r.hash);
   json["logs"] = options.log_folder.empty() ? Json(nullptr) : Json(r.logs);
+  json["mcap"] = options.mcap.empty() ? Json(nullptr) : Json(r.mcap);
   json["wall"] = {{"total_s", r.wall_s},
                   {"scoring_s", r.scoring_s},
                   {"steps_per_s", r.steps / r.wall_s},
@@ -149,13 +152,14 @@ int main(int argc, char** argv) {
   io::Program program("flappy-fly", "Flies a configuration in closed loop, scores the flights, writes their logs.",
                       {"instruction set " + sim::best_instruction_set()});
   const io::Command& app = program.app();
-  std::string config_name, log;
+  std::string config_name, log, mcap;
   std::vector<std::string> overrides;
   std::uint64_t seed = 0;
   rollout::FlyOptions options;
   app.option("config", config_name, "what to fly: configs/fly/*.toml").required();
   app.option("--count", options.count, "flights, each with noise of its own").range(1, 1'000'000).shows_default();
   app.option("--log", log, "folder for the log of the flight, or one folder in it for each of several");
+  app.option("--mcap", mcap, "file for the flight as topics of ROS 2, for Foxglove and PlotJuggler");
   app.option("--set", overrides, "override a key: flight.duration_s=2, controller.attitude.pitch.p=4").one_at_a_time();
   io::Option seeded =
       app.option("--seed", seed, "in place of flight.seed").range(std::uint64_t{0}, std::uint64_t{INT64_MAX});
@@ -164,6 +168,7 @@ int main(int argc, char** argv) {
     rollout::FlyConfig config = rollout::read_fly_config(config_name, overrides);
     config.watch = server::telemetry_of(config.dds, config.fleet.sensors);
     options.log_folder = log;
+    options.mcap = mcap;
     io::ProgressLine progress("flown");
     const double started_s = io::steady_seconds();
     options.keep_going = [&](double done) {

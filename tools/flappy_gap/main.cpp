@@ -5,6 +5,7 @@
 #include "flightlog/check/check.hpp"
 #include "flightlog/check/data_faults.hpp"
 #include "gap/diagnose/diagnose_command.hpp"
+#include "import_command.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"
 
@@ -117,6 +118,16 @@ int main(int argc, char** argv) {
       "check", "axes, units, clocks and dropouts of logs; exit code 1 where a fault forbids a diagnosis");
   std::vector<std::string> folders;
   check.option("flight", folders, "folders of flight logs").required();
+  io::Command import =
+      program.app().command("import", "makes a flight log of a bag (MCAP, SQLite), a ULog, or CSV files");
+  gap::ImportCommand import_command;
+  import.option("file", import_command.files, "a bag or its folder, a ULog, a CSV; several are one recording")
+      .required();
+  import.option("--mapping", import_command.mapping, "which channels become which streams: configs/mapping/*.toml")
+      .required();
+  import.option("--out", import_command.out, "folder of the flight log").required();
+  import.option("--set", import_command.overrides, "override a key of the mapping: mocap.time=received")
+      .one_at_a_time();
   io::Command diagnose = program.app().command("diagnose", "what is missing in the model of a robot that flew");
   gap::DiagnoseCommand command;
   diagnose.option("--vehicle", command.vehicle, "the vehicle's file, as it was believed").required();
@@ -140,6 +151,8 @@ int main(int argc, char** argv) {
       const nlohmann::ordered_json found = gap::check(folders);
       faulty = found["faults"] > 0;
       program.write_json(found);
+    } else if (import.given()) {
+      program.write_json(gap::run_import(import_command));
     } else {
       program.write_json(gap::run_diagnose(command));
     }

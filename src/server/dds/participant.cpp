@@ -6,6 +6,8 @@
 #include <map>
 #include <mutex>
 
+#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/type_hash.hpp"
 #include "io/files.hpp"
 
 namespace flappy::server {
@@ -76,10 +78,10 @@ Entity make_topic(const Participant& p, const dds_topic_descriptor_t& type, cons
   return {dds_create_topic(p.get(), &type, ("rt" + name).c_str(), nullptr, nullptr), name};
 }
 
-std::string type_hash(const std::string&) { return ""; }
-
+/// The type's hash, by which ROS 2 knows it from Iron on.
 std::string user_data(const dds_topic_descriptor_t& type) {
-  return "typehash=" + type_hash(ros_name(type.m_typename)) + ";";
+  using namespace flightlog::ros;
+  return "typehash=" + type_hash(*standard_messages().layout(ros_name(type.m_typename))) + ";";
 }
 
 }  // namespace

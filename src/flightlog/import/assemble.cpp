@@ -1,0 +1,388 @@
+#include "flightlog/import/assemble.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <numeric>
+
+#include "flightlog/import/clock.hpp"
+#include "io/statistics.hpp"
+
+namespace flappy::flightlog {
+namespace {
+
+constexpr double kQuaternionTolerance = 1e-3;
+/// No message that is received at all is so late.
+constexpr double kOddOffset_s = 0.5;
+using Columns = std::map<std::string, Column>;
+
+/// Names that a fault lists, which may be thousands.
+std::string listed(const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 30;
+  if (names.size() <= kMost) return names.empty() ? "nothing" : io::joined(names);
+  return io::joined({names.begin(), names.begin() + kMost}) + " and " + std::to_string(names.size() - kMost) + " more";
+}
+
+const Channel& channel_of(const Channels& channels, const StreamMapping& s, const std::string& name,
+                          const std::string& key) {
+  if (const Channel* found = channels.find(name)) return *found;
+  const std::vector<std::string> names = channels.names();
+  s.table.fail(key, "\"" + name + "\" is not recorded", listed(names) + io::did_you_mean(name, names));
+}
+
+/// Whether a stream that a log need not have is not recorded.
+bool left_out(const Channels& channels, const StreamMapping& s) {
+  return (s.name == "power" || s.name == "wings") && !channels.find(s.channel);
+}
+
+const std::vector<double>& field_of(const Channel& channel, const io::Table& table, const std::string& key,
+                                    const std::string& field) {
+  if (const auto* found = channel.column(field)) return *found;
+  const std::vector<std::string> names = channel.fields();
+  if (names.empty()) table.fail(key, "\"" + field + "\" is of a channel without samples", "a channel with samples");
+  table.fail(key, "\"" + field + "\" is no field of the channel", listed(names) + io::did_you_mean(field, names));
+}
+
+/// The times of a channel's rows as a stream takes them: stamps are still by their own clock.
+std::vector<std::int64_t> raw_times(const Channel& channel, const StreamMapping& s) {
+  if (s.time == TimeOf::received) return channel.received_ns();
+  if (s.time == TimeOf::stamp) return channel.stamp_ns();
+  std::vector<std::int64_t> times;
+  for (const double t : field_of(channel, s.table, "time_field", s.time_field)) {
+    const double t_ns = t * s.time_unit_ns;
+    times.push_back(std::abs(t_ns) < 4e18 ? std::llround(t_ns) : kNoTime);
+  }
+  return times;
+}
+
+bool all_missing(const std::vector<std::int64_t>& times) {
+  return std::ranges::all_of(times, [](std::int64_t t) { return t == kNoTime; });
+}
+
+/// Streams of one clock give one line: the quickest message of all is what bounds it.
+class Clocks {
+ public:
+  Clocks(const Channels& channels, const Mapping& mapping) : mapping_(mapping) {
+    for (const StreamMapping& s : mapping.streams) {
+      if (left_out(channels, s)) continue;
+      const Channel& channel = channel_of(channels, s, s.channel, "channel");
+      if (s.time == TimeOf::received) continue;
+      auto& pairs = pairs_[s.clock];
+      const std::vector<std::int64_t> stamps = raw_times(channel, s);
+      for (std::size_t i = 0; i < stamps.size(); ++i)
+        if (stamps[i] != kNoTime && channel.received_ns()[i] != kNoTime)
+          pairs.emplace_back(stamps[i], channel.received_ns()[i]);
+    }
+    for (const auto& [name, pairs] : pairs_) add(name, pairs);
+  }
+
+  /// Where the stamps of a stream are on the receiver's clock.
+  const ClockLine& line(const StreamMapping& s) const { return lines_.at(s.clock); }
+  /// The line that the quickest messages lie on, which delays are counted from.
+  const ClockLine& quickest(const StreamMapping& s) const { return quickest_.at(s.clock); }
+  const std::vector<ClockReport>& reports() const { return reports_; }
+
+ private:
+  void add(const std::string& name, const std::vector<std::pair<std::int64_t, std::int64_t>>& pairs) {
+    const auto given = mapping_.offsets_s.find(name);
+    if (pairs.empty() && name != kReceiver && given == mapping_.offsets_s.end()) {
+      const auto stream = std::ranges::find(mapping_.streams, name, &StreamMapping::clock);
+      stream->table.fail("clock", "\"" + name + "\" cannot be measured: no sample says when it was received",
+                         "clocks." + name + ".offset_s");
+    }
+    ClockLine below = pairs.empty() ? ClockLine() : ClockLine::below(pairs);
+    ClockReport report{name, below.offset_s(), below.drift(), true, pairs.size()};
+    if (!pairs.empty()) {
+      const auto [first, last] = std::ranges::minmax(pairs);
+      report.span_s = 1e-9 * static_cast<double>(last.first - first.first);
+    }
+    quickest_.emplace(name, below);
+    if (name == kReceiver) {
+      lines_.emplace(name, ClockLine());
+    } else if (given != mapping_.offsets_s.end()) {
+      lines_.emplace(name, ClockLine(std::llround(1e9 * given->second)));
+      report.offset_s = given->second;
+      report.drift = 0;
+      report.measured = false;
+    } else {
+      lines_.emplace(name, below);
+    }
+    if (!pairs.empty() || !report.measured) reports_.push_back(report);
+  }
+
+  const Mapping& mapping_;
+  std::map<std::string, std::vector<std::pair<std::int64_t, std::int64_t>>> pairs_;
+  std::map<std::string, ClockLine> lines_, quickest_;
+  std::vector<ClockReport> reports_;
+};
+
+/// Of a channel that a stream takes columns from.
+struct Timed {
+  const Channel* channel;
+  std::vector<std::int64_t> t_ns;  ///< by the receiver's clock
+};
+
+Timed timed(const Channel& channel, const StreamMapping& s, const Clocks& clocks) {
+  Timed timed{&channel, raw_times(channel, s)};
+  if (s.time == TimeOf::received) return timed;
+  const ClockLine& line = clocks.line(s);
+  for (std::int64_t& t : timed.t_ns)
+    if (t != kNoTime) t = line.received_ns(t);
+  return timed;
+}
+
+/// Row by row of `times`, the row of `held` that came last at or before it; its size where there is none.
+std::vector<std::size_t> last_rows(const std::vector<std::int64_t>& times, const std::vector<std::int64_t>& held) {
+  std::vector<std::size_t> order(held.size()), rows;
+  std::iota(order.begin(), order.end(), 0);
+  std::erase_if(order, [&](std::size_t i) { return held[i] == kNoTime; });
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return held[i]; });
+  for (const std::int64_t t : times) {
+    const auto after = std::ranges::upper_bound(order, t, {}, [&](std::size_t i) { return held[i]; });
+    rows.push_back(after == order.begin() ? held.size() : *(after - 1));
+  }
+  return rows;
+}
+
+struct Quaternion {
+  double w, x, y, z;
+  Quaternion operator*(const Quaternion& q) const {
+    return {w * q.w - x * q.x - y * q.y - z * q.z, w * q.x + x * q.w + y * q.z - z * q.y,
+            w * q.y - x * q.z + y * q.w + z * q.x, w * q.z + x * q.y - y * q.x + z * q.w};
+  }
+};
+
+/// A stream's samples, and the times that they have.
+struct Stream {
+  const StreamMapping& mapping;
+  std::vector<std::int64_t> t_ns;
+  Columns columns;
+  StreamReport report;
+
+  void turn() {
+    if (mapping.frd)
+      for (const char* name : {"gyro_y_rad_s", "gyro_z_rad_s", "accel_y_m_s2", "accel_z_m_s2"})
+        if (const auto c = columns.find(name); c != columns.end())
+          for (double& value : c->second) value = -value;
+    if (mapping.name != "mocap" || (!mapping.frd && !mapping.ned)) return;
+    Column &x = columns["x_m"], &y = columns["y_m"], &z = columns["z_m"];
+    Column &qw = columns["qw"], &qx = columns["qx"], &qy = columns["qy"], &qz = columns["qz"];
+    constexpr double kHalf = std::numbers::sqrt2 / 2;
+    constexpr Quaternion kFromNed{0, kHalf, kHalf, 0};  // north, east, down to east, north, up
+    constexpr Quaternion kFromFlu{0, 1, 0, 0};          // forward, left, up to forward, right, down
+    for (std::size_t i = 0; i < qw.size(); ++i) {
+      Quaternion q{qw[i], qx[i], qy[i], qz[i]};
+      if (mapping.ned) q = kFromNed * q;
+      if (mapping.frd) q = q * kFromFlu;
+      qw[i] = q.w, qx[i] = q.x, qy[i] = q.y, qz[i] = q.z;
+      if (!mapping.ned) continue;
+      std::swap(x[i], y[i]);
+      z[i] = -z[i];
+    }
+  }
+};
+
+bool is_rotation(const Stream& s, std::size_t i) {
+  if (s.mapping.name != "mocap") return true;
+  double square = 0;
+  for (const char* name : {"qw", "qx", "qy", "qz"}) square += std::pow(s.columns.at(name)[i], 2);
+  return std::abs(std::sqrt(square) - 1) <= kQuaternionTolerance;
+}
+
+/// Drops what is unusable, counts what is out of order and puts it in order, drops what came twice.
+void tidy(Stream& s, const std::vector<double>* sequence) {
+  std::vector<std::size_t> rows;
+  std::int64_t latest = kNoTime;
+  for (std::size_t i = 0; i < s.t_ns.size(); ++i) {
+    std::size_t finite = 0;
+    for (const auto& [name, column] : s.columns) finite += std::isfinite(column[i]);
+    if (finite == 0) continue;  // another's row on the same channel
+    if (finite < s.columns.size() || s.t_ns[i] == kNoTime || !is_rotation(s, i)) {
+      ++s.report.unusable;
+      continue;
+    }
+    if (s.t_ns[i] < latest) ++s.report.reordered;
+    latest = std::max(latest, s.t_ns[i]);
+    rows.push_back(i);
+  }
+  std::ranges::stable_sort(rows, {}, [&](std::size_t i) { return s.t_ns[i]; });
+  const auto again =
+      std::unique(rows.begin(), rows.end(), [&](std::size_t i, std::size_t k) { return s.t_ns[i] == s.t_ns[k]; });
+  s.report.twice = static_cast<std::size_t>(rows.end() - again);
+  rows.erase(again, rows.end());
+  const auto kept = [&](const auto& all) {
+    std::remove_cvref_t<decltype(all)> some;
+    for (const std::size_t i : rows) some.push_back(all[i]);
+    return some;
+  };
+  s.t_ns = kept(s.t_ns);
+  for (auto& [name, column] : s.columns) column = kept(column);
+  s.report.samples = rows.size();
+  if (rows.size() < 2) return;
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < rows.size(); ++i)
+    steps_s.push_back(1e-9 * static_cast<double>(s.t_ns[i] - s.t_ns[i - 1]));
+  const double step_s = io::median(steps_s);
+  double all_steps = 0;
+  const std::vector<double> counts = sequence ? kept(*sequence) : std::vector<double>();
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const double by_time = std::round(steps_s[i - 1] / step_s);
+    const double steps = sequence ? counts[i] - counts[i - 1] : by_time;
+    if (steps > 1 && steps < 1e6) s.report.lost += static_cast<std::size_t>(steps) - 1;  // else it began anew
+    all_steps += std::max(by_time, 1.0);
+  }
+  s.report.rate_hz = all_steps / (1e-9 * static_cast<double>(s.t_ns.back() - s.t_ns.front()));
+}
+
+/// Delays are beyond the quickest message of the clock, lateness beyond the quickest of the stream: some sensors just take longer.
+void count_delays(Stream& s, const Channel& channel, const ClockLine& quickest) {
+  std::vector<std::pair<std::int64_t, std::int64_t>> pairs;
+  const std::vector<std::int64_t> stamps = raw_times(channel, s.mapping);
+  for (std::size_t i = 0; i < stamps.size(); ++i)
+    if (stamps[i] != kNoTime && channel.received_ns()[i] != kNoTime)
+      pairs.emplace_back(stamps[i], channel.received_ns()[i]);
+  if (pairs.empty()) return;
+  const ClockLine own = ClockLine::below(pairs);
+  std::vector<double> delays_s;
+  for (const auto& [stamp, received] : pairs) {
+    delays_s.push_back(1e-9 * static_cast<double>(received - quickest.received_ns(stamp)));
+    s.report.late += 1e-9 * static_cast<double>(received - own.received_ns(stamp)) > s.mapping.late_s;
+  }
+  s.report.delay_most_s = *std::ranges::max_element(delays_s);
+  s.report.delay_median_s = io::median(delays_s);
+}
+
+Stream read_stream(const Channels& channels, const StreamMapping& mapping, const Clocks& clocks) {
+  const Channel& channel = channel_of(channels, mapping, mapping.channel, "channel");
+  if (all_missing(raw_times(channel, mapping)) && !channel.received_ns().empty())
+    mapping.table.fail("time",
+                       mapping.time == TimeOf::stamp ? "samples of this channel have no stamp"
+                                                     : "samples of this channel do not say when they were received",
+                       mapping.time == TimeOf::stamp ? "\"received\", or \"field\" with time_field"
+                                                     : "\"stamp\", or \"field\" with time_field");
+  const Timed own = timed(channel, mapping, clocks);
+  Stream s{mapping, own.t_ns, {}, {}};
+  s.report.stream = mapping.name;
+  s.report.channel = mapping.channel;
+  for (const ColumnMapping& c : mapping.columns) {
+    const io::Table columns = mapping.table.table("columns");
+    Column column;
+    if (c.channel == mapping.channel) {
+      column = field_of(channel, columns, c.column, c.field);
+    } else {
+      const Channel& other = channel_of(channels, mapping, c.channel, "from");
+      const std::vector<double>& values = field_of(other, columns, c.column, c.field);
+      for (const std::size_t row : last_rows(own.t_ns, timed(other, mapping, clocks).t_ns))
+        column.push_back(row < values.size() ? values[row] : std::numeric_limits<double>::quiet_NaN());
+    }
+    for (double& value : column) value = c.scale * value + c.offset;
+    s.columns[c.column] = std::move(column);
+  }
+  if (mapping.time != TimeOf::received) count_delays(s, channel, clocks.quickest(mapping));
+  const std::string& counted = mapping.sequence;
+  tidy(s, counted.empty() ? nullptr : &field_of(channel, mapping.table, "sequence", counted));
+  if (s.t_ns.size() < 2)
+    mapping.table.fail("channel",
+                       "\"" + mapping.channel + "\" has " + std::to_string(s.t_ns.size()) + " usable samples, " +
+                           std::to_string(s.report.unusable) + " that are not, and " + std::to_string(s.report.twice) +
+                           " at the time of another",
+                       "at least 2 usable ones");
+  s.turn();
+  return s;
+}
+
+Column seconds(const std::vector<std::int64_t>& t_ns, std::int64_t start_ns) {
+  Column t_s;
+  for (const std::int64_t t : t_ns) t_s.push_back(static_cast<double>(t - start_ns) / 1e9);
+  return t_s;
+}
+
+void put(FlightLog& log, Stream& s, std::int64_t start_ns) {
+  const Column t_s = seconds(s.t_ns, start_ns);
+  const double rate_hz = s.report.rate_hz;
+  Columns& c = s.columns;
+  if (s.mapping.name == "command") {
+    CommandStream& to = log.command;
+    to = {t_s, c["left_voltage_V"], c["right_voltage_V"], {}, {}};
+    if (c.contains("amplitude_V"))
+      to.inputs = BeatInputs{c["amplitude_V"], c["difference_V"], c["bias_V"], c["split_cycle"]};
+    if (c.contains("phase_rad")) to.phase_rad = c["phase_rad"];
+  } else if (s.mapping.name == "mocap") {
+    log.mocap = {t_s, c["x_m"], c["y_m"], c["z_m"], c["qw"], c["qx"], c["qy"], c["qz"]};
+    if (s.mapping.measures_rate) log.header.mocap.rate_hz = rate_hz;
+  } else if (s.mapping.name == "imu") {
+    log.imu = {t_s,
+               c["gyro_x_rad_s"],
+               c["gyro_y_rad_s"],
+               c["gyro_z_rad_s"],
+               c["accel_x_m_s2"],
+               c["accel_y_m_s2"],
+               c["accel_z_m_s2"]};
+    if (s.mapping.measures_rate) log.header.imu.rate_hz = rate_hz;
+  } else if (s.mapping.name == "power") {
+    log.power = PowerStream{t_s, c["battery_V"], c["left_current_A"], c["right_current_A"]};
+    if (s.mapping.measures_rate) log.header.power->rate_hz = rate_hz;
+  } else {
+    log.wings =
+        WingsStream{t_s, c["left_stroke_rad"], c["left_rotation_rad"], c["right_stroke_rad"], c["right_rotation_rad"]};
+    if (s.mapping.measures_rate) log.header.wings->rate_hz = rate_hz;
+  }
+}
+
+}  // namespace
+
+Imported assemble(const Channels& channels, const Mapping& mapping) {
+  const Clocks clocks(channels, mapping);
+  std::vector<Stream> streams;
+  Imported out;
+  out.log.header = mapping.header;
+  for (const StreamMapping& s : mapping.streams) {
+    if (!left_out(channels, s)) {
+      streams.push_back(read_stream(channels, s, clocks));
+      continue;
+    }
+    out.report.warnings.push_back(s.name + ": " + s.channel + " is not recorded: done without");
+    if (s.name == "power") out.log.header.power.reset();
+    else out.log.header.wings.reset();
+  }
+  out.report.clocks = clocks.reports();
+  if (mapping.from_first) {
+    out.report.start_ns = streams.front().t_ns.front();
+    for (const Stream& s : streams) out.report.start_ns = std::min(out.report.start_ns, s.t_ns.front());
+  }
+  for (Stream& s : streams) {
+    put(out.log, s, out.report.start_ns);
+    out.report.streams.push_back(s.report);
+  }
+  return out;
+}
+
+std::string report_text(const ImportReport& report) {
+  std::string text;
+  char line[256];
+  const auto add = [&](const char* format, auto... values) {
+    std::snprintf(line, sizeof line, format, values...);
+    text += line;
+  };
+  add("  %-8s %9s %9s %6s %6s %6s %6s %8s  %21s  %s\n", "stream", "samples", "Hz", "never", "twice", "late", "order",
+      "unusable", "delay ms, median most", "channel");
+  for (const StreamReport& s : report.streams)
+    add("  %-8s %9zu %9.2f %6zu %6zu %6zu %6zu %8zu  %12.3f %8.3f  %s\n", s.stream.c_str(), s.samples, s.rate_hz,
+        s.lost, s.twice, s.late, s.reordered, s.unusable, 1e3 * s.delay_median_s, 1e3 * s.delay_most_s,
+        s.channel.c_str());
+  for (const ClockReport& c : report.clocks) {
+    if (c.name == kReceiver) {
+      const bool odd = c.offset_s < 0 || c.offset_s > kOddOffset_s;
+      add("  stamps of the receiver's clock: the quickest of %zu came %.6f s later%s\n", c.stamps, c.offset_s,
+          odd ? ", so they may be of another clock" : "");
+      continue;
+    }
+    add("  clock %s: the receiver's is ahead by %.6f s", c.name.c_str(), c.offset_s);
+    if (c.measured) add(", drifting by %.1f us/s, by %zu stamps over %.1f s\n", 1e6 * c.drift, c.stamps, c.span_s);
+    else text += ", as the mapping says\n";
+  }
+  return text;
+}
+
+}  // namespace flappy::flightlog

@@ -1,0 +1,88 @@
+#include "flightlog/import/channels.hpp"
+
+#include <utility>
+
+namespace flappy::flightlog {
+namespace {
+
+/// What PX4 calls the first instance of a topic is often the only one.
+const std::string kFirst = "[0]";
+
+/// Differences of two times fit, too.
+std::int64_t checked(std::int64_t t_ns) {
+  constexpr std::int64_t kLatest_ns = 4'000'000'000'000'000'000;
+  return t_ns >= -kLatest_ns && t_ns <= kLatest_ns ? t_ns : kNoTime;
+}
+
+}  // namespace
+
+void Channel::add(std::int64_t received_ns, std::int64_t stamp_ns, const Row& row) {
+  received_ns_.push_back(checked(received_ns));
+  stamp_ns_.push_back(checked(stamp_ns));
+  for (std::size_t k = 0; k < row.size(); ++k) {
+    if (k == order_.size()) order_.emplace_back(row[k].name, slot(row[k].name));
+    else if (order_[k].first != row[k].name) order_[k] = {row[k].name, slot(row[k].name)};
+    if (const std::size_t at = order_[k].second; at != kUnwanted) {
+      columns_[at].resize(received_ns_.size() - 1, std::numeric_limits<double>::quiet_NaN());
+      columns_[at].push_back(row[k].value);
+    }
+  }
+  for (auto& column : columns_) column.resize(received_ns_.size(), std::numeric_limits<double>::quiet_NaN());
+}
+
+std::size_t Channel::slot(const std::string& field) {
+  const auto [found, fresh] = slots_.try_emplace(field, kUnwanted);
+  if (fresh && (wanted_.empty() || wanted_.contains(field))) {
+    found->second = columns_.size();
+    columns_.emplace_back();
+  }
+  return found->second;
+}
+
+const std::vector<double>* Channel::column(std::string_view field) const {
+  const auto found = slots_.find(field);
+  return found == slots_.end() || found->second == kUnwanted ? nullptr : &columns_[found->second];
+}
+
+std::vector<std::string> Channel::fields() const {
+  std::vector<std::string> list;
+  for (const auto& [name, slot] : slots_) list.push_back(name);
+  return list;
+}
+
+bool Channels::wants(const std::string& channel) const {
+  return wanted_.empty() || wanted_.contains(channel) ||
+         (channel.ends_with(kFirst) && wanted_.contains(channel.substr(0, channel.size() - kFirst.size())));
+}
+
+void Channels::add(const std::string& channel) {
+  if (channels_.contains(channel)) return;
+  auto wanted = wanted_.find(channel);
+  if (wanted == wanted_.end() && channel.ends_with(kFirst))
+    wanted = wanted_.find(channel.substr(0, channel.size() - kFirst.size()));
+  channels_.emplace(channel, Channel(wanted == wanted_.end() ? std::set<std::string>() : wanted->second));
+}
+
+void Channels::add(const std::string& channel, std::int64_t received_ns, std::int64_t stamp_ns, const Row& row) {
+  if (!wants(channel)) return;
+  auto found = channels_.find(channel);
+  if (found == channels_.end()) {
+    add(channel);
+    found = channels_.find(channel);
+  }
+  found->second.add(received_ns, stamp_ns, row);
+}
+
+const Channel* Channels::find(const std::string& name) const {
+  auto found = channels_.find(name);
+  if (found == channels_.end()) found = channels_.find(name + kFirst);
+  return found == channels_.end() ? nullptr : &found->second;
+}
+
+std::vector<std::string> Channels::names() const {
+  std::vector<std::string> list;
+  for (const auto& [name, channel] : channels_) list.push_back(name);
+  return list;
+}
+
+}  // namespace flappy::flightlog

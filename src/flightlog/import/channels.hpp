@@ -1,0 +1,69 @@
+// What a recording holds, whatever wrote it: named channels of rows of named numbers, each with the time at which it was
+// received and, where it says so itself, the time that it tells of. Importers fill it, and so may a recorder, row by row.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace flappy::flightlog {
+
+/// Where a row has no such time. Others are nanoseconds of some clock.
+inline constexpr std::int64_t kNoTime = std::numeric_limits<std::int64_t>::min();
+
+struct Item {
+  std::string name;
+  double value;
+};
+using Row = std::vector<Item>;
+
+/// Fields by channel.
+using Wanted = std::map<std::string, std::set<std::string>>;
+
+class Channel {
+ public:
+  /// Nothing wanted: all of it.
+  explicit Channel(std::set<std::string> wanted = {}) : wanted_(std::move(wanted)) {}
+
+  void add(std::int64_t received_ns, std::int64_t stamp_ns, const Row& row);
+  const std::vector<std::int64_t>& received_ns() const { return received_ns_; }
+  const std::vector<std::int64_t>& stamp_ns() const { return stamp_ns_; }
+  /// One value for each row, NaN where it had none; null where there is no such field, or nobody wanted it.
+  const std::vector<double>* column(std::string_view field) const;
+  /// Names of all fields that rows had, wanted or not.
+  std::vector<std::string> fields() const;
+
+ private:
+  static constexpr std::size_t kUnwanted = std::numeric_limits<std::size_t>::max();
+  std::size_t slot(const std::string& field);
+
+  std::set<std::string> wanted_;
+  std::vector<std::int64_t> received_ns_, stamp_ns_;
+  std::map<std::string, std::size_t, std::less<>> slots_;
+  std::vector<std::vector<double>> columns_;
+  std::vector<std::pair<std::string, std::size_t>> order_;  ///< of the row before, which the next is like
+};
+
+class Channels {
+ public:
+  /// Only rows of what is wanted are kept; nothing wanted: all.
+  explicit Channels(Wanted wanted = {}) : wanted_(std::move(wanted)) {}
+
+  bool wants(const std::string& channel) const;
+  /// Makes a channel known, though no row of it may come.
+  void add(const std::string& channel);
+  void add(const std::string& channel, std::int64_t received_ns, std::int64_t stamp_ns, const Row& row);
+  /// `name`, or else `name`[0]; null where it is not there.
+  const Channel* find(const std::string& name) const;
+  std::vector<std::string> names() const;
+
+ private:
+  Wanted wanted_;
+  std::map<std::string, Channel> channels_;
+};
+
+}  // namespace flappy::flightlog

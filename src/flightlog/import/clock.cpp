@@ -1,0 +1,63 @@
+#include "flightlog/import/clock.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace flappy::flightlog {
+namespace {
+
+struct Point {
+  double x_s, y_ns;
+};
+
+/// The lower convex hull of points in order of x.
+std::vector<Point> lower_hull(const std::vector<Point>& points) {
+  std::vector<Point> hull;
+  for (const Point& p : points) {
+    while (hull.size() >= 2) {
+      const Point &a = hull[hull.size() - 2], &b = hull.back();
+      if ((b.x_s - a.x_s) * (p.y_ns - a.y_ns) > (b.y_ns - a.y_ns) * (p.x_s - a.x_s)) break;
+      hull.pop_back();
+    }
+    hull.push_back(p);
+  }
+  return hull;
+}
+
+}  // namespace
+
+ClockLine ClockLine::below(std::vector<std::pair<std::int64_t, std::int64_t>> pairs) {
+  std::ranges::sort(pairs);
+  ClockLine line;
+  line.origin_ns_ = pairs.front().first;
+  line.base_ns_ = pairs.front().second - pairs.front().first;
+  std::vector<Point> points;
+  double least_ns = 0, middle_s = 0;
+  for (const auto& [stamp, received] : pairs) {
+    // small numbers, which a double holds to the nanosecond
+    const Point p{1e-9 * static_cast<double>(stamp - line.origin_ns_),
+                  static_cast<double>(received - stamp - line.base_ns_)};
+    if (points.empty() || p.x_s > points.back().x_s) points.push_back(p);  // of one stamp, the first has the least
+    least_ns = std::min(least_ns, p.y_ns);
+    middle_s += p.x_s / static_cast<double>(pairs.size());
+  }
+  line.above_ns_ = least_ns;
+  if (points.back().x_s < kLeastSpan_s) return line;
+  const std::vector<Point> hull = lower_hull(points);
+  std::size_t i = 0;
+  while (i + 2 < hull.size() && hull[i + 1].x_s < middle_s) ++i;
+  const double slope_ns_s = (hull[i + 1].y_ns - hull[i].y_ns) / (hull[i + 1].x_s - hull[i].x_s);
+  if (std::abs(slope_ns_s) > 1e9 * kMostDrift) return line;
+  line.slope_ = 1e-9 * slope_ns_s;
+  line.above_ns_ = hull[i].y_ns - slope_ns_s * hull[i].x_s;
+  return line;
+}
+
+std::int64_t ClockLine::received_ns(std::int64_t stamp_ns) const {
+  const double above_ns = above_ns_ + slope_ * static_cast<double>(stamp_ns - origin_ns_);
+  return stamp_ns + base_ns_ + std::llround(above_ns);
+}
+
+double ClockLine::offset_s() const { return 1e-9 * (static_cast<double>(base_ns_) + above_ns_); }
+
+}  // namespace flappy::flightlog

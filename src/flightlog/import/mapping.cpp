@@ -1,0 +1,184 @@
+#include "flightlog/import/mapping.hpp"
+
+#include <algorithm>
+
+namespace flappy::flightlog {
+namespace {
+
+using io::non_negative;
+using io::positive;
+using Names = std::vector<std::string>;
+
+struct StreamKeys {
+  std::string name;
+  Names columns, optional_columns, declared;
+  bool has_frame, has_world;
+};
+
+const std::vector<StreamKeys> kStreams = {
+    {"command",
+     {"left_voltage_V", "right_voltage_V"},
+     {"amplitude_V", "difference_V", "bias_V", "split_cycle", "phase_rad"},
+     {},
+     false,
+     false},
+    {"mocap",
+     {"x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"},
+     {},
+     {"latency_s", "position_noise_m", "attitude_noise_rad"},
+     true,
+     true},
+    {"imu",
+     {"gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s", "accel_x_m_s2", "accel_y_m_s2", "accel_z_m_s2"},
+     {},
+     {"latency_s", "bandwidth_hz", "position_m", "gyro_noise_rad_s", "gyro_bias_sd_rad_s", "accel_noise_m_s2"},
+     true,
+     false},
+    {"power",
+     {"battery_V", "left_current_A", "right_current_A"},
+     {},
+     {"battery_nominal_V", "latency_s", "voltage_noise_V", "current_noise_A"},
+     false,
+     false},
+    {"wings",
+     {"left_stroke_rad", "left_rotation_rad", "right_stroke_rad", "right_rotation_rad"},
+     {},
+     {"noise_rad"},
+     false,
+     false},
+};
+
+void read_columns(const StreamKeys& keys, StreamMapping& stream) {
+  const io::Table& table = stream.table;
+  Names known = keys.columns;
+  known.insert(known.end(), keys.optional_columns.begin(), keys.optional_columns.end());
+  const io::Table columns = table.table("columns");
+  columns.accept(known);
+  const auto scale = table.optional_table("scale"), offset = table.optional_table("offset"),
+             from = table.optional_table("from");
+  for (const auto* part : {&scale, &offset, &from})
+    if (*part) (*part)->accept(known);
+  for (const std::string& name : known) {
+    if (std::ranges::find(keys.columns, name) == keys.columns.end() && !columns.has(name)) {
+      for (const auto* part : {&scale, &offset, &from})
+        if (*part && (*part)->has(name)) (*part)->fail(name, "has no such column", "columns of " + columns.path());
+      continue;
+    }
+    ColumnMapping column{name, stream.channel, columns.string(name)};
+    if (scale) column.scale = scale->number_or(name, 1);
+    if (offset) column.offset = offset->number_or(name, 0);
+    if (from) column.channel = from->string_or(name, stream.channel);
+    stream.columns.push_back(std::move(column));
+  }
+  Names given, missing;
+  if (keys.name == "command")
+    for (const char* input : {"amplitude_V", "difference_V", "bias_V", "split_cycle"})
+      (columns.has(input) ? given : missing).emplace_back(input);
+  if (!given.empty() && !missing.empty())
+    columns.fail(given.front(), "is given without " + io::joined(missing), "all four inputs of the wing beat, or none");
+}
+
+StreamMapping read_stream(const StreamKeys& keys, const io::Table& table) {
+  Names accepted = {"channel",  "time",    "time_field", "time_unit", "clock", "late_s",
+                    "sequence", "columns", "scale",      "offset",    "from"};
+  accepted.insert(accepted.end(), keys.declared.begin(), keys.declared.end());
+  if (keys.has_frame) accepted.emplace_back("frame");
+  if (keys.has_world) accepted.emplace_back("world");
+  if (keys.name != "command") accepted.emplace_back("rate_hz");
+  table.accept(accepted);
+  StreamMapping s{.name = keys.name, .table = table};
+  s.channel = table.string("channel");
+  const std::string time = table.choice_or("time", "stamp", {"stamp", "received", "field"});
+  s.time = time == "stamp" ? TimeOf::stamp : time == "received" ? TimeOf::received : TimeOf::field;
+  if (s.time == TimeOf::field) {
+    s.time_field = table.string("time_field");
+    const std::string unit = table.choice_or("time_unit", "s", {"s", "ms", "us", "ns"});
+    s.time_unit_ns = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : 1;
+  } else {
+    for (const char* key : {"time_field", "time_unit"})
+      if (table.has(key)) table.fail(key, "is given beside time = \"" + time + "\"", "time = \"field\"");
+  }
+  s.clock = table.string_or("clock", kReceiver);
+  if (s.time == TimeOf::received && s.clock != kReceiver)
+    table.fail("clock", "\"" + s.clock + "\" is not the clock of times of receipt",
+               "\"" + kReceiver + "\", or time = \"stamp\"");
+  s.late_s = table.number_or("late_s", s.late_s, positive(1e3));
+  s.sequence = table.string_or("sequence", "");
+  if (keys.has_frame) s.frd = table.choice_or("frame", "flu", {"flu", "frd"}) == "frd";
+  if (keys.has_world) s.ned = table.choice_or("world", "enu", {"enu", "ned"}) == "ned";
+  s.measures_rate = keys.name != "command" && !table.has("rate_hz");
+  read_columns(keys, s);
+  return s;
+}
+
+/// As flight.toml has them; what is left out is 0 until it is measured.
+void read_declared(const io::Table& root, FlightHeader& h) {
+  const io::Range rate = positive(1e6), latency = non_negative(10);
+  const auto rate_of = [&](const io::Table& table) { return table.number_or("rate_hz", 0, rate); };
+  const io::Table mocap = root.table("mocap"), imu = root.table("imu");
+  h.mocap = {rate_of(mocap), mocap.number("latency_s", latency), mocap.number("position_noise_m", non_negative(1)),
+             mocap.number("attitude_noise_rad", non_negative(1))};
+  h.imu.rate_hz = rate_of(imu);
+  h.imu.latency_s = imu.number("latency_s", latency);
+  h.imu.bandwidth_hz = imu.number("bandwidth_hz", rate);
+  std::ranges::copy(imu.numbers("position_m", 3, {-1, 1}), h.imu.position_m.begin());
+  h.imu.gyro_noise_rad_s = imu.number("gyro_noise_rad_s", non_negative(10));
+  std::ranges::copy(imu.numbers("gyro_bias_sd_rad_s", 3, non_negative(10)), h.imu.gyro_bias_sd_rad_s.begin());
+  h.imu.accel_noise_m_s2 = imu.number("accel_noise_m_s2", non_negative(1e3));
+  if (const auto power = root.optional_table("power"))
+    h.power = {power->number("battery_nominal_V", positive(100)), rate_of(*power), power->number("latency_s", latency),
+               power->number("voltage_noise_V", non_negative(10)), power->number("current_noise_A", non_negative(10))};
+  if (const auto wings = root.optional_table("wings"))
+    h.wings = {rate_of(*wings), wings->number("noise_rad", non_negative(1))};
+}
+
+}  // namespace
+
+Wanted Mapping::wanted() const {
+  Wanted wanted;
+  for (const StreamMapping& s : streams) {
+    std::set<std::string>& own = wanted[s.channel];
+    if (!s.time_field.empty()) own.insert(s.time_field);
+    if (!s.sequence.empty()) own.insert(s.sequence);
+    for (const ColumnMapping& c : s.columns) {
+      wanted[c.channel].insert(c.field);
+      if (!s.time_field.empty()) wanted[c.channel].insert(s.time_field);
+    }
+  }
+  return wanted;
+}
+
+Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  const io::Config config = io::Config::load(path, overrides);
+  const io::Table root = config.root();
+  root.schema(1);
+  Names accepted = {"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2", "start", "ambient", "clocks"};
+  for (const StreamKeys& keys : kStreams) accepted.push_back(keys.name);
+  root.accept(accepted);
+  Mapping m;
+  FlightHeader& h = m.header;
+  h.vehicle = root.string("vehicle");
+  h.vehicle_sha256 = root.string_or("vehicle_sha256", "");
+  h.flapping_Hz = root.number("flapping_Hz", positive(1e3));
+  h.gravity_m_s2 = root.number("gravity_m_s2", non_negative(100));
+  m.from_first = root.choice_or("start", "first", {"first", "clock"}) == "first";
+  h.ambient = read_ambient(root.table("ambient"));
+  for (const StreamKeys& keys : kStreams) {
+    const bool optional = keys.name == "power" || keys.name == "wings";
+    if (optional && !root.has(keys.name)) continue;
+    m.streams.push_back(read_stream(keys, root.table(keys.name)));
+  }
+  read_declared(root, h);
+  if (const auto clocks = root.optional_table("clocks"))
+    for (const std::string& name : clocks->keys()) {
+      const bool used = std::ranges::find(m.streams, name, &StreamMapping::clock) != m.streams.end();
+      if (!used || name == kReceiver) clocks->fail(name, "is no clock of a stream", "names that clock = \"...\" has");
+      const io::Table clock = clocks->table(name);
+      clock.accept({"offset_s"});
+      if (clock.has("offset_s")) m.offsets_s[name] = clock.number("offset_s", {-4e9, 4e9});
+    }
+  root.finish();
+  return m;
+}
+
+}  // namespace flappy::flightlog

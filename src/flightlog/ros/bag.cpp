@@ -1,0 +1,212 @@
+#include "flightlog/ros/bag.hpp"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <deque>
+#include <fstream>
+#include <map>
+
+#include "flightlog/ros/mcap.hpp"
+#include "flightlog/ros/mcap_records.hpp"
+#include "flightlog/ros/messages.hpp"
+#include "io/files.hpp"
+#include "io/mapped_file.hpp"
+
+namespace flappy::flightlog::ros {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kSqliteMagic("SQLite format 3\0", 16);
+constexpr std::string_view kAccepted = "rosbag2's .mcap or .db3 files, or a folder of them";
+
+class McapBag : public Bag {
+ public:
+  explicit McapBag(const fs::path& path) : file_(path), reader_(file_.bytes(), path.string()) {}
+
+  std::optional<BagMessage> next() override {
+    while (const auto message = reader_.next()) {
+      const McapTopic& t = *message->topic;
+      if (t.encoding != "cdr") continue;
+      BagTopic& topic = topics_[&t];
+      if (topic.name.empty()) topic = {t.name, t.type, t.definition_encoding == "ros2msg" ? t.definition : ""};
+      return BagMessage{&topic, message->logged_ns, message->bytes};
+    }
+    return {};
+  }
+  std::vector<std::string> warnings() const override { return reader_.warnings(); }
+
+ private:
+  io::MappedFile file_;
+  McapReader reader_;
+  std::map<const McapTopic*, BagTopic> topics_;
+};
+
+class SqliteBag : public Bag {
+ public:
+  explicit SqliteBag(const fs::path& path) : name_(path.string()) {
+    io::MappedFile readable(path);  // says why not, in our words
+    sqlite3* database = nullptr;
+    const int code = sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READONLY, nullptr);
+    database_.reset(database);
+    if (code != SQLITE_OK) refuse();
+    read_topics();
+    messages_ = prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id");
+    if (!messages_) refuse();
+  }
+
+  std::optional<BagMessage> next() override {
+    while (!ended_) {
+      const int code = sqlite3_step(messages_.get());
+      if (code != SQLITE_ROW) {
+        ended_ = true;
+        if (code != SQLITE_DONE)
+          warnings_.push_back(name_ + ": " + sqlite3_errmsg(database_.get()) + ": read as far as it goes");
+        break;
+      }
+      const auto topic = topics_.find(sqlite3_column_int64(messages_.get(), 0));
+      if (topic == topics_.end()) continue;
+      const auto* data = static_cast<const char*>(sqlite3_column_blob(messages_.get(), 2));
+      const auto size = static_cast<std::size_t>(sqlite3_column_bytes(messages_.get(), 2));
+      return BagMessage{&topic->second, sqlite3_column_int64(messages_.get(), 1), {data, size}};
+    }
+    return {};
+  }
+  std::vector<std::string> warnings() const override { return warnings_; }
+
+ private:
+  struct Close {
+    void operator()(sqlite3* database) const { sqlite3_close(database); }
+    void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+  };
+  using Statement = std::unique_ptr<sqlite3_stmt, Close>;
+
+  [[noreturn]] void refuse() const {
+    throw io::InputError(name_ + ": cannot be read as a bag: " + sqlite3_errmsg(database_.get()) +
+                         "; accepted: " + std::string(kAccepted));
+  }
+
+  Statement prepare(const char* query) {
+    sqlite3_stmt* statement = nullptr;
+    sqlite3_prepare_v2(database_.get(), query, -1, &statement, nullptr);
+    return Statement(statement);
+  }
+
+  static std::string text(const Statement& statement, int column) {
+    const auto* chars = reinterpret_cast<const char*>(sqlite3_column_text(statement.get(), column));
+    return chars ? chars : "";
+  }
+
+  void read_topics() {
+    // a table of Iron and later
+    std::map<std::string, std::string> definitions;
+    if (const Statement found =
+            prepare("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"))
+      while (sqlite3_step(found.get()) == SQLITE_ROW)
+        if (text(found, 1) == "ros2msg") definitions[text(found, 0)] = text(found, 2);
+    const Statement topics = prepare("SELECT id, name, type, serialization_format FROM topics");
+    if (!topics) refuse();
+    while (sqlite3_step(topics.get()) == SQLITE_ROW) {
+      if (text(topics, 3) != "cdr") continue;
+      const std::string type = text(topics, 2);
+      topics_[sqlite3_column_int64(topics.get(), 0)] = {text(topics, 1), type, definitions[type]};
+    }
+  }
+
+  std::string name_;
+  std::unique_ptr<sqlite3, Close> database_;
+  Statement messages_;
+  std::map<std::int64_t, BagTopic> topics_;
+  std::vector<std::string> warnings_;
+  bool ended_ = false;
+};
+
+/// Files one after the other.
+class SplitBag : public Bag {
+ public:
+  explicit SplitBag(std::vector<std::unique_ptr<Bag>> parts) : parts_(std::move(parts)) {}
+  std::optional<BagMessage> next() override {
+    for (; part_ < parts_.size(); ++part_)
+      if (auto message = parts_[part_]->next()) return message;
+    return {};
+  }
+  std::vector<std::string> warnings() const override {
+    std::vector<std::string> all;
+    for (const auto& part : parts_)
+      for (const std::string& warning : part->warnings()) all.push_back(warning);
+    return all;
+  }
+
+ private:
+  std::vector<std::unique_ptr<Bag>> parts_;
+  std::size_t part_ = 0;
+};
+
+std::string beginning(const fs::path& path) {
+  std::array<char, 16> bytes = {};
+  std::ifstream file(path, std::ios::binary);
+  file.read(bytes.data(), bytes.size());
+  return {bytes.data(), static_cast<std::size_t>(file.gcount())};
+}
+
+/// The number that ends a file's stem: of bag_2.mcap and bag_10.mcap, bag_2 comes first.
+std::uint64_t part_number(const fs::path& path) {
+  const std::string stem = path.stem().string();
+  const std::string digits = stem.substr(stem.find_last_not_of("0123456789") + 1);
+  std::uint64_t number = 0;
+  std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  return number;
+}
+
+std::vector<fs::path> parts_of(const fs::path& folder) {
+  std::vector<fs::path> parts;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string ending = entry.path().extension().string();
+    if (ending == ".mcap" || ending == ".db3") parts.push_back(entry.path());
+  }
+  std::ranges::sort(parts, [](const fs::path& a, const fs::path& b) {
+    return std::pair(part_number(a), a) < std::pair(part_number(b), b);
+  });
+  return parts;
+}
+
+}  // namespace
+
+bool Bag::is_bag(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored)) return !parts_of(path).empty();
+  const std::string begins = beginning(path);
+  return begins.starts_with(mcap::kMagic) || begins == kSqliteMagic;
+}
+
+std::unique_ptr<Bag> Bag::open(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored)) {
+    std::vector<std::unique_ptr<Bag>> parts;
+    for (const fs::path& part : parts_of(path)) parts.push_back(open(part));
+    if (parts.empty()) throw io::InputError(path.string() + ": holds no bag; accepted: " + std::string(kAccepted));
+    return std::make_unique<SplitBag>(std::move(parts));
+  }
+  if (beginning(path) == kSqliteMagic) return std::make_unique<SqliteBag>(path);
+  return std::make_unique<McapBag>(path);
+}
+
+std::shared_ptr<const Layout> layout_of(const BagTopic& topic) {
+  if (!topic.definition.empty()) {
+    Definitions definitions;
+    definitions.add(topic.type, topic.definition);
+    // a definition that refers to nothing else may leave out what everybody knows
+    try {
+      return definitions.layout(topic.type);
+    } catch (const MessageError&) {
+      if (!standard_messages().has(topic.type)) throw;
+    }
+  }
+  return standard_messages().layout(topic.type);
+}
+
+}  // namespace flappy::flightlog::ros

@@ -1,0 +1,183 @@
+#include "flightlog/ros/flight_mcap.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "flightlog/ros/cdr.hpp"
+#include "flightlog/ros/mcap.hpp"
+#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/type_hash.hpp"
+
+namespace flappy::flightlog::ros {
+namespace {
+
+constexpr const char *kWorld = "world", *kTorso = "torso";
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+std::int64_t to_ns(double t_s) { return std::llround(1e9 * t_s); }
+
+void put_time(Members& m, const std::string& path, std::int64_t t_ns) {
+  const std::int64_t sec = t_ns >= 0 ? t_ns / kSecond_ns : -((kSecond_ns - 1 - t_ns) / kSecond_ns);
+  m[path + ".sec"] = sec;
+  m[path + ".nanosec"] = t_ns - sec * kSecond_ns;
+}
+
+void put_header(Members& m, std::int64_t t_ns, const char* frame, const std::string& path = "header") {
+  put_time(m, path + ".stamp", t_ns);
+  m[path + ".frame_id"] = frame;
+}
+
+/// The same number on the diagonal of a matrix of 3 x 3.
+void put_variance(Members& m, const std::string& path, double sd) {
+  for (const int i : {0, 4, 8}) m[path + "[" + std::to_string(i) + "]"] = sd * sd;
+}
+
+/// The samples of one stream: when each was logged, and what writes it.
+struct Feed {
+  const Column* t_s;
+  std::function<void(std::size_t i)> write;
+  std::size_t next = 0;
+};
+
+class FlightFile {
+ public:
+  FlightFile(const std::filesystem::path& path, const FlightLog& log) : log_(log), file_(path) {
+    feeds_ = {{&log.command.t_s, [this](std::size_t i) { write_command(i); }},
+              {&log.mocap.t_s, [this](std::size_t i) { write_mocap(i); }},
+              {&log.imu.t_s, [this](std::size_t i) { write_imu(i); }}};
+    if (log.power && log.header.power) feeds_.push_back({&log.power->t_s, [this](std::size_t i) { write_power(i); }});
+    if (log.wings && log.header.wings) feeds_.push_back({&log.wings->t_s, [this](std::size_t i) { write_wings(i); }});
+  }
+
+  /// All samples in the order of their times, as a recorder would have seen them.
+  void write() {
+    while (true) {
+      Feed* first = nullptr;
+      for (Feed& feed : feeds_)
+        if (feed.next < feed.t_s->size() && (!first || (*feed.t_s)[feed.next] < (*first->t_s)[first->next]))
+          first = &feed;
+      if (!first) break;
+      first->write(first->next++);
+    }
+    file_.finish();
+  }
+
+ private:
+  struct Topic {
+    std::uint16_t number;
+    std::shared_ptr<const Layout> layout;
+  };
+
+  void send(const std::string& name, const char* type, double t_s, double latency_s, const Members& members) {
+    auto found = topics_.find(name);
+    if (found == topics_.end()) {
+      const auto layout = standard_messages().layout(type);
+      const auto number = file_.add_topic(name, type, standard_messages().concatenated(type), type_hash(*layout));
+      found = topics_.emplace(name, Topic{number, layout}).first;
+    }
+    file_.write(found->second.number, to_ns(t_s), to_ns(t_s - latency_s), encode(*found->second.layout, members));
+  }
+
+  void write_command(std::size_t i) {
+    const CommandStream& c = log_.command;
+    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+    const auto input = [&](Column BeatInputs::*column) { return c.inputs ? ((*c.inputs).*column)[i] : kUnknown; };
+    Members m = {{"tick", std::uint64_t{i}},
+                 {"amplitude_v", input(&BeatInputs::amplitude_V)},
+                 {"difference_v", input(&BeatInputs::difference_V)},
+                 {"bias_v", input(&BeatInputs::bias_V)},
+                 {"split_cycle", input(&BeatInputs::split_cycle)},
+                 {"left_voltage_v", c.left_voltage_V[i]},
+                 {"right_voltage_v", c.right_voltage_V[i]},
+                 {"phase_rad", c.phase_rad ? (*c.phase_rad)[i] : kUnknown}};
+    put_header(m, to_ns(c.t_s[i]), kTorso);
+    send("/wing_input", type_name::kWingInput, c.t_s[i], 0, m);
+  }
+
+  void write_mocap(std::size_t i) {
+    const MocapStream& s = log_.mocap;
+    const double t_s = s.t_s[i], late_s = log_.header.mocap.latency_s;
+    const std::array<std::pair<const char*, double>, 3> place = {{{"x", s.x_m[i]}, {"y", s.y_m[i]}, {"z", s.z_m[i]}}};
+    const std::array<std::pair<const char*, double>, 4> turn = {
+        {{"w", s.qw[i]}, {"x", s.qx[i]}, {"y", s.qy[i]}, {"z", s.qz[i]}}};
+    Members pose, tf, clock;
+    put_header(pose, to_ns(t_s - late_s), kWorld);
+    put_header(tf, to_ns(t_s - late_s), kWorld, "transforms[0].header");
+    tf["transforms[0].child_frame_id"] = kTorso;
+    for (const auto& [axis, value] : place) {
+      pose[std::string("pose.position.") + axis] = value;
+      tf[std::string("transforms[0].transform.translation.") + axis] = value;
+    }
+    for (const auto& [axis, value] : turn) {
+      pose[std::string("pose.orientation.") + axis] = value;
+      tf[std::string("transforms[0].transform.rotation.") + axis] = value;
+    }
+    put_time(clock, "clock", to_ns(t_s));
+    send("/clock", type_name::kClock, t_s, 0, clock);
+    send("/pose", type_name::kPoseStamped, t_s, late_s, pose);
+    send("/tf", type_name::kTFMessage, t_s, late_s, tf);
+  }
+
+  void write_imu(std::size_t i) {
+    const ImuStream& s = log_.imu;
+    const ImuHeader& h = log_.header.imu;
+    Members m = {{"angular_velocity.x", s.gyro_x_rad_s[i]},
+                 {"angular_velocity.y", s.gyro_y_rad_s[i]},
+                 {"angular_velocity.z", s.gyro_z_rad_s[i]},
+                 {"linear_acceleration.x", s.accel_x_m_s2[i]},
+                 {"linear_acceleration.y", s.accel_y_m_s2[i]},
+                 {"linear_acceleration.z", s.accel_z_m_s2[i]},
+                 {"orientation.w", 1.0},
+                 {"orientation_covariance[0]", -1.0}};  // it knows none
+    put_header(m, to_ns(s.t_s[i] - h.latency_s), kTorso);
+    put_variance(m, "angular_velocity_covariance", h.gyro_noise_rad_s);
+    put_variance(m, "linear_acceleration_covariance", h.accel_noise_m_s2);
+    send("/imu", type_name::kImu, s.t_s[i], h.latency_s, m);
+  }
+
+  void write_power(std::size_t i) {
+    const PowerStream& s = *log_.power;
+    const double t_s = s.t_s[i], late_s = log_.header.power->latency_s;
+    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+    Members battery = {{"voltage", s.battery_V[i]},   {"current", -(s.left_current_A[i] + s.right_current_A[i])},
+                       {"present", std::uint64_t{1}}, {"temperature", kUnknown},
+                       {"charge", kUnknown},          {"capacity", kUnknown},
+                       {"design_capacity", kUnknown}, {"percentage", kUnknown}};
+    Members motors = {{"name[0]", "left_motor"},
+                      {"name[1]", "right_motor"},
+                      {"effort[0]", s.left_current_A[i]},
+                      {"effort[1]", s.right_current_A[i]}};
+    put_header(battery, to_ns(t_s - late_s), kTorso);
+    put_header(motors, to_ns(t_s - late_s), kTorso);
+    send("/motors", type_name::kJointState, t_s, late_s, motors);
+    send("/battery", type_name::kBatteryState, t_s, late_s, battery);
+  }
+
+  void write_wings(std::size_t i) {
+    const WingsStream& s = *log_.wings;
+    Members m = {{"name[0]", "left_stroke"},
+                 {"name[1]", "left_rotation"},
+                 {"name[2]", "right_stroke"},
+                 {"name[3]", "right_rotation"},
+                 {"position[0]", s.left_stroke_rad[i]},
+                 {"position[1]", s.left_rotation_rad[i]},
+                 {"position[2]", s.right_stroke_rad[i]},
+                 {"position[3]", s.right_rotation_rad[i]}};
+    put_header(m, to_ns(s.t_s[i]), kTorso);
+    send("/joint_states", type_name::kJointState, s.t_s[i], 0, m);
+  }
+
+  const FlightLog& log_;
+  McapWriter file_;
+  std::map<std::string, Topic> topics_;
+  std::vector<Feed> feeds_;
+};
+
+}  // namespace
+
+void write_flight_mcap(const std::filesystem::path& path, const FlightLog& log) { FlightFile(path, log).write(); }
+
+}  // namespace flappy::flightlog::ros

@@ -1,0 +1,22 @@
+// A flight log as topics of ROS 2, for Foxglove, PlotJuggler and whatever reads bags.
+//
+//   /pose         PoseStamped    motion capture, in "world"          /tf      TFMessage   the same, "world" to "torso"
+//   /imu          Imu            in "torso"; variances as declared   /clock   Clock       with every pose
+//   /wing_input   WingInput      what the driver applied; NaN where the log lacks it
+//   /battery      BatteryState   where power is logged: its current is minus that of both motors
+//   /motors       JointState     where power is logged: effort is the current in A of left_motor and right_motor
+//   /joint_states JointState     where wings are logged: left_stroke, left_rotation, right_stroke, right_rotation
+//
+// A message was logged when its sample arrived; its stamp is the instant that it tells of, earlier by the declared latency.
+#pragma once
+
+#include <filesystem>
+
+#include "flightlog/flight_log.hpp"
+
+namespace flappy::flightlog::ros {
+
+/// InputError where the file cannot be written.
+void write_flight_mcap(const std::filesystem::path& path, const FlightLog& log);
+
+}  // namespace flappy::flightlog::ros

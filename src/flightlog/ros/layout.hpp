@@ -1,0 +1,78 @@
+// What a ROS 2 message consists of, read from its definition (the text of a .msg file).
+//
+// A concatenated definition, as MCAP files and rosbag2's databases hold it, is the text of one message followed by those that it
+// refers to, each after a line of '=' and a line "MSG: package/Type".
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace flappy::flightlog::ros {
+
+/// A definition or the bytes of a message are not what they should be; what() says why.
+class MessageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Numbered as in type_description_interfaces/msg/FieldType, which hashes of types (REP 2016) are made of.
+enum class Kind : std::uint8_t {
+  message = 1,
+  int8 = 2,
+  uint8 = 3,
+  int16 = 4,
+  uint16 = 5,
+  int32 = 6,
+  uint32 = 7,
+  int64 = 8,
+  uint64 = 9,
+  float32 = 10,
+  float64 = 11,
+  boolean = 15,
+  byte = 16,
+  string = 17,
+};
+
+enum class Many : std::uint8_t { one, array, bounded, unbounded };
+
+struct Layout;
+
+struct LayoutField {
+  std::string name;
+  Kind kind = Kind::message;
+  Many many = Many::one;
+  std::size_t capacity = 0;         ///< of an array, or at most of a bounded sequence
+  std::size_t string_capacity = 0;  ///< 0: unbounded
+  std::shared_ptr<const Layout> message;
+};
+
+struct Layout {
+  std::string name;  ///< "package/msg/Type"
+  std::vector<LayoutField> fields;
+};
+
+/// "package/msg/Type" of that or of "package/Type".
+std::string full_type_name(std::string_view name);
+
+/// Definitions by name.
+class Definitions {
+ public:
+  /// A concatenated definition; parts that are there already stay as they were.
+  void add(std::string_view type, std::string_view text);
+  bool has(std::string_view type) const { return texts_.contains(full_type_name(type)); }
+  /// MessageError where the type, or one that it refers to, is unknown, cannot be read or contains itself.
+  std::shared_ptr<const Layout> layout(std::string_view type) const;
+  /// The concatenated definition.
+  std::string concatenated(std::string_view type) const;
+  std::vector<std::string> names() const;
+
+ private:
+  std::map<std::string, std::string> texts_;
+};
+
+}  // namespace flappy::flightlog::ros

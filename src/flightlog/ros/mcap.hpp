@@ -1,0 +1,111 @@
+// Messages of many topics in one file: MCAP (mcap.dev/spec), profile "ros2", as rosbag2 writes it and Foxglove and PlotJuggler read it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/append_file.hpp"
+
+namespace flappy::flightlog::ros {
+
+struct McapOptions {
+  bool compress = true;  ///< chunks in zstd, or as they are
+  std::size_t chunk_bytes = 1u << 20;
+  double flush_s =
+      1;  ///< messages that came within it, by their time of logging, may be lost when the process is killed
+};
+
+/// Writes messages in chunks. A chunk is handed to the system whole and does not need what follows, so a killed process
+/// leaves a file that can be read up to its last chunk. InputError where the file cannot be written.
+class McapWriter {
+ public:
+  explicit McapWriter(const std::filesystem::path& path, const McapOptions& options = {});
+  /// Finishes the file if finish() was not called; then what cannot be written is not reported.
+  ~McapWriter();
+  McapWriter(const McapWriter&) = delete;
+  McapWriter& operator=(const McapWriter&) = delete;
+
+  /// A number for the topic, to write messages with. The definition is concatenated; `hash` as type_hash() has it, or empty.
+  std::uint16_t add_topic(const std::string& topic, const std::string& type, const std::string& definition,
+                          const std::string& hash);
+  /// `stamp_ns`: when it was sent, or what it tells of happened.
+  void write(std::uint16_t topic, std::int64_t logged_ns, std::int64_t stamp_ns, std::string_view bytes);
+  /// Hands over what is in memory.
+  void flush();
+  /// Adds the summary, by which readers find things fast.
+  void finish();
+  std::uint64_t messages() const { return messages_; }
+
+ private:
+  struct Schema {
+    std::string type, definition;
+  };
+  struct Topic {
+    std::string name, hash;
+    std::uint16_t schema;
+    std::uint32_t sequence = 0;
+    std::uint64_t count = 0;
+    bool in_chunks = false;  ///< whether a chunk has its record
+  };
+  struct ChunkIndex;
+
+  std::string schema_record(std::size_t index) const;
+  std::string channel_record(std::size_t index) const;
+  void append(std::string_view bytes);
+
+  io::AppendFile file_;
+  McapOptions options_;
+  std::uint64_t size_ = 0, messages_ = 0;
+  std::uint32_t data_crc_ = 0;
+  std::vector<Schema> schemas_;
+  std::vector<Topic> topics_;
+  std::string chunk_;
+  std::int64_t chunk_first_ns_ = 0, chunk_last_ns_ = 0, opened_ns_ = 0, first_ns_ = 0, last_ns_ = 0;
+  std::map<std::uint16_t, std::string> chunk_messages_;  ///< entries of the index by topic
+  std::vector<ChunkIndex> chunks_;
+  bool finished_ = false;
+};
+
+struct McapTopic {
+  std::string name, type, encoding;             ///< of the messages: "cdr"
+  std::string definition, definition_encoding;  ///< "ros2msg", where the definition is one that layout.hpp reads
+};
+
+struct McapMessage {
+  const McapTopic* topic;
+  std::uint32_t sequence;
+  std::int64_t logged_ns, stamp_ns;
+  std::string_view bytes;  ///< until the next is read
+};
+
+/// Goes through all messages in the order of the file. What is damaged is left out, and a file that ends early is read as far
+/// as it goes; warnings say so.
+class McapReader {
+ public:
+  /// `bytes` outlive the reader; `name` stands for the file in messages. InputError where this is no MCAP file.
+  McapReader(std::string_view bytes, std::string name);
+  std::optional<McapMessage> next();
+  const std::vector<std::string>& warnings() const { return warnings_; }
+
+ private:
+  std::optional<McapMessage> record(std::uint8_t code, std::string_view content);
+  void open_chunk(std::string_view content);
+  void warn(const std::string& what);
+
+  std::string name_;
+  std::string_view all_, rest_;  ///< of the file
+  std::string_view chunk_rest_;
+  std::string chunk_;  ///< uncompressed
+  std::map<std::uint16_t, McapTopic> schemas_;
+  std::map<std::uint16_t, McapTopic> topics_;
+  std::vector<std::string> warnings_;
+  bool in_chunk_ = false, ended_ = false;
+};
+
+}  // namespace flappy::flightlog::ros

@@ -1,0 +1,149 @@
+#include <lz4frame.h>
+#include <zlib.h>
+#include <zstd.h>
+
+#include <memory>
+
+#include "flightlog/ros/mcap.hpp"
+#include "flightlog/ros/mcap_records.hpp"
+#include "io/files.hpp"
+
+namespace flappy::flightlog::ros {
+namespace {
+
+using namespace mcap;
+
+/// Of an uncompressed chunk, which writers make of some MB; more is a damaged length.
+constexpr std::uint64_t kLargestChunk = 256u << 20;
+/// A block of 128 KiB takes 4 bytes at least, in zstd as in lz4.
+constexpr std::uint64_t kMostCompressed = 1u << 15;
+constexpr std::size_t kMostWarnings = 20;
+
+void unpack_zstd(std::string_view packed, std::string& out) {
+  const std::size_t size = ZSTD_decompress(out.data(), out.size(), packed.data(), packed.size());
+  if (ZSTD_isError(size)) throw MessageError(std::string("cannot be uncompressed: ") + ZSTD_getErrorName(size));
+  if (size != out.size()) throw MessageError("is shorter than it says");
+}
+
+void unpack_lz4(std::string_view packed, std::string& out) {
+  LZ4F_dctx* raw = nullptr;
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&raw, LZ4F_VERSION))) throw std::bad_alloc();
+  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(raw,
+                                                                                     LZ4F_freeDecompressionContext);
+  std::size_t done = 0, taken = 0;
+  while (done < out.size()) {
+    std::size_t room = out.size() - done, left = packed.size() - taken;
+    const std::size_t result = LZ4F_decompress(raw, out.data() + done, &room, packed.data() + taken, &left, nullptr);
+    if (LZ4F_isError(result)) throw MessageError(std::string("cannot be uncompressed: ") + LZ4F_getErrorName(result));
+    if (room == 0 && left == 0) throw MessageError("is shorter than it says");
+    done += room;
+    taken += left;
+  }
+}
+
+}  // namespace
+
+McapReader::McapReader(std::string_view bytes, std::string name) : name_(std::move(name)), all_(bytes), rest_(bytes) {
+  if (!rest_.starts_with(kMagic))
+    throw io::InputError(name_ + ": is no MCAP file; accepted: a file that begins as one");
+  rest_.remove_prefix(kMagic.size());
+}
+
+void McapReader::warn(const std::string& what) {
+  if (warnings_.size() < kMostWarnings) warnings_.push_back(name_ + ": " + what);
+  else if (warnings_.size() == kMostWarnings) warnings_.push_back(name_ + ": is damaged in more places");
+}
+
+std::optional<McapMessage> McapReader::next() {
+  while (true) {
+    if (in_chunk_ && chunk_rest_.empty()) in_chunk_ = false;
+    if (!in_chunk_ && ended_) return {};
+    std::string_view& rest = in_chunk_ ? chunk_rest_ : rest_;
+    const std::string place = "byte " + std::to_string(all_.size() - rest_.size());
+    try {
+      Parts parts(rest);
+      const auto code = parts.number<std::uint8_t>();
+      const std::string_view content = parts.raw(parts.number<std::uint64_t>());
+      rest = parts.rest();
+      try {
+        if (auto message = record(code, content)) return message;
+      } catch (const MessageError& error) {
+        warn("the record before " + place + " " + error.what() + ": left out");
+      }
+    } catch (const MessageError&) {  // what the length says is not there
+      if (in_chunk_) warn("the chunk before " + place + " ends within a record");
+      else warn("ends within a record, at " + place + ": read as far as it goes");
+      if (in_chunk_) in_chunk_ = false;
+      else ended_ = true;
+    }
+  }
+}
+
+std::optional<McapMessage> McapReader::record(std::uint8_t code, std::string_view content) {
+  Parts parts(content);
+  switch (code) {
+    case kSchema: {
+      const auto id = parts.number<std::uint16_t>();
+      McapTopic schema;
+      schema.type = parts.string();
+      schema.definition_encoding = parts.string();
+      schema.definition = parts.string();
+      schemas_[id] = std::move(schema);
+      return {};
+    }
+    case kChannel: {
+      const auto id = parts.number<std::uint16_t>();
+      const auto schema = schemas_.find(parts.number<std::uint16_t>());
+      McapTopic topic = schema == schemas_.end() ? McapTopic() : schema->second;
+      topic.name = parts.string();
+      topic.encoding = parts.string();
+      topics_.try_emplace(id, std::move(topic));  // written once more in the summary; messages point to the first
+      return {};
+    }
+    case kMessage: {
+      const auto topic = topics_.find(parts.number<std::uint16_t>());
+      if (topic == topics_.end()) throw MessageError("is a message of an unknown channel");
+      McapMessage message{&topic->second, parts.number<std::uint32_t>(), 0, 0, {}};
+      message.logged_ns = parts.number<std::int64_t>();
+      message.stamp_ns = parts.number<std::int64_t>();
+      message.bytes = parts.rest();
+      return message;
+    }
+    case kChunk:
+      if (in_chunk_) throw MessageError("is a chunk in a chunk");
+      open_chunk(content);
+      return {};
+    case kDataEnd:
+    case kFooter:  // what follows repeats what was before
+      if (!in_chunk_) ended_ = true;
+      return {};
+    default:
+      return {};
+  }
+}
+
+void McapReader::open_chunk(std::string_view content) {
+  Parts parts(content);
+  parts.raw(16);  // times
+  const auto size = parts.number<std::uint64_t>();
+  const auto expected = parts.number<std::uint32_t>();
+  const std::string_view compression = parts.string();
+  const std::string_view records = parts.raw(parts.number<std::uint64_t>());
+  if (size > kLargestChunk || (!compression.empty() && size / kMostCompressed > records.size()))
+    throw MessageError("is a chunk of " + std::to_string(size) + " bytes");
+  if (compression.empty()) {
+    chunk_rest_ = records;
+  } else {
+    chunk_.assign(size, '\0');
+    if (compression == "zstd") unpack_zstd(records, chunk_);
+    else if (compression == "lz4") unpack_lz4(records, chunk_);
+    else throw MessageError("is compressed as " + std::string(compression) + ", which is not read");
+    chunk_rest_ = chunk_;
+  }
+  const auto found =
+      static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(chunk_rest_.data()), chunk_rest_.size()));
+  if (expected != 0 && expected != found) throw MessageError("is a chunk that its checksum does not match");
+  in_chunk_ = true;
+}
+
+}  // namespace flappy::flightlog::ros

@@ -1,0 +1,91 @@
+#include "flightlog/import/mapping.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "io/temporary_folder.hpp"
+#include "refusal.hpp"
+
+namespace flappy::flightlog {
+namespace {
+
+namespace fs = std::filesystem;
+const fs::path kMappings = fs::path(FLAPPY_SOURCE_DIR) / "configs" / "mapping";
+
+/// What a person sees of the ROS 2 mapping with `old` in it replaced.
+std::string edited(const std::string& old, const std::string& fresh) {
+  const io::TemporaryFolder folder;
+  std::string text = io::read_text(kMappings / "ros2.toml");
+  const std::size_t at = text.find(old);
+  if (at == std::string::npos) return "\"" + old + "\" is not there";
+  text.replace(at, old.size(), fresh);
+  std::ofstream(folder / "m.toml") << text;
+  const std::string line = test::refusal([&] { read_mapping(folder / "m.toml"); });
+  const std::string place = folder.path().string() + "/";
+  return line.starts_with(place) ? line.substr(place.size()) : line;
+}
+
+TEST(Mapping, ShippedOnesAreRead) {
+  int count = 0;
+  for (const auto& entry : fs::directory_iterator(kMappings)) {
+    const Mapping m = read_mapping(entry.path());
+    EXPECT_GE(m.streams.size(), 3u) << entry.path();
+    EXPECT_EQ(m.header.vehicle, "hummingbird_nominal.toml");
+    ++count;
+  }
+  EXPECT_EQ(count, 3);
+}
+
+TEST(Mapping, WantsTheFieldsOfItsColumns) {
+  const Wanted wanted = read_mapping(kMappings / "ros2.toml").wanted();
+  EXPECT_EQ(wanted.at("/motors"), (std::set<std::string>{"effort[left_motor]", "effort[right_motor]"}));
+  EXPECT_EQ(wanted.at("/battery"), (std::set<std::string>{"voltage"}));
+  EXPECT_TRUE(wanted.at("/wing_input").contains("tick"));
+  EXPECT_TRUE(read_mapping(kMappings / "csv.toml").wanted().at("mocap").contains("time_s"));
+}
+
+TEST(Mapping, TakesOverrides) {
+  const Mapping m = read_mapping(kMappings / "ros2.toml",
+                                 {"mocap.time=field", "mocap.time_field=t", "mocap.time_unit=ms", "imu.rate_hz=400"});
+  EXPECT_EQ(m.streams[1].time, TimeOf::field);
+  EXPECT_EQ(m.streams[1].time_unit_ns, 1e6);
+  EXPECT_TRUE(m.streams[1].measures_rate);
+  EXPECT_FALSE(m.streams[2].measures_rate);
+  EXPECT_EQ(m.header.imu.rate_hz, 400);
+}
+
+TEST(Mapping, RefusesFaults) {
+  EXPECT_EQ(edited("schema = 1", "schema = 2"),
+            "m.toml:3:10: schema: 2 is read by a newer flappy than this one; accepted: 1");
+  EXPECT_EQ(edited("channel = \"/pose\"\n", ""), "m.toml:27:1: mocap.channel: is missing; accepted: a string");
+  EXPECT_EQ(edited("channel = \"/pose\"", "topic = \"/pose\""),
+            "m.toml:28:1: mocap.topic: unknown key; accepted: attitude_noise_rad, channel, clock, columns, frame, "
+            "from, late_s, "
+            "latency_s, offset, position_noise_m, rate_hz, scale, sequence, time, time_field, time_unit, world");
+  EXPECT_EQ(edited("x_m = \"pose", "x_mm = \"pose"),
+            "m.toml:34:1: mocap.columns.x_mm: unknown key; accepted here with another unit: \"x_m\"");
+  EXPECT_EQ(edited("qz = \"pose.orientation.z\"\n", ""),
+            "m.toml:33:1: mocap.columns.qz: is missing; accepted: a string");
+  EXPECT_EQ(edited("bias_V = \"bias_v\"\n", ""),
+            "m.toml:21:15: command.columns.amplitude_V: is given without bias_V; accepted: all four inputs of the wing "
+            "beat, or none");
+  EXPECT_EQ(edited("clock = \"robot\"\nsequence", "time = \"received\"\nclock = \"robot\"\nsequence"),
+            "m.toml:17:9: command.clock: \"robot\" is not the clock of times of receipt; accepted: \"receiver\", or "
+            "time = \"stamp\"");
+  EXPECT_EQ(edited("clock = \"robot\"\nsequence", "time_unit = \"s\"\nsequence"),
+            "m.toml:16:13: command.time_unit: is given beside time = \"stamp\"; accepted: time = \"field\"");
+  EXPECT_EQ(edited("[command]", "[clocks.robbot]\noffset_s = 1.0\n\n[command]"),
+            "m.toml:14:1: clocks.robbot: is no clock of a stream; accepted: names that clock = \"...\" has");
+  EXPECT_EQ(edited("[mocap]", "[command.scale]\nphase_radd = 2.0\n\n[mocap]"),
+            "m.toml:28:1: command.scale.phase_radd: unknown key; accepted: amplitude_V, bias_V, difference_V, "
+            "left_voltage_V, "
+            "phase_rad, right_voltage_V, split_cycle; did you mean \"phase_rad\"?");
+  EXPECT_EQ(edited("phase_rad = \"phase_rad\"\n", "[command.scale]\nphase_rad = 2.0\n"),
+            "m.toml:26:13: command.scale.phase_rad: has no such column; accepted: columns of command.columns");
+  EXPECT_EQ(edited("latency_s = 0.0", "latency_s = -1.0"),
+            "m.toml:30:13: mocap.latency_s: -1 is out of range; accepted: a number from 0 to 10");
+}
+
+}  // namespace
+}  // namespace flappy::flightlog

@@ -1,0 +1,67 @@
+# flappy-gap import as a person meets it, and flappy-fly --mcap before it.
+#   cmake -DPROGRAM=flappy-gap -DFLY=flappy-fly -DSOURCE=the project -DWORK=a folder to use -P import_test.cmake
+cmake_minimum_required(VERSION 3.25)
+include(${CMAKE_CURRENT_LIST_DIR}/program.cmake)
+set(mapping ${SOURCE}/configs/mapping/ros2.toml)
+
+# ---- a flight as topics, and as a log again
+
+execute_process(COMMAND ${FLY} ${SOURCE}/configs/fly/open_loop.toml --set flight.duration_s=0.5 --log ${WORK}/log --mcap ${WORK}/f.mcap
+  OUTPUT_VARIABLE out ERROR_VARIABLE err RESULT_VARIABLE code)
+expect_equal("stderr" "${err}" "")
+expect_match("stdout" "${out}" "  topics in ${WORK}/f.mcap\n")
+run(import ${WORK}/f.mcap --mapping ${mapping} --out ${WORK}/imported --set start=clock --set vehicle=bird.toml --json ${WORK}/import.json)
+expect_equal("stderr" "${err}" "")
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "^${WORK}/imported: bird.toml, 34 Hz\n  stream +samples +Hz +never +twice +late +order +unusable")
+expect_match("stdout" "${out}" "\n  command +500 +1000.00 +0 +0 +0 +0 +0 +0.000 +0.000  /wing_input\n")
+expect_match("stdout" "${out}" "\n  mocap +7[0-9] +150.0[0-9] +0 +0 +0 +0 +0 +30.000 +30.000  /pose\n")
+expect_match("stdout" "${out}" "\n  clock robot: the receiver's is ahead by 0.000000 s, drifting by 0.0 us/s, by [0-9]+ stamps over 0.5 s\n$")
+expect_keys(${WORK}/import.json folder=STRING start_ns=NUMBER warnings=ARRAY streams.0.samples=NUMBER streams.4.name=STRING
+  streams.1.delay_median_s=NUMBER clocks.0.offset_s=NUMBER clocks.0.measured=BOOLEAN)
+foreach(file IN ITEMS command wings)  # no latency there, so the same to the last digit
+  file(READ ${WORK}/log/${file}.csv flown)
+  file(READ ${WORK}/imported/${file}.csv imported)
+  expect_equal("${file}.csv" "${imported}" "${flown}")
+endforeach()
+run(check ${WORK}/imported)
+expect_match("stdout of the check" "${out}" "1 readable, ")
+
+# ---- a flight without power and wings
+
+execute_process(COMMAND ${FLY} ${SOURCE}/configs/fly/hover.toml --set flight.duration_s=0.5 --mcap ${WORK}/hover.mcap OUTPUT_QUIET)
+run(import ${WORK}/hover.mcap --mapping ${mapping} --out ${WORK}/hover)
+expect_equal("stderr" "${err}" "warning: ${mapping}: power: /battery is not recorded: done without
+warning: ${mapping}: wings: /joint_states is not recorded: done without\n")
+
+# ---- tables
+
+file(MAKE_DIRECTORY ${WORK}/tables)
+file(WRITE ${WORK}/tables/motors.csv "time_us,left_V,right_V\n0,1,2\n10000,1,2\n")
+file(WRITE ${WORK}/tables/mocap.csv "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n0,1000,2,3,1,0,0,0\n0.01,1,2,3,1,0,0,0\n")
+file(WRITE ${WORK}/tables/imu.csv "time_us,gx_deg_s,gy_deg_s,gz_deg_s,ax_g,ay_g,az_g\n0,180,0,0,0,0,1\n10000,0,0,0,0,0,1\n")
+set(tables ${WORK}/tables/motors.csv ${WORK}/tables/mocap.csv ${WORK}/tables/imu.csv)
+run(import ${tables} --mapping ${SOURCE}/configs/mapping/csv.toml --out ${WORK}/of_tables)
+expect_equal("stderr" "${err}" "")
+file(READ ${WORK}/of_tables/mocap.csv mocap)
+expect_equal("mocap.csv" "${mocap}" "t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,1,0.002,0.003,1,0,0,0\n0.01,0.001,0.002,0.003,1,0,0,0\n")
+
+# ---- what is refused
+
+set(import import ${WORK}/f.mcap --mapping ${mapping} --out ${WORK}/refused)
+expect_refused("${WORK}/none.mcap: cannot be read: No such file or directory" import ${WORK}/none.mcap --mapping ${mapping} --out ${WORK}/refused)
+expect_refused("${WORK}/log: holds no bag; accepted: rosbag2's .mcap or .db3 files, or a folder of them"
+  import ${WORK}/log --mapping ${mapping} --out ${WORK}/refused)
+expect_refused("--set imu.channel=/imuu: imu.channel: \"/imuu\" is not recorded; accepted: /battery, /clock, /imu, /joint_states, /motors, /pose, /tf, /wing_input; did you mean \"/imu\"?"
+  ${import} --set imu.channel=/imuu)
+file(WRITE ${WORK}/notes/notes.txt "")
+expect_refused("${WORK}/notes: holds notes.txt, which is no part of a flight log; accepted: a new folder, an empty one, or a flight log to replace"
+  import ${WORK}/f.mcap --mapping ${mapping} --out ${WORK}/notes)
+expect_refused("flappy-gap: --mapping is required; see flappy-gap --help" import ${WORK}/f.mcap --out ${WORK}/refused)
+if(EXISTS ${WORK}/refused)
+  message(SEND_ERROR "something is left of what was refused")
+endif()
+set(PROGRAM ${FLY})
+expect_refused("--mcap: is of one flight, not of 2; accepted: --count 1"
+  ${SOURCE}/configs/fly/hover.toml --count 2 --mcap ${WORK}/two.mcap)
+expect_refused("${WORK}/none/f.mcap: cannot be written: No such file or directory" ${SOURCE}/configs/fly/hover.toml --mcap ${WORK}/none/f.mcap)
