@@ -37,6 +37,7 @@ ROOMS = {
     "gap/diagnose": ROLLOUT | {"gap/replay", "gap/evidence", "gap/localise"},
     "server/dds": {"io", "flightlog", "flightlog/ros"},
     "server/telemetry": ROLLOUT | {"server/dds"},
+    "server/record": BASE | {"flightlog", "flightlog/import", "flightlog/ros", "server/dds"},
     "server/sitl": ROLLOUT | {"server/dds", "server/telemetry"},
     "blind": FLIGHT | {"flightlog"},
     "benchmark": GAP | {"blind", "benchmark/predict"},

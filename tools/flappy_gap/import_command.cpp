@@ -8,35 +8,7 @@
 #include "io/log.hpp"
 
 namespace flappy::gap {
-namespace {
-
 using Json = nlohmann::ordered_json;
-
-Json to_json(const flightlog::ImportReport& report) {
-  Json streams = Json::array(), clocks = Json::array();
-  for (const flightlog::StreamReport& s : report.streams)
-    streams.push_back({{"name", s.stream},
-                       {"channel", s.channel},
-                       {"samples", s.samples},
-                       {"rate_hz", s.rate_hz},
-                       {"never", s.lost},
-                       {"twice", s.twice},
-                       {"late", s.late},
-                       {"out_of_order", s.reordered},
-                       {"unusable", s.unusable},
-                       {"delay_median_s", s.delay_median_s},
-                       {"delay_most_s", s.delay_most_s}});
-  for (const flightlog::ClockReport& c : report.clocks)
-    clocks.push_back({{"name", c.name},
-                      {"offset_s", c.offset_s},
-                      {"drift", c.drift},
-                      {"measured", c.measured},
-                      {"stamps", c.stamps},
-                      {"span_s", c.span_s}});
-  return {{"start_ns", report.start_ns}, {"streams", streams}, {"clocks", clocks}};
-}
-
-}  // namespace
 
 Json run_import(const ImportCommand& command) {
   const flightlog::Mapping mapping = flightlog::read_mapping(command.mapping, command.overrides);
@@ -50,7 +22,7 @@ Json run_import(const ImportCommand& command) {
   write_flight_log(command.out, imported.log);
   std::printf("%s: %s, %g Hz\n%s", command.out.c_str(), imported.log.header.vehicle.c_str(),
               imported.log.header.flapping_Hz, report_text(imported.report).c_str());
-  Json json = to_json(imported.report);
+  Json json = json_of(imported.report);
   json["folder"] = command.out.string();
   json["warnings"] = warnings;
   return json;

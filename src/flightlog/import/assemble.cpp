@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
 
@@ -383,6 +384,31 @@ std::string report_text(const ImportReport& report) {
     else text += ", as the mapping says\n";
   }
   return text;
+}
+
+nlohmann::ordered_json json_of(const ImportReport& report) {
+  using Json = nlohmann::ordered_json;
+  Json streams = Json::array(), clocks = Json::array();
+  for (const StreamReport& s : report.streams)
+    streams.push_back({{"name", s.stream},
+                       {"channel", s.channel},
+                       {"samples", s.samples},
+                       {"rate_hz", s.rate_hz},
+                       {"never", s.lost},
+                       {"twice", s.twice},
+                       {"late", s.late},
+                       {"out_of_order", s.reordered},
+                       {"unusable", s.unusable},
+                       {"delay_median_s", s.delay_median_s},
+                       {"delay_most_s", s.delay_most_s}});
+  for (const ClockReport& c : report.clocks)
+    clocks.push_back({{"name", c.name},
+                      {"offset_s", c.offset_s},
+                      {"drift", c.drift},
+                      {"measured", c.measured},
+                      {"stamps", c.stamps},
+                      {"span_s", c.span_s}});
+  return {{"start_ns", report.start_ns}, {"streams", streams}, {"clocks", clocks}};
 }
 
 }  // namespace flappy::flightlog

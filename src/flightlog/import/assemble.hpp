@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,9 @@ struct Imported {
 /// InputError, at the mapping's own line, for a channel or a field that is not there and for times that cannot be had. The log
 /// is one that write_flight_log() looks at once more.
 Imported assemble(const Channels& channels, const Mapping& mapping);
+
+/// What --json holds.
+nlohmann::ordered_json json_of(const ImportReport& report);
 
 /// A table, and a line for each clock.
 std::string report_text(const ImportReport& report);

@@ -152,7 +152,8 @@ Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::s
   const io::Config config = io::Config::load(path, overrides);
   const io::Table root = config.root();
   root.schema(1);
-  Names accepted = {"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2", "start", "ambient", "clocks"};
+  Names accepted = {"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2",
+                    "start",  "ambient", "clocks",         "dds"};
   for (const StreamKeys& keys : kStreams) accepted.push_back(keys.name);
   root.accept(accepted);
   Mapping m;
@@ -169,6 +170,7 @@ Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::s
     m.streams.push_back(read_stream(keys, root.table(keys.name)));
   }
   read_declared(root, h);
+  m.dds = io::read_dds_config(root);
   if (const auto clocks = root.optional_table("clocks"))
     for (const std::string& name : clocks->keys()) {
       const bool used = std::ranges::find(m.streams, name, &StreamMapping::clock) != m.streams.end();

@@ -49,6 +49,8 @@
 //   [wings]                                  # optional
 //   noise_rad
 //
+//   [dds]                                    # for flappy-record: io/dds_config.hpp
+//
 // A joint's value is "position[left_stroke]", a transform's "transforms[torso].transform.translation.x".
 #pragma once
 
@@ -61,6 +63,7 @@
 #include "flightlog/flight_log.hpp"
 #include "flightlog/import/channels.hpp"
 #include "io/config.hpp"
+#include "io/dds_config.hpp"
 
 namespace flappy::flightlog {
 
@@ -91,6 +94,7 @@ struct Mapping {
   FlightHeader header;  ///< rates that are measured are 0
   bool from_first = true;
   std::map<std::string, double> offsets_s;  ///< of clocks, where given
+  io::DdsConfig dds;                        ///< where a recorder finds the robot
   std::vector<StreamMapping> streams;       ///< command, mocap, imu, and power and wings where mapped
 
   /// What a recording is read for.

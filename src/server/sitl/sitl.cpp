@@ -181,11 +181,39 @@ class Flight {
       std::ranges::copy(s.attitude, pose.attitude);
       poses_.push_back({s.arrival_s, pose});
     }
-    topics_.write(now_s(), fleet_.batch().state(0));
-    const auto& power = recorder_->so_far().power;
-    for (; power && batteries_ < power->t_s.size(); ++batteries_)
-      topics_.write(BatterySample{power->t_s[batteries_], power->battery_V[batteries_],
-                                  power->left_current_A[batteries_], power->right_current_A[batteries_]});
+    show_recorded();
+  }
+
+  /// What the recorder has made of the period: angles, if it has none, are true ones.
+  void show_recorded() {
+    const flightlog::FlightLog& log = recorder_->so_far();
+    const auto& [t_s, left_V, right_V, inputs, phase_rad] = log.command;
+    for (; applied_ < t_s.size(); ++applied_) {
+      const std::size_t k = applied_;
+      topics_.write(
+          AppliedSample{t_s[k],
+                        k,
+                        {inputs->amplitude_V[k], inputs->difference_V[k], inputs->bias_V[k], inputs->split_cycle[k]},
+                        left_V[k],
+                        right_V[k],
+                        (*phase_rad)[k]});
+    }
+    for (; log.power && batteries_ < log.power->t_s.size(); ++batteries_) {
+      const flightlog::PowerStream& p = *log.power;
+      const std::size_t k = batteries_;
+      topics_.write(BatterySample{p.t_s[k] - log.header.power->latency_s, p.battery_V[k], p.left_current_A[k],
+                                  p.right_current_A[k]});
+    }
+    if (!log.wings) return topics_.write(now_s(), fleet_.batch().state(0));
+    for (; angles_ < log.wings->t_s.size(); ++angles_) {
+      const flightlog::WingsStream& w = *log.wings;
+      const double nan = std::nan("");
+      sim::FlapperState s;
+      s.stroke_rad[0] = w.left_stroke_rad[angles_], s.rotation_rad[0] = w.left_rotation_rad[angles_];
+      s.stroke_rad[1] = w.right_stroke_rad[angles_], s.rotation_rad[1] = w.right_rotation_rad[angles_];
+      for (double* rate : {s.stroke_rate_rad_s, s.rotation_rate_rad_s}) rate[0] = rate[1] = nan;
+      topics_.write(w.t_s[angles_], s);
+    }
   }
 
   SitlResult finished() {
@@ -217,7 +245,7 @@ class Flight {
   std::deque<Late<ImuReading>> imu_;
   std::deque<Late<PoseSample>> poses_;
   std::uint32_t imu_count_ = 0, pose_count_ = 0;
-  std::size_t batteries_ = 0;
+  std::size_t applied_ = 0, batteries_ = 0, angles_ = 0;  // rows of the recorder that were shown
   std::int64_t period_ = 0;
   sim::Input input_{};
   double started_s_ = 0, told_s_ = 0;

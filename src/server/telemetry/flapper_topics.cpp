@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace flappy::server {
 namespace {
@@ -28,6 +29,18 @@ void put_diagonal(double (&covariance)[9], double variance) {
   covariance[0] = covariance[4] = covariance[8] = variance;
 }
 
+WingInput message(double t_s, std::uint64_t tick, const sim::Input& u, const std::string& frame) {
+  return {header(t_s, frame.c_str()),
+          tick,
+          u.amplitude_V,
+          u.difference_V,
+          u.bias_V,
+          u.split_cycle,
+          kUnknown,
+          kUnknown,
+          kUnknown};
+}
+
 }  // namespace
 
 std::string topic_name(const std::string& name_space, std::size_t slot, const std::string& name) {
@@ -44,6 +57,8 @@ FlapperTopics::FlapperTopics(const Participant& p, const std::string& name_space
       joints_(p, topic_name(name_space, slot, "joint_states"), kSensorData),
       input_(p, topic_name(name_space, slot, "wing_input"), kSensorData),
       battery_(p, topic_name(name_space, slot, "battery"), kSensorData),
+      motors_(p, topic_name(name_space, slot, "motors"), kSensorData),
+      driver_(p, topic_name(name_space, slot, "driver"), samples),
       tf_(p, "/tf", {true, false, 100}) {}
 
 void FlapperTopics::write(const PoseSample& pose) const {
@@ -87,6 +102,13 @@ void FlapperTopics::write(const BatterySample& battery) const {
   m.present = true;
   m.location = m.serial_number = text("");
   battery_.write(m);
+  char* names[] = {text("left_motor"), text("right_motor")};
+  double effort[] = {battery.left_current_A, battery.right_current_A};
+  JointState motors{};
+  motors.header = m.header;
+  motors.name = {2, 2, names, false};
+  motors.effort = {2, 2, effort, false};
+  motors_.write(motors);
 }
 
 void FlapperTopics::write(double t_s, const sim::FlapperState& s) const {
@@ -102,18 +124,16 @@ void FlapperTopics::write(double t_s, const sim::FlapperState& s) const {
   joints_.write(m);
 }
 
-void FlapperTopics::write(double t_s, std::uint64_t tick, const sim::Input& u, double left_V, double right_V) const {
-  WingInput m{};
-  m.header = header(t_s, frame_.c_str());
-  m.tick = tick;
-  m.amplitude_v = u.amplitude_V;
-  m.difference_v = u.difference_V;
-  m.bias_v = u.bias_V;
-  m.split_cycle = u.split_cycle;
-  m.left_voltage_v = left_V;
-  m.right_voltage_v = right_V;
-  m.phase_rad = kUnknown;
-  input_.write(m);
+void FlapperTopics::write(double t_s, std::uint64_t tick, const sim::Input& u) const {
+  input_.write(message(t_s, tick, u, frame_));
+}
+
+void FlapperTopics::write(const AppliedSample& a) const {
+  WingInput m = message(a.t_s, a.update, a.input, frame_);
+  m.left_voltage_v = a.left_V;
+  m.right_voltage_v = a.right_V;
+  m.phase_rad = a.phase_rad;
+  driver_.write(m);
 }
 
 void FlapperTopics::write(const rollout::FlightSample& s) const {

@@ -4,14 +4,15 @@
 //   imu            Imu           rates and specific force in the torso's frame, covariances as the sensors declare; no attitude
 //   joint_states   JointState    left_stroke, left_rotation, right_stroke, right_rotation: rad, rad/s
 //   wing_input     WingInput     as controller and actor set it
-//   battery        BatteryState  where it is known
+//   battery        BatteryState  where it is known, and
+//   motors         JointState    with it: effort is the current in A of left_motor and right_motor
+//   driver         WingInput     what a simulated driver applied, and its voltages
 //   /tf            TFMessage     "world" to the torso's frame: "flappy/torso"
 //
 // World z up, x and y level; torso x forward, y left, z up (REP 103). Stamps are times of the flight.
 #pragma once
 
 #include <array>
-#include <limits>
 
 #include "flight/setup.hpp"
 #include "rollout/watch.hpp"
@@ -21,6 +22,14 @@ namespace flappy::server {
 
 struct BatterySample {
   double t_s, voltage_V, left_current_A, right_current_A;  // of the motors, signed
+};
+
+/// One update of the driver.
+struct AppliedSample {
+  double t_s;
+  std::uint64_t update;
+  sim::Input input;
+  double left_V, right_V, phase_rad;
 };
 
 struct PoseSample {
@@ -43,9 +52,8 @@ class FlapperTopics {
   void write(const ImuReading& imu) const;
   void write(const BatterySample& battery) const;
   void write(double t_s, const sim::FlapperState& joints) const;
-  void write(double t_s, std::uint64_t tick, const sim::Input& input,
-             double left_V = std::numeric_limits<double>::quiet_NaN(),
-             double right_V = std::numeric_limits<double>::quiet_NaN()) const;
+  void write(double t_s, std::uint64_t tick, const sim::Input& input) const;
+  void write(const AppliedSample& applied) const;
   void write_transform(const PoseSample& pose) const;
 
  private:
@@ -56,6 +64,8 @@ class FlapperTopics {
   Writer<JointState> joints_;
   Writer<WingInput> input_;
   Writer<BatteryState> battery_;
+  Writer<JointState> motors_;
+  Writer<WingInput> driver_;
   Writer<TFMessage> tf_;
 };
 
