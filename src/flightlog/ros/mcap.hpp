@@ -94,6 +94,7 @@ class McapReader {
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
+  void read_summary();
   std::optional<McapMessage> record(std::uint8_t code, std::string_view content);
   void open_chunk(std::string_view content);
   void warn(const std::string& what);
