@@ -4,8 +4,11 @@
 #include <lz4frame.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <csignal>
+#include <map>
+#include <set>
 
 #include "flightlog/ros/mcap_records.hpp"
 #include "io/temporary_folder.hpp"
@@ -60,6 +63,68 @@ TEST(Mcap, ReadsWhatItWrote) {
     EXPECT_EQ(read(written({compress, 500, 1}, 100, &expected), &warnings), expected);
     EXPECT_TRUE(warnings.empty());
   }
+}
+
+struct Record {
+  std::uint8_t code;
+  std::string_view content;
+};
+
+Record record_at(std::string_view bytes, std::uint64_t at) {
+  mcap::Parts parts(bytes.substr(at));
+  const auto code = parts.number<std::uint8_t>();
+  return {code, parts.raw(parts.number<std::uint64_t>())};
+}
+
+/// No reader that is tried with --full follows these offsets, but others do.
+TEST(Mcap, HasASummaryThatPointsToEveryMessage) {
+  const std::string bytes = written({false, 500, 1}, 100);
+  const std::size_t footer = bytes.size() - mcap::kMagic.size() - 29;
+  mcap::Parts end(record_at(bytes, footer).content);
+  const auto summary = end.number<std::uint64_t>(), offsets = end.number<std::uint64_t>();
+  const std::string_view summed = std::string_view(bytes).substr(summary, footer + 25 - summary);
+  EXPECT_EQ(end.number<std::uint32_t>(), crc32_z(0, reinterpret_cast<const Bytef*>(summed.data()), summed.size()));
+  std::map<std::uint8_t, std::uint64_t> groups;
+  for (std::size_t at = offsets; at < footer;) {
+    const Record r = record_at(bytes, at);
+    ASSERT_EQ(r.code, mcap::kSummaryOffset);
+    mcap::Parts parts(r.content);
+    const auto code = parts.number<std::uint8_t>();
+    groups[code] = parts.number<std::uint64_t>();
+    EXPECT_EQ(record_at(bytes, groups[code]).code, code);
+    at += 9 + r.content.size();
+  }
+  EXPECT_EQ(groups.size(), 4u);  // schemas, channels, statistics, chunks
+  std::set<std::uint64_t> times;
+  for (std::size_t at = groups.at(mcap::kChunkIndex); at < offsets;) {
+    const Record r = record_at(bytes, at);
+    ASSERT_EQ(r.code, mcap::kChunkIndex);
+    at += 9 + r.content.size();
+    mcap::Parts parts(r.content);
+    parts.raw(16);
+    const Record chunk = record_at(bytes, parts.number<std::uint64_t>());
+    ASSERT_EQ(chunk.code, mcap::kChunk);
+    EXPECT_EQ(parts.number<std::uint64_t>(), 9 + chunk.content.size());
+    const std::string_view records = chunk.content.substr(40);  // times, sizes, checksum, no compression
+    for (mcap::Parts places(parts.string()); !places.rest().empty();) {
+      const auto topic = places.number<std::uint16_t>();
+      const Record index = record_at(bytes, places.number<std::uint64_t>());
+      ASSERT_EQ(index.code, mcap::kMessageIndex);
+      mcap::Parts entries(index.content);
+      EXPECT_EQ(entries.number<std::uint16_t>(), topic);
+      for (mcap::Parts entry(entries.string()); !entry.rest().empty();) {
+        const auto time = entry.number<std::uint64_t>();
+        const Record message = record_at(records, entry.number<std::uint64_t>());
+        ASSERT_EQ(message.code, mcap::kMessage);
+        mcap::Parts head(message.content);
+        EXPECT_EQ(head.number<std::uint16_t>(), topic);
+        head.raw(4);
+        EXPECT_EQ(head.number<std::uint64_t>(), time);
+        times.insert(time);
+      }
+    }
+  }
+  EXPECT_EQ(times.size(), 100u);
 }
 
 TEST(Mcap, CompressesWhereAsked) { EXPECT_LT(written({true}, 1000).size(), written({false}, 1000).size() / 2); }
