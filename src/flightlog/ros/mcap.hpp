@@ -17,8 +17,8 @@ namespace flappy::flightlog::ros {
 struct McapOptions {
   bool compress = true;  ///< chunks in zstd, or as they are
   std::size_t chunk_bytes = 1u << 20;
-  double flush_s =
-      1;  ///< messages that came within it, by their time of logging, may be lost when the process is killed
+  /// So much of the messages, by their times of logging, may be lost when the process is killed.
+  double flush_s = 1;
 };
 
 /// Writes messages in chunks. A chunk is handed to the system whole and does not need what follows, so a killed process
