@@ -79,6 +79,7 @@ def read_by_mcap(file):
     with file.open("rb") as stream:
         plain = [(c.topic, m.log_time, m.publish_time, m.data) for _, c, m in NonSeekingReader(stream, validate_crcs=True).iter_messages()]
     assert sorted(indexed) == sorted(plain) and len(plain) == summary.statistics.message_count > 1000
+    assert all(c.metadata["offered_qos_profiles"] == "" for c in summary.channels.values())  # the profile requires it
     hashes = {c.topic: (summary.schemas[c.schema_id].name, c.metadata["topic_type_hash"]) for c in summary.channels.values()}
     for types in RELEASES.values():
         for topic, (name, given) in hashes.items():
