@@ -153,6 +153,7 @@ def self_test():
         ({"src/deploy/header/x.cpp": '#include "learn/d.hpp"\n', "src/learn/d.hpp": ""}, "not learn"),
         ({"src/learn/x.cpp": '#include "deploy/d.hpp"\n', "src/deploy/d.hpp": ""}, "not deploy"),
         ({"src/flightlog/check/x.cpp": '#include "sim/b.hpp"\n'}, "flightlog/check may include flightlog, io, not sim"),
+        ({"src/flightlog/ros/x.cpp": '#include "flightlog/import/y.hpp"\n', "src/flightlog/import/y.hpp": ""}, "not flightlog/import"),
         ({"src/flight/x.cpp": "#include <torch/script.h>\n"}, "LibTorch belongs to src/policy/ and src/learn/torch/ and src/io/torch/"),
         ({"src/learn/torch/x.cpp": "#include <torch/torch.h>\n"}, None),
         ({"src/learn/x.cpp": "#include <torch/torch.h>\n"}, "LibTorch belongs to src/policy/ and src/learn/torch/ and src/io/torch/"),

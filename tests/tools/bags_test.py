@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
 """What flappy-fly --mcap wrote, in the Python packages mcap and rosbags; what rosbags wrote, in flappy-gap import; hashes of types and
-bytes of messages, by both: bags_test.py BIN SOURCE WORK
+bytes of messages, by both; a ULog, in pyulog and in flappy-gap import: bags_test.py BIN SOURCE WORK
 """
 import filecmp
 import json
 import os
 import random
 import shutil
+import struct
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy
+import pyulog
 from mcap.reader import NonSeekingReader, make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
@@ -77,6 +79,7 @@ def read_by_mcap(file):
     with file.open("rb") as stream:
         plain = [(c.topic, m.log_time, m.publish_time, m.data) for _, c, m in NonSeekingReader(stream, validate_crcs=True).iter_messages()]
     assert sorted(indexed) == sorted(plain) and len(plain) == summary.statistics.message_count > 1000
+    assert all(c.metadata["offered_qos_profiles"] == "" for c in summary.channels.values())  # the profile requires it
     hashes = {c.topic: (summary.schemas[c.schema_id].name, c.metadata["topic_type_hash"]) for c in summary.channels.values()}
     for types in RELEASES.values():
         for topic, (name, given) in hashes.items():
@@ -158,6 +161,38 @@ def disturbed(types, messages):
     return said
 
 
+def ulog():
+    """A flight as PX4 logs it, in the package pyulog and in ours."""
+    formats = {
+        "actuator_motors": "uint64_t timestamp;uint64_t timestamp_sample;float[12] control;uint16_t reversible_flags;uint8_t[6] _padding0;",
+        "sensor_combined": "uint64_t timestamp;float[3] gyro_rad;uint32_t gyro_integral_dt;float[3] accelerometer_m_s2;",
+        "vehicle_visual_odometry": "uint64_t timestamp;uint64_t timestamp_sample;float[3] position;float[4] q;uint8_t quality;uint8_t[3] _padding0;",
+    }
+    records = [(b"B", bytes(40))]
+    records += [(b"F", f"{name}:{members}".encode()) for name, members in formats.items()]
+    records += [(b"A", struct.pack("<BH", 0, i) + name.encode()) for i, name in enumerate(formats)]
+    for k in range(200):
+        t = 1_000_000 + 5000 * k
+        records.append((b"D", struct.pack("<HQQ12fH", 0, t, t, 0.01 * k % 1, -0.5, *[0] * 10, 0)))
+        records.append((b"D", struct.pack("<HQ3fI3f", 1, t, 0.1 * k, 2, 3, 5000, 4, 5, -9.8)))
+        records.append((b"D", struct.pack("<HQQ3f4fB", 2, t, t - 2000, k, 20, -30, 1, 0, 0, 0, 100)))
+    file = WORK / "px4.ulg"
+    body = b"".join(struct.pack("<Hc", len(content), kind) + content for kind, content in records)
+    file.write_bytes(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 1) + body)
+    theirs = {d.name: d.data for d in pyulog.ULog(str(file)).data_list}
+    run(BIN / "flappy-gap", "import", file, "--mapping", SOURCE / "configs/mapping/px4.toml", "--out", WORK / "px4")
+    ours = {name: numpy.genfromtxt(WORK / "px4" / f"{name}.csv", delimiter=",", names=True) for name in ("command", "mocap", "imu")}
+    motors, imu, pose = (theirs[name] for name in formats)
+    start = 1_000_000 - 2000
+    for found, expected in (
+        (ours["command"]["t_s"], 1e-6 * (motors["timestamp"] - start)), (ours["command"]["left_voltage_V"], 18 * motors["control[0]"]),
+        (ours["imu"]["gyro_x_rad_s"], imu["gyro_rad[0]"]), (ours["imu"]["accel_z_m_s2"], -imu["accelerometer_m_s2[2]"]),
+        (ours["mocap"]["t_s"], 1e-6 * (pose["timestamp_sample"] - start)), (ours["mocap"]["y_m"], pose["position[0]"]),
+        (ours["mocap"]["z_m"], -pose["position[2]"]),
+    ):
+        assert len(found) == 200 and numpy.allclose(found, expected, rtol=1e-6, atol=1e-9), (found, expected)
+
+
 def any_message(types, name, dice):
     """With numbers and lengths at random."""
     numbers = {"bool": lambda: dice.random() < 0.5, "byte": lambda: dice.randrange(128), "char": lambda: dice.randrange(256),
@@ -218,6 +253,7 @@ def main():
                 same_logs(log, imported(folder.name + "_log", bag))
                 same_logs(log, imported(folder.name + "_log", next(p for p in bag.iterdir() if p.suffix in (".db3", ".mcap"))))
         all_messages(types, WORK / f"{release}_all")
+    ulog()
     long = WORK / "long.mcap"
     run(BIN / "flappy-fly", SOURCE / "configs/fly/open_loop.toml", "--set", "flight.duration_s=30", "--mcap", long)
     print(disturbed(RELEASES["jazzy"], read_by_rosbags(long)))

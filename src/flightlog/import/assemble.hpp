@@ -20,14 +20,14 @@ struct StreamReport {
   std::size_t late = 0, reordered = 0;  ///< in the log all the same
   std::size_t lost = 0;                 ///< never came, by the sequence or the rate
   double rate_hz = 0;                   ///< measured
-  double delay_median_s = 0,
-         delay_most_s = 0;  ///< beyond the quickest of its clock; 0 where it has no times of receipt
+  /// Beyond the quickest of its clock; 0 where it has no times of receipt.
+  double delay_median_s = 0, delay_most_s = 0;
 };
 
 struct ClockReport {
   std::string name;
-  double offset_s = 0,
-         drift = 0;  ///< the receiver's time less this clock's, at the first stamp; of a second in a second
+  double offset_s = 0;  ///< the receiver's time less this clock's, at the first stamp
+  double drift = 0;     ///< how much faster the receiver's goes, in a second
   bool measured = false;
   std::size_t stamps = 0;
   double span_s = 0;

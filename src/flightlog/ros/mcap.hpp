@@ -17,8 +17,8 @@ namespace flappy::flightlog::ros {
 struct McapOptions {
   bool compress = true;  ///< chunks in zstd, or as they are
   std::size_t chunk_bytes = 1u << 20;
-  double flush_s =
-      1;  ///< messages that came within it, by their time of logging, may be lost when the process is killed
+  /// So much of the messages, by their times of logging, may be lost when the process is killed.
+  double flush_s = 1;
 };
 
 /// Writes messages in chunks. A chunk is handed to the system whole and does not need what follows, so a killed process
@@ -94,6 +94,7 @@ class McapReader {
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
+  void read_summary();
   std::optional<McapMessage> record(std::uint8_t code, std::string_view content);
   void open_chunk(std::string_view content);
   void warn(const std::string& what);

@@ -47,6 +47,25 @@ McapReader::McapReader(std::string_view bytes, std::string name) : name_(std::mo
   if (!rest_.starts_with(kMagic))
     throw io::InputError(name_ + ": is no MCAP file; accepted: a file that begins as one");
   rest_.remove_prefix(kMagic.size());
+  try {
+    read_summary();
+  } catch (const MessageError&) {  // none, or damaged: what it has stands before the messages, too
+  }
+}
+
+/// Channels stand in the summary once more: a damaged chunk need not take them with it.
+void McapReader::read_summary() {
+  constexpr std::size_t kFooterSize = kHead + 20;
+  if (!all_.ends_with(kMagic) || all_.size() < 2 * kMagic.size() + kFooterSize) return;
+  const std::size_t footer = all_.size() - kMagic.size() - kFooterSize;
+  if (all_[footer] != kFooter) return;
+  const auto start = Parts(all_.substr(footer + kHead)).number<std::uint64_t>();
+  if (start < kMagic.size() || start > footer) return;
+  for (Parts parts(all_.substr(start, footer - start)); !parts.rest().empty();) {
+    const auto code = parts.number<std::uint8_t>();
+    const std::string_view content = parts.raw(parts.number<std::uint64_t>());
+    if (code == kSchema || code == kChannel) record(code, content);
+  }
 }
 
 void McapReader::warn(const std::string& what) {
@@ -59,22 +78,24 @@ std::optional<McapMessage> McapReader::next() {
     if (in_chunk_ && chunk_rest_.empty()) in_chunk_ = false;
     if (!in_chunk_ && ended_) return {};
     std::string_view& rest = in_chunk_ ? chunk_rest_ : rest_;
-    const std::string place = "byte " + std::to_string(all_.size() - rest_.size());
+    const std::size_t at = all_.size() - rest_.size();  // in the file; of a chunk, its end
     try {
       Parts parts(rest);
       const auto code = parts.number<std::uint8_t>();
       const std::string_view content = parts.raw(parts.number<std::uint64_t>());
       rest = parts.rest();
+      const bool in_chunk = in_chunk_;
       try {
         if (auto message = record(code, content)) return message;
       } catch (const MessageError& error) {
-        warn("the record before " + place + " " + error.what() + ": left out");
+        warn((in_chunk ? "a record in the chunk before byte " : "the record at byte ") + std::to_string(at) + " " +
+             error.what() + ": left out");
       }
     } catch (const MessageError&) {  // what the length says is not there
-      if (in_chunk_) warn("the chunk before " + place + " ends within a record");
-      else warn("ends within a record, at " + place + ": read as far as it goes");
-      if (in_chunk_) in_chunk_ = false;
-      else ended_ = true;
+      if (in_chunk_) warn("the chunk before byte " + std::to_string(at) + " ends within a record");
+      else warn("ends within a record, at byte " + std::to_string(at) + ": read as far as it goes");
+      (in_chunk_ ? chunk_rest_ : rest_) = {};
+      if (!in_chunk_) ended_ = true;
     }
   }
 }

@@ -66,6 +66,7 @@ std::string McapWriter::schema_record(std::size_t index) const {
 std::string McapWriter::channel_record(std::size_t index) const {
   const Topic& topic = topics_[index];
   Bytes metadata;
+  metadata.string("offered_qos_profiles").string("");  // the profile requires it; empty: any
   if (!topic.hash.empty()) metadata.string("topic_type_hash").string(topic.hash);
   return Bytes()
       .number(static_cast<std::uint16_t>(index))
