@@ -35,6 +35,8 @@ ROOMS = {
     "gap/diagnose": ROLLOUT | {"gap/replay", "gap/evidence", "gap/localise"},
     "blind": FLIGHT | {"flightlog"},
     "benchmark": GAP | {"blind", "benchmark/predict"},
+    "server/jobs": {"io"},
+    "server/http": {"io", "server/jobs"},
     "benchmark/predict": GAP,  # answers the benchmark's questions, and knows nothing of who makes them
 }
 # Rooms that may include no more than these files of others, and io: the blind robot shares neither physics nor effects
