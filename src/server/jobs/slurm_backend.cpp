@@ -1,12 +1,14 @@
 // Jobs go to sbatch, under a name that says whose they are. Should the server be killed before it has noted sbatch's answer, the next one
 // finds the job by its name; should sbatch itself be on its way still, it holds the job's folder; and of one name Slurm runs one job at a
 // time. The exit code comes from the minder, through the folder, which all nodes share.
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <map>
 #include <optional>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "io/files.hpp"
 #include "io/progress.hpp"
@@ -122,7 +124,10 @@ class SlurmBackend : public Backend {
       at = end + 1;
       const std::size_t first = line.find('|'), second = line.find('|', first + 1);
       if (second == std::string::npos) continue;
-      listed_[line.substr(0, first)] = {line.substr(first + 1, second - first - 1), line.substr(second + 1)};
+      const Listed found{line.substr(first + 1, second - first - 1), line.substr(second + 1)};
+      Listed& kept = listed_[line.substr(0, first)];
+      // an attempt that is about to be gone may stand beside the next one
+      if (std::pair(found.id.size(), found.id) > std::pair(kept.id.size(), kept.id)) kept = found;
     }
     return true;
   }
