@@ -7,6 +7,7 @@
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "server/http/dashboard.hpp"
+#include "server/jobs/commands.hpp"
 #include "server/jobs/minder.hpp"
 #include "server/jobs/runner.hpp"
 
@@ -27,7 +28,9 @@ int main(int argc, char** argv) {
     server::Queue queue(config.jobs.folders.output);
     io::log_into(config.jobs.folders.output);
     server::Runner runner(queue, {config.jobs, io::beside_program("bin/flappy-server"), io::beside_program("bin")});
-    server::Watched watched;  // a transport sets it
+    // what a transport carries out, and what it sets
+    [[maybe_unused]] server::Commands commands(queue, config, io::beside_program("bin"));
+    server::Watched watched;
     std::optional<server::Dashboard> dashboard;
     if (!config.http.listen.empty()) {
       dashboard.emplace(queue, watched, config);

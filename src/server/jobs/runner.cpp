@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds kStep{50};
-constexpr double kReportEvery_s = 1;
+constexpr double kReportEvery_s = 1, kFirstDelay_s = 5, kLongestDelay_s = 600;
 constexpr int kUsersMistake = 2, kGoesOn = 75;  // exit codes of our programs
 
 void note(const Job& job, const std::string& what) {
@@ -155,7 +155,19 @@ Ending Runner::ending_of(const Job& job) const {
           (exit->message.empty() ? "" : ": ") + exit->message);
 }
 
+/// Of what cannot be started now, for no fault of its own: later, and each time twice as long.
+void Runner::put_off(const Job& job, const std::string& why) {
+  Delay& delay = delays_[job.id];
+  delay.length_s = delay.length_s == 0 ? kFirstDelay_s : std::min(2 * delay.length_s, kLongestDelay_s);
+  delay.until_s = io::steady_seconds() + delay.length_s;
+  queue_.end(job.id, {State::queued, std::nullopt, why + "; is tried again", false});
+  note(job, why + "; is tried again in " + std::to_string(static_cast<int>(delay.length_s)) + " s");
+}
+
 void Runner::start(const Job& queued) {
+  if (const auto delay = delays_.find(queued.id);
+      delay != delays_.end() && io::steady_seconds() < delay->second.until_s)
+    return;
   const fs::path folder = folder_of(queued);
   io::make_folder(folder);
   const std::optional<JobLock> lock = JobLock::take(folder);
@@ -180,11 +192,12 @@ void Runner::start(const Job& queued) {
   try {
     backend_->start(queue_, job, folder, minder_command(options_.server.string(), folder, job.attempts, command),
                     *lock);
+    delays_.erase(job.id);
   } catch (const std::system_error& e) {
     queue_.end(job.id, crash(job, std::nullopt, std::string("cannot be started: ") + e.what()));
   } catch (const io::InputError& e) {
-    if (!backend_->is_local()) queue_.end(job.id, crash(job, std::nullopt, e.what()));
-    else throw;
+    if (backend_->is_local()) throw;
+    put_off(job, e.what());
   }
 }
 

@@ -46,6 +46,10 @@ class Runner {
     bool killed = false;
   };
 
+  struct Delay {
+    double length_s = 0, until_s = 0;
+  };
+
   std::filesystem::path folder_of(const Job& job) const;
   Launch launch_of(const Job& job) const;
   bool look_after_all();
@@ -54,6 +58,7 @@ class Runner {
   void tell_progress(const Job& job);
   Ending ending_of(const Job& job) const;
   Ending crash(const Job& job, std::optional<int> code, const std::string& what) const;
+  void put_off(const Job& job, const std::string& why);
   void start(const Job& job);
 
   Queue& queue_;
@@ -62,6 +67,7 @@ class Runner {
   std::set<std::uint64_t> started_here_;        ///< jobs whose last attempt this runner started
   std::map<std::uint64_t, Request> requests_;   ///< by job: how it was asked to stop
   std::map<std::uint64_t, double> reported_s_;  ///< by job
+  std::map<std::uint64_t, Delay> delays_;       ///< by job that could not be started
 };
 
 }  // namespace flappy::server

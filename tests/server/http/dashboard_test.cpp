@@ -225,7 +225,7 @@ TEST_F(Page, TakesNoLargeRequest) {
   const std::string much(1'000'000, 'x');
   EXPECT_FALSE(raw("GET /" + much + " HTTP/1.1\r\nHost: localhost\r\n\r\n").starts_with("HTTP/1.1 200"));
   std::string headers;
-  for (int i = 0; i < 2000; ++i) headers += "X-" + std::to_string(i) + ": " + std::string(100, 'x') + "\r\n";
+  for (int i = 0; i < 200; ++i) headers += "X-" + std::to_string(i) + ": " + std::string(100, 'x') + "\r\n";
   const int descriptor = connected();
   const std::string request = "GET / HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n";
   send(descriptor, request.data(), request.size(), MSG_NOSIGNAL);

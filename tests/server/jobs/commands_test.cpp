@@ -63,6 +63,7 @@ TEST_F(CommandsOf, AreBounded) {
   EXPECT_EQ(refused(submit(much, "train", "a")), "id: has 1000000 characters; accepted: at most 64");
   EXPECT_EQ(refused(submit("a", much, "a")), "kind: has 1000000 characters; accepted: at most 64");
   EXPECT_EQ(refused(submit("a", "train", much)), "config: has 1000000 characters; accepted: at most 256");
+  EXPECT_EQ(refused({"a", "b", "list", "", much, 0, {}}), "config: has 1000000 characters; accepted: at most 256");
   EXPECT_EQ(refused({"a", much, "list", "", "", 0, {}}), "client: has 1000000 characters; accepted: at most 64");
   EXPECT_EQ(refused({"a", "b", much, "", "", 0, {}}), "verb: has 1000000 characters; accepted: at most 16");
   EXPECT_EQ(refused(submit("a", "train", "a", std::vector<std::string>(33, "a=1"))),

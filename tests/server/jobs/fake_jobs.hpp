@@ -74,7 +74,7 @@ struct Place {
     config.jobs.folders = {fs::canonical(root / "configs"), fs::canonical(root / "output"),
                            fs::canonical(root / "data")};
     config.jobs.grace_s = 0.3;
-    config.jobs.at_once = 4;
+    config.jobs.at_once = 5;
   }
   RunnerOptions options() const {
     return {config.jobs, fs::path(FLAPPY_BUILD_DIR) / "bin/flappy-server", "/nowhere", fake_kinds()};

@@ -187,6 +187,24 @@ TEST_F(OnSlurm, KilledServersLoseNothingAndRunNothingTwice) {
   EXPECT_TRUE(is_quiet());
 }
 
+TEST_F(OnSlurm, WaitsForSlurmToAnswer) {
+  RunnerOptions options{read_server_config(root / "server.toml").jobs, kPrograms + "flappy-server", kPrograms,
+                        fake_kinds()};
+  const std::string conf = std::getenv("SLURM_CONF");
+  Queue queue(output);
+  const std::uint64_t id = queue.submit(fake("a"));
+  Runner runner(queue, options);
+  setenv("SLURM_CONF", "/nowhere/slurm.conf", 1);
+  runner.step();
+  setenv("SLURM_CONF", conf.c_str(), 1);
+  EXPECT_EQ(queue.job(id).state, State::queued);
+  EXPECT_EQ(queue.job(id).crashes, 0);
+  EXPECT_EQ(queue.job(id).message.substr(0, 8), "sbatch: ");
+  EXPECT_TRUE(run_until(
+      runner, [&] { return queue.job(id).state == State::done; }, 60));
+  EXPECT_TRUE(is_quiet());
+}
+
 TEST_F(OnSlurm, PausesCancelsAndTellsMistakes) {
   RunnerOptions options{read_server_config(root / "server.toml").jobs, kPrograms + "flappy-server", kPrograms,
                         fake_kinds()};

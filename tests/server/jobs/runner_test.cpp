@@ -53,7 +53,7 @@ TEST_F(Jobs, EndAsTheirProgramsDo) {
 
 TEST_F(Jobs, RunSoManyAtOnce) {
   place.config.jobs.at_once = 2;
-  for (int i = 0; i < 5; ++i) queue.submit(fake(std::to_string(i)));
+  for (int i = 0; i < 5; ++i) queue.submit(fake(std::to_string(i), "well", 2));
   Runner runner(queue, place.options());
   std::size_t most = 0;
   EXPECT_TRUE(run_until(runner, [&] {
@@ -88,18 +88,18 @@ TEST_F(Jobs, PauseGoOnAndAreCancelled) {
 }
 
 TEST_F(Jobs, StopWithTheServerAndGoOnWithIt) {
-  const std::uint64_t id = queue.submit(fake("a", "well", 60));
+  const std::uint64_t id = queue.submit(fake("a", "well", 25));
   {
     Runner runner(queue, place.options());
     const double from_s = io::steady_seconds();
-    runner.run([&] { return io::steady_seconds() < from_s + 0.4; });
+    runner.run([&] { return io::steady_seconds() < from_s + 0.2; });
   }
   EXPECT_EQ(state(id), State::queued);
   EXPECT_EQ(queue.job(id).crashes, 0);
   EXPECT_TRUE(JobLock::take(place.folder(id)));
   Runner runner(queue, place.options());
   EXPECT_TRUE(comes_to(runner, id, State::done));
-  EXPECT_EQ(text_of(place.folder(id) / "steps"), counted(60));
+  EXPECT_EQ(text_of(place.folder(id) / "steps"), counted(25));
 }
 
 TEST_F(Jobs, FailWhereTheirConfigurationIsGone) {
@@ -119,6 +119,21 @@ TEST_F(Jobs, CountAsCrashedWithoutAMinder) {
   Runner runner(queue, options);
   EXPECT_TRUE(comes_to(runner, id, State::failed));
   EXPECT_EQ(queue.job(id).attempts, 3);
+}
+
+TEST_F(Jobs, EndWithTheirMinder) {
+  RunnerOptions options = place.options();
+  options.config.attempts = 1;
+  options.kinds[0].command = [](const Launch&) { return std::vector<std::string>{"/bin/sleep", "100"}; };
+  const std::uint64_t id = queue.submit(fake("a"));
+  Runner runner(queue, options);
+  ASSERT_TRUE(run_until(runner, [&] { return began(place.folder(id), 1).has_value(); }));
+  usleep(50'000);  // its program is there by now
+  const Process minder = began(place.folder(id), 1).value();
+  EXPECT_EQ(queue.job(id).process, minder);
+  EXPECT_TRUE(signal_process(minder, SIGKILL));
+  EXPECT_TRUE(comes_to(runner, id, State::failed));
+  EXPECT_EQ(queue.job(id).message.substr(0, 43), "its process was killed, or could not start;");
 }
 
 TEST(Process, IsNeverMistakenForAnother) {
@@ -164,7 +179,7 @@ void kill_often(Place& place, int kills, int steps, bool minders_too) {
   int unfinished = 0;
   for (int k = 0; k < kills; ++k) {
     const pid_t server = serve(place);
-    usleep(std::uniform_int_distribution<unsigned>(0, 100'000)(random));
+    usleep(std::uniform_int_distribution<unsigned>(0, 60'000)(random));
     kill(server, SIGKILL);
     waitpid(server, nullptr, 0);
     if (minders_too) kill_minders(place);
@@ -188,13 +203,13 @@ void kill_often(Place& place, int kills, int steps, bool minders_too) {
 
 TEST(Killed, TwentyTimesTheServerLosesNothingAndRunsNothingTwice) {
   Place place;
-  kill_often(place, 20, flappy::test::full() ? 100 : 25, false);
+  kill_often(place, 20, flappy::test::full() ? 100 : 16, false);
 }
 
 TEST(Killed, WithItsJobsTheServerGoesOnFromTheirSteps) {
   Place place;
   place.config.jobs.attempts = 100;
-  kill_often(place, 10, 12, true);
+  kill_often(place, flappy::test::full() ? 20 : 6, 6, true);
 }
 
 }  // namespace
