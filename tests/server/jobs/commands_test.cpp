@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <malloc.h>
 
+#include <algorithm>
+
 #include "refusal.hpp"
 #include "server/jobs/fake_jobs.hpp"
 

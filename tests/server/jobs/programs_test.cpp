@@ -194,7 +194,8 @@ TEST_F(OnSlurm, WaitsForSlurmToAnswer) {
   Queue queue(output);
   const std::uint64_t id = queue.submit(fake("a"));
   Runner runner(queue, options);
-  setenv("SLURM_CONF", "/nowhere/slurm.conf", 1);
+  io::write_atomically(root / "slurm.conf", "ClusterName=none\nNonsense=1\n");
+  setenv("SLURM_CONF", (root / "slurm.conf").c_str(), 1);
   runner.step();
   setenv("SLURM_CONF", conf.c_str(), 1);
   EXPECT_EQ(queue.job(id).state, State::queued);
