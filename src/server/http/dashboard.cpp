@@ -25,7 +25,7 @@ using httplib::Request;
 using httplib::Response;
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kJobs = 200, kLogBytes = 32 * 1024, kCurveBytes = 4'000'000, kCurvePoints = 500;
+constexpr std::size_t kJobs = 200, kLogBytes = 32'768, kCurveBytes = 4'000'000, kCurvePoints = 500;
 constexpr std::size_t kThreads = 6;  // that answer besides the streams
 constexpr std::chrono::milliseconds kEventEvery{100};
 constexpr double kHeartbeat_s = 10;
@@ -166,7 +166,7 @@ void Dashboard::Parts::route() {
   listener.set_error_handler([](const Request&, Response& response) {
     if (response.body.empty()) answer(response, response.status, "there is nothing here");
   });
-  listener.set_exception_handler([](const Request&, Response& response, std::exception_ptr what) {
+  listener.set_exception_handler([](const Request&, Response& response, const std::exception_ptr& what) {
     try {
       std::rethrow_exception(what);
     } catch (const io::InputError& e) {

@@ -18,7 +18,7 @@
 
 namespace flappy::server {
 
-inline constexpr std::size_t kMostOfRequest = 16 * 1024;  ///< bytes of a request, headers included
+inline constexpr std::size_t kMostOfRequest = 16'384;  ///< bytes of a request, headers included
 
 class Dashboard {
  public:

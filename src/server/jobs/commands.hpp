@@ -46,7 +46,7 @@ struct JobFile {
   std::string name;
   std::uint64_t bytes = 0;
 };
-inline constexpr std::size_t kMostFiles = 10'000, kMostOfChunk = 64 * 1024, kMostListed = 1000;
+inline constexpr std::size_t kMostFiles = 10'000, kMostOfChunk = 65'536, kMostListed = 1000;
 
 /// Any thread may call it.
 class Commands {

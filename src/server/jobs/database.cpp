@@ -16,6 +16,7 @@ namespace {
     case SQLITE_NOTADB:
     case SQLITE_CORRUPT:
       throw io::InputError(name + ": is no sound queue: " + what + "; accepted: a queue that flappy-server left");
+    case SQLITE_BUSY:  // somebody else writes to it, and does not end
     case SQLITE_CANTOPEN:
     case SQLITE_FULL:
     case SQLITE_IOERR:
@@ -36,7 +37,7 @@ Statement::Statement(sqlite3* database, const std::string& name, std::string_vie
 }
 
 Statement::Statement(Statement&& other) noexcept
-    : database_(other.database_), name_(other.name_), statement_(std::exchange(other.statement_, nullptr)) {}
+    : database_(other.database_), name_(std::move(other.name_)), statement_(std::exchange(other.statement_, nullptr)) {}
 
 Statement::~Statement() { sqlite3_finalize(statement_); }
 

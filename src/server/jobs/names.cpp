@@ -41,7 +41,7 @@ fs::path below(const fs::path& folder, const std::string& name, const std::strin
   std::error_code error;
   const fs::path root = fs::canonical(folder, error);
   if (error) throw io::InputError(folder.string() + ": cannot be read: " + error.message());
-  const fs::path found = fs::canonical(root / name, error);
+  fs::path found = fs::canonical(root / name, error);
   if (error) throw refuse("is not there; accepted: what lies below the allowed folder");
   // part by part, so that /a/bc is not below /a/b
   const auto differ = std::ranges::mismatch(root, found);

@@ -59,7 +59,7 @@ class Runner {
   Ending ending_of(const Job& job) const;
   Ending crash(const Job& job, std::optional<int> code, const std::string& what) const;
   void put_off(const Job& job, const std::string& why);
-  void start(const Job& job);
+  void start(const Job& queued);
 
   Queue& queue_;
   RunnerOptions options_;

@@ -9,7 +9,7 @@ namespace fs = std::filesystem;
 
 fs::path existing_folder(const io::Table& table, const std::string& key) {
   std::error_code error;
-  const fs::path folder = fs::canonical(table.file(key), error);
+  fs::path folder = fs::canonical(table.file(key), error);
   if (error || !fs::is_directory(folder)) table.fail(key, "is no folder", "a folder that exists");
   return folder;
 }
