@@ -37,10 +37,13 @@ ROOMS = {
     "gap/diagnose": ROLLOUT | {"gap/replay", "gap/evidence", "gap/localise"},
     "server/dds": {"io", "flightlog", "flightlog/ros"},
     "server/telemetry": ROLLOUT | {"server/dds"},
+    "server/commands": {"io", "server/dds", "server/http", "server/jobs"},
     "server/record": BASE | {"flightlog", "flightlog/import", "flightlog/ros", "server/dds"},
     "server/sitl": ROLLOUT | {"server/dds", "server/telemetry"},
     "blind": FLIGHT | {"flightlog"},
     "benchmark": GAP | {"blind", "benchmark/predict"},
+    "server/jobs": {"io"},
+    "server/http": {"io", "server/jobs"},
     "benchmark/predict": GAP,  # answers the benchmark's questions, and knows nothing of who makes them
 }
 # Rooms that may include no more than these files of others, and io: the blind robot shares neither physics nor effects

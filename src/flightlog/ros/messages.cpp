@@ -60,6 +60,8 @@ constexpr Text kTexts[] = {
     {"flappy_msgs/msg/Command",
      "builtin_interfaces/Time stamp\nstring<=64 id\nstring<=16 verb\nstring<=64 kind\nstring<=256 config\nuint64 job\n"
      "string<=256[<=32] overrides\n"},
+    {"flappy_msgs/msg/FileChunk",
+     "string<=64 id\nuint64 job\nstring<=1024 name\nuint64 size\nuint64 offset\nuint32 left\nuint8[<=65536] data\n"},
     {"flappy_msgs/msg/CommandResult", "string<=64 id\nbool accepted\nuint64 job\nstring<=1024 message\n"},
 };
 

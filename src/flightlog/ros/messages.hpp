@@ -12,7 +12,7 @@ namespace flappy::flightlog::ros {
 ///   TrainingMetrics  how far a training is
 ///   JobStatus        a job in the queue of a server
 ///   Watch            which flapper of a batch is shown
-///   Command, CommandResult   what is asked of a server, and what it says
+///   Command, CommandResult, FileChunk   what is asked of a server, and what it says and hands over
 ///
 /// Each as members alone: constants, defaults and comments are no part of a message on the wire, nor of its hash.
 const Definitions& standard_messages();

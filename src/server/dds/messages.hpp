@@ -26,6 +26,7 @@ using TrainingMetrics = flappy_msgs_msg_dds__TrainingMetrics_;
 using JobStatusMessage = flappy_msgs_msg_dds__JobStatus_;
 using Watch = flappy_msgs_msg_dds__Watch_;
 using CommandMessage = flappy_msgs_msg_dds__Command_;
+using FileChunk = flappy_msgs_msg_dds__FileChunk_;
 using CommandResultMessage = flappy_msgs_msg_dds__CommandResult_;
 
 template <class M>
@@ -48,6 +49,7 @@ FLAPPY_MESSAGE(TrainingMetrics, flappy_msgs_msg_dds__TrainingMetrics_)
 FLAPPY_MESSAGE(JobStatusMessage, flappy_msgs_msg_dds__JobStatus_)
 FLAPPY_MESSAGE(Watch, flappy_msgs_msg_dds__Watch_)
 FLAPPY_MESSAGE(CommandMessage, flappy_msgs_msg_dds__Command_)
+FLAPPY_MESSAGE(FileChunk, flappy_msgs_msg_dds__FileChunk_)
 FLAPPY_MESSAGE(CommandResultMessage, flappy_msgs_msg_dds__CommandResult_)
 #undef FLAPPY_MESSAGE
 

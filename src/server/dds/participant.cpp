@@ -17,6 +17,8 @@ namespace fs = std::filesystem;
 
 /// ROS 2 processes that do not use multicast ask the first so many ports of a machine, and take one of them.
 constexpr int kMostParticipants = 99;
+/// Messages on their way where none may be dropped.
+constexpr std::int32_t kMostKept = 64;
 /// A reliable reader that does not take what it is sent stops us no longer than this.
 constexpr dds_duration_t kBlocks = DDS_MSECS(100);
 
@@ -29,7 +31,12 @@ Qos qos_of(const Quality& quality, const std::string& user_data) {
   Qos q(dds_create_qos());
   dds_qset_reliability(q.get(), quality.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, kBlocks);
   dds_qset_durability(q.get(), quality.kept ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
-  dds_qset_history(q.get(), DDS_HISTORY_KEEP_LAST, quality.depth);
+  if (quality.depth == kAllOfIt) {
+    dds_qset_history(q.get(), DDS_HISTORY_KEEP_ALL, 0);
+    dds_qset_resource_limits(q.get(), kMostKept, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  } else {
+    dds_qset_history(q.get(), DDS_HISTORY_KEEP_LAST, quality.depth);
+  }
   const dds_data_representation_id_t plain = DDS_DATA_REPRESENTATION_XCDR1;
   dds_qset_data_representation(q.get(), 1, &plain);
   if (!user_data.empty()) dds_qset_userdata(q.get(), user_data.data(), user_data.size());
@@ -193,6 +200,16 @@ std::size_t take(const Entity& reader, const std::function<void(const void*, con
 }
 
 }  // namespace detail
+
+std::string writer_of(const Entity& reader, const dds_sample_info_t& info) {
+  dds_builtintopic_endpoint_t* writer = dds_get_matched_publication_data(reader.get(), info.publication_handle);
+  if (writer == nullptr) return "";
+  constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (const unsigned char byte : writer->participant_key.v) text += {kDigits[byte >> 4], kDigits[byte & 15]};
+  dds_builtintopic_free_endpoint(writer);
+  return text;
+}
 
 WaitSet::WaitSet(const Participant& p) : set_(dds_create_waitset(p.get()), "waiting") {}
 

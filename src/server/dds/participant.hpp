@@ -20,8 +20,9 @@ namespace flappy::server {
 /// As ROS 2 expects of a topic: what its subscriptions of that kind match.
 struct Quality {
   bool reliable, kept;  ///< kept: late joiners get the last `depth`
-  int depth;
+  int depth;            ///< kAllOfIt: nothing is dropped, and a writer waits for who is slow
 };
+inline constexpr int kAllOfIt = 0;
 inline constexpr Quality kSensorData{false, false, 5}, kReliable{true, false, 10}, kLatched{true, true, 1};
 
 /// What Cyclone DDS is told of interfaces and peers; empty where the environment alone says it.
@@ -63,6 +64,9 @@ std::size_t matched(const Entity&, bool writer);
 std::size_t take(const Entity&, const std::function<void(const void*, const dds_sample_info_t&)>& see);
 }  // namespace detail
 
+/// The process that wrote a message that a reader took, as DDS knows it; empty where it is gone.
+std::string writer_of(const Entity& reader, const dds_sample_info_t& info);
+
 template <class M>
 class Writer {
  public:
@@ -71,6 +75,7 @@ class Writer {
   /// False where it could not be handed over in time; text and lists that `message` points to are copied.
   bool write(const M& message) const { return detail::write(writer_, &message); }
   std::size_t readers() const { return detail::matched(writer_, true); }
+  const Entity& entity() const { return writer_; }
 
  private:
   Entity writer_;

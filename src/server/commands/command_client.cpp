@@ -1,0 +1,186 @@
+#include "server/commands/command_client.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <optional>
+#include <random>
+
+#include "io/progress.hpp"
+
+namespace flappy::server {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+
+constexpr Quality kAnswers{true, false, 1000}, kPieces{true, false, kAllOfIt};
+constexpr milliseconds kLook{50};
+
+std::string fresh_id() {
+  std::random_device random;
+  std::string id;
+  for (int i = 0; i < 4; ++i) {
+    char text[9];
+    std::snprintf(text, sizeof text, "%08x", random());
+    id += text;
+  }
+  return id;
+}
+
+template <std::size_t kSize>
+void put(char (&to)[kSize], const std::string& from, const char* what) {
+  if (from.size() >= kSize)
+    throw io::InputError(std::string(what) + ": has " + std::to_string(from.size()) +
+                         " characters; accepted: at most " + std::to_string(kSize - 1));
+  std::memcpy(to, from.c_str(), from.size() + 1);
+}
+
+JobStatus status_of(const JobStatusMessage& m) {
+  return {m.id, m.kind, m.config, m.state, static_cast<int>(m.attempts), m.exit_code, m.progress, m.message, m.folder};
+}
+
+/// A file's name as a server gives it: below a folder, whatever the server is.
+fs::path safe(const std::string& name) {
+  const fs::path path(name);
+  const bool odd = name.empty() || path.is_absolute() ||
+                   std::ranges::any_of(path, [](const fs::path& part) { return part == ".." || part == "."; });
+  if (odd) throw io::InputError("the server names a file \"" + shown(name) + "\"; accepted: names below a folder");
+  return path;
+}
+
+}  // namespace
+
+CommandClient::CommandClient(const io::DdsConfig& config, double timeout_s)
+    : timeout_s_(timeout_s),
+      participant_(config),
+      command_(participant_, "/" + config.name_space + "/command", kAnswers),
+      results_(participant_, "/" + config.name_space + "/command_result", kAnswers),
+      jobs_(participant_, "/" + config.name_space + "/jobs", kAnswers),
+      files_(participant_, "/" + config.name_space + "/files", kPieces),
+      waiting_(participant_) {
+  for (const Entity* reader : {&results_.entity(), &jobs_.entity(), &files_.entity()}) waiting_.add(*reader);
+  const double until_s = io::steady_seconds() + timeout_s_;
+  while (command_.readers() == 0 || results_.writers() == 0 || jobs_.writers() == 0 || files_.writers() == 0) {
+    if (io::steady_seconds() > until_s)
+      throw io::InputError(jobs_.writers() > 0 ? "the server takes no commands; accepted: one with dds.commands = true"
+                                               : "no server within " + io::shortest_digits(timeout_s_) +
+                                                     " s; accepted: one in the same domain and within dds.reach");
+    io::sleep_until(io::steady_seconds() + 0.005);
+  }
+}
+
+void CommandClient::take_jobs() {
+  jobs_.take([&](const JobStatusMessage& m, const dds_sample_info_t&) { heard_.push_back(status_of(m)); });
+}
+
+CommandResult CommandClient::await(const std::string& id, const std::function<void()>& meanwhile) {
+  std::optional<CommandResult> result;
+  for (const double until_s = io::steady_seconds() + timeout_s_; !result;) {
+    waiting_.wait(kLook);
+    results_.take([&](const CommandResultMessage& m, const dds_sample_info_t&) {
+      if (m.id == id) result = {m.id, m.accepted, m.job, m.message};
+    });
+    take_jobs();
+    if (meanwhile) meanwhile();
+    if (!result && io::steady_seconds() > until_s)
+      throw io::InputError("the server does not answer within " + io::shortest_digits(timeout_s_) + " s");
+  }
+  return *result;
+}
+
+CommandResult CommandClient::ask(Command command) {
+  if (command.id.empty()) command.id = fresh_id();
+  CommandMessage m{};
+  m.stamp = time_of(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count());
+  put(m.id, command.id, "id");
+  put(m.verb, command.verb, "verb");
+  put(m.kind, command.kind, "kind");
+  put(m.config, command.config, "config");
+  m.job = command.job;
+  std::vector<char[kMostOfOverride + 1]> overrides(command.overrides.size());
+  for (std::size_t i = 0; i < overrides.size(); ++i) put(overrides[i], command.overrides[i], "--set");
+  const auto count = static_cast<std::uint32_t>(overrides.size());
+  if (count > kMostOverrides)
+    throw io::InputError("--set: is given " + std::to_string(count) + " times; accepted: at most " +
+                         std::to_string(kMostOverrides));
+  m.overrides = {count, count, overrides.data(), false};
+  if (!command_.write(m)) throw io::InputError("the server takes nothing");
+  return await(command.id, {});
+}
+
+std::vector<JobStatus> CommandClient::list() {
+  heard_.clear();
+  Command command;
+  command.verb = "list";
+  const CommandResult r = ask(command);
+  if (!r.accepted) throw io::InputError(r.message);
+  const double until_s = io::steady_seconds() + timeout_s_;
+  std::map<std::uint64_t, JobStatus> all;
+  for (;;) {
+    for (JobStatus& job : heard_) all.insert_or_assign(job.id, std::move(job));
+    heard_.clear();
+    if (all.size() >= r.job) break;
+    if (io::steady_seconds() > until_s) throw io::InputError("the server lists fewer jobs than it says");
+    waiting_.wait(kLook);
+    take_jobs();
+  }
+  std::vector<JobStatus> list;
+  for (auto& [id, job] : all) list.insert(list.begin(), std::move(job));
+  return list;
+}
+
+void CommandClient::watch(const std::function<bool(const JobStatus& job)>& see,
+                          const std::function<bool()>& keep_going) {
+  while (keep_going()) {
+    waiting_.wait(kLook);
+    take_jobs();
+    for (const JobStatus& job : std::exchange(heard_, {}))
+      if (!see(job)) return;
+  }
+}
+
+std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
+                                 const std::function<void(const JobFile&)>& see) {
+  const auto ask_for = [&](const std::string& name, const std::function<void(const FileChunk&)>& piece) {
+    Command command{
+        .id = fresh_id(), .client = {}, .verb = "fetch", .kind = {}, .config = name, .job = job, .overrides = {}};
+    const CommandResult r = ask(command);
+    if (!r.accepted) throw io::InputError(r.message);
+    bool over = r.message == "0 files";
+    for (double heard_s = io::steady_seconds(); !over;) {
+      files_.take([&](const FileChunk& m, const dds_sample_info_t&) {
+        if (m.id != command.id) return;
+        heard_s = io::steady_seconds();
+        piece(m);
+        over = m.left == 0;
+      });
+      if (over) break;
+      if (io::steady_seconds() - heard_s > timeout_s_)
+        throw io::InputError((name.empty() ? "the list of files" : name) + ": does not come within " +
+                             io::shortest_digits(timeout_s_) + " s");
+      waiting_.wait(kLook);
+    }
+  };
+  std::vector<JobFile> files;
+  ask_for("", [&](const FileChunk& m) { files.push_back({m.name, m.size}); });
+  for (const JobFile& file : files) {
+    see(file);
+    const fs::path path = folder / safe(file.name);
+    io::make_folder(path.parent_path());
+    io::AtomicFile to(path);
+    std::uint64_t got = 0, size = 0;
+    ask_for(file.name, [&](const FileChunk& m) {
+      if (m.offset != got) throw io::InputError(file.name + ": a piece is missing");
+      to.write({reinterpret_cast<const char*>(m.data._buffer), m.data._length});
+      got += m.data._length;
+      size = m.size;
+    });
+    if (got != size) throw io::InputError(file.name + ": changed while it was fetched; accepted: the same once more");
+    to.commit();
+  }
+  return files.size();
+}
+
+}  // namespace flappy::server

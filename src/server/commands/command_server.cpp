@@ -1,0 +1,201 @@
+#include "server/commands/command_server.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <limits>
+
+#include "io/log.hpp"
+#include "io/progress.hpp"
+
+namespace flappy::server {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr Quality kAnswers{true, false, 1000}, kPieces{true, false, kAllOfIt};
+constexpr milliseconds kLook{100};  // between looks at the queue
+constexpr std::size_t kMostTransfers = 16;
+constexpr double kMostOfSpeed_m_s = 100;  // beyond it, two poses are of two flights
+
+template <std::size_t kSize>
+void put(char (&to)[kSize], const std::string& from) {
+  const std::size_t size = std::min(from.size(), kSize - 1);
+  std::memcpy(to, from.data(), size);
+  to[size] = '\0';
+}
+
+double now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
+
+}  // namespace
+
+CommandServer::CommandServer(const io::DdsConfig& config, Commands& commands, Watched& watched)
+    : commands_(commands),
+      watched_(watched),
+      participant_(config),
+      jobs_(participant_, "/" + config.name_space + "/jobs", kAnswers),
+      results_(participant_, "/" + config.name_space + "/command_result", kAnswers),
+      files_(participant_, "/" + config.name_space + "/files", kPieces),
+      pose_(participant_, "/" + config.name_space + "/pose", kSensorData),
+      imu_(participant_, "/" + config.name_space + "/imu", kSensorData),
+      battery_(participant_, "/" + config.name_space + "/battery", kSensorData),
+      waiting_(participant_) {
+  state_.source = "/" + config.name_space;
+  if (config.commands) {
+    asked_.emplace(participant_, "/" + config.name_space + "/command", kAnswers);
+    waiting_.add(asked_->entity());
+  }
+  thread_ = std::thread([this] { run(); });
+}
+
+CommandServer::~CommandServer() {
+  over_ = true;
+  thread_.join();
+}
+
+void CommandServer::run() {
+  double looked_s = 0;
+  while (!over_) try {
+      if (transfers_.empty()) waiting_.wait(kLook);
+      take_commands();
+      send_pieces();
+      if (io::steady_seconds() - looked_s < std::chrono::duration<double>(kLook).count()) continue;
+      looked_s = io::steady_seconds();
+      show_changes(false);
+      look();
+    } catch (const std::exception& e) {  // one that nobody sent; the queue goes on
+      io::log(io::LogLevel::error, std::string("dds: ") + e.what());
+      std::this_thread::sleep_for(kLook);
+    }
+}
+
+void CommandServer::take_commands() {
+  if (!asked_) return;
+  asked_->take([&](const CommandMessage& m, const dds_sample_info_t& info) {
+    Command c{m.id, writer_of(asked_->entity(), info), m.verb, m.kind, m.config, m.job, {}};
+    for (std::uint32_t i = 0; i < m.overrides._length; ++i) c.overrides.emplace_back(m.overrides._buffer[i]);
+    answer(c);
+  });
+}
+
+void CommandServer::answer(const Command& command) {
+  CommandResult r = commands_.execute(command);
+  if (r.accepted && command.verb == "list") {
+    show_changes(true);
+    r.job = shown_.size();
+  }
+  if (r.accepted && command.verb == "fetch") r = fetch(command);
+  CommandResultMessage m{};
+  put(m.id, r.id);
+  m.accepted = r.accepted;
+  m.job = r.job;
+  put(m.message, r.message);
+  results_.write(m);
+}
+
+/// The names of all files, or the pieces of one from now on.
+CommandResult CommandServer::fetch(const Command& command) {
+  CommandResult r{command.id, true, command.job, ""};
+  try {
+    const std::vector<JobFile> files = commands_.files(command.job);
+    if (command.config.empty()) {
+      auto left = static_cast<std::uint32_t>(files.size());
+      for (const JobFile& file : files) {
+        FileChunk m{};
+        put(m.id, command.id);
+        m.job = command.job;
+        put(m.name, file.name);
+        m.size = file.bytes;
+        m.left = --left;
+        files_.write(m);
+      }
+      r.message = std::to_string(files.size()) + " files";
+      return r;
+    }
+    const auto found = std::ranges::find(files, command.config, &JobFile::name);
+    if (found == files.end())
+      throw io::InputError("file: \"" + shown(command.config) + "\" is none of job " + std::to_string(command.job));
+    if (transfers_.size() >= kMostTransfers)
+      throw io::InputError("too many files at a time; accepted: the same one later");
+    transfers_.push_back({command.id, command.job, found->bytes, 0, found->name});
+    r.message = found->name + ": " + std::to_string(found->bytes) + " bytes";
+  } catch (const io::InputError& e) {
+    r.accepted = false;
+    r.message = shown(e.what());
+  }
+  return r;
+}
+
+/// One piece of each file that is on its way, so that nobody waits for another's checkpoint.
+void CommandServer::send_pieces() {
+  for (std::size_t k = transfers_.size(); k > 0; --k) {
+    Transfer t = transfers_.front();
+    transfers_.pop_front();
+    std::string data;
+    try {
+      data = commands_.chunk(t.job, t.name, t.offset);
+    } catch (const io::InputError&) {  // it is gone: the last piece comes too early, which its receiver sees
+    }
+    data.resize(std::min<std::uint64_t>(data.size(), t.size - t.offset));  // a file may grow meanwhile
+    FileChunk m{};
+    put(m.id, t.id);
+    m.job = t.job;
+    put(m.name, t.name);
+    m.size = t.size;
+    m.offset = t.offset;
+    const std::uint64_t after = t.size - t.offset - data.size();
+    m.left = data.empty() ? 0 : static_cast<std::uint32_t>((after + kMostOfChunk - 1) / kMostOfChunk);
+    const auto size = static_cast<std::uint32_t>(data.size());
+    m.data = {size, size, reinterpret_cast<std::uint8_t*>(data.data()), false};
+    const bool sent = files_.write(m);
+    if (sent) t.offset += data.size();
+    if (files_.readers() > 0 && (!sent || m.left > 0)) transfers_.push_back(std::move(t));
+  }
+}
+
+void CommandServer::show_changes(bool all) {
+  std::map<std::uint64_t, JobStatus> now;
+  for (JobStatus& s : commands_.statuses()) now.emplace(s.id, std::move(s));
+  for (const auto& [id, s] : now) {
+    const auto before = shown_.find(id);
+    if (!all && before != shown_.end() && before->second == s) continue;
+    char no_frame[] = "";
+    JobStatusMessage m{};
+    m.header = {time_of(now_s()), no_frame};
+    m.id = id;
+    put(m.kind, s.kind);
+    put(m.config, s.config);
+    put(m.state, s.state);
+    m.attempts = static_cast<std::uint32_t>(std::max(0, s.attempts));
+    m.exit_code = s.exit_code;
+    m.progress = s.progress;
+    put(m.message, s.message);
+    put(m.folder, s.folder);
+    jobs_.write(m);
+  }
+  shown_ = std::move(now);
+}
+
+/// What the watched flapper's topics say.
+void CommandServer::look() {
+  bool any = false;
+  imu_.take([&](const Imu& m, const dds_sample_info_t&) {
+    state_.w_WB_B_rad_s = {m.angular_velocity.x, m.angular_velocity.y, m.angular_velocity.z};
+  });
+  battery_.take([&](const BatteryState& m, const dds_sample_info_t&) { state_.battery_V = m.voltage; });
+  pose_.take([&](const PoseStamped& m, const dds_sample_info_t&) {
+    const double t_s = seconds_of(m.header.stamp), passed_s = t_s - state_.t_s;
+    const std::array<double, 3> p{m.pose.position.x, m.pose.position.y, m.pose.position.z};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double v = (p[i] - state_.position_m[i]) / passed_s;
+      state_.v_WB_W_m_s[i] = std::abs(v) < kMostOfSpeed_m_s ? v : 0;
+    }
+    state_.t_s = t_s;
+    state_.position_m = p;
+    state_.q_WB = {m.pose.orientation.w, m.pose.orientation.x, m.pose.orientation.y, m.pose.orientation.z};
+    any = true;
+  });
+  if (any) watched_.set(state_);
+}
+
+}  // namespace flappy::server

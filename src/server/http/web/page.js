@@ -1,0 +1,134 @@
+"use strict";
+
+const at = (id) => document.getElementById(id);
+let jobs = [];
+let chosen = null;
+
+// Text only ever becomes a text node: what a job printed is never markup.
+function element(name, text, kind) {
+  const made = document.createElement(name);
+  made.textContent = text;
+  if (kind) made.className = kind;
+  return made;
+}
+
+async function ask(path) {
+  const response = await fetch(path);
+  if (!response.ok) throw new Error(response.status);
+  return response;
+}
+
+function time(seconds) {
+  return seconds > 0 ? new Date(1000 * seconds).toLocaleString() : "";
+}
+
+function showJobs() {
+  at("none").hidden = jobs.length > 0;
+  at("jobs").replaceChildren(...jobs.map((job) => {
+    const button = element("button", "", "job");
+    button.setAttribute("aria-current", job.id === chosen);
+    button.append(element("span", `${job.id}  ${job.kind} ${job.config}`), element("span", job.state, job.state));
+    if (job.state === "running" || job.state === "paused") {
+      const bar = element("progress", "");
+      bar.value = job.progress;
+      button.append(bar);
+    }
+    button.addEventListener("click", () => {
+      chosen = job.id;
+      showJobs();
+      showChosen();
+    });
+    const row = element("li", "");
+    row.append(button);
+    return row;
+  }));
+}
+
+const svg = (name, attributes, text) => {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text !== undefined) made.textContent = text;
+  return made;
+};
+
+function showCurve(curve) {
+  const points = curve.update.map((update, i) => [update, curve.success_rate[i]]).filter((p) => p[0] !== null && p[1] !== null);
+  at("curve").hidden = points.length === 0;
+  if (points.length === 0) return;
+  const [left, right, top, bottom] = [44, 632, 10, 212];
+  const last = Math.max(1, points[points.length - 1][0]);
+  const x = (update) => left + (right - left) * update / last;
+  const y = (rate) => bottom - (bottom - top) * rate;
+  const parts = [];
+  for (const rate of [0, 0.25, 0.5, 0.75, 1]) {
+    parts.push(svg("line", {class: "grid", x1: left, x2: right, y1: y(rate), y2: y(rate)}));
+    parts.push(svg("text", {x: left - 6, y: y(rate) + 4, "text-anchor": "end"}, `${100 * rate} %`));
+  }
+  parts.push(svg("text", {x: left, y: bottom + 18}, "0"));
+  parts.push(svg("text", {x: right, y: bottom + 18, "text-anchor": "end"}, last.toLocaleString()));
+  parts.push(svg("polyline", {class: "curve", points: points.map((p) => `${x(p[0]).toFixed(1)},${y(p[1]).toFixed(1)}`).join(" ")}));
+  at("curve").querySelector("svg").replaceChildren(...parts);
+}
+
+async function showChosen() {
+  const job = jobs.find((each) => each.id === chosen);
+  at("job").hidden = !job;
+  if (!job) return;
+  at("job-title").textContent = `Job ${job.id}: ${job.kind} ${job.config}`;
+  at("message").textContent = [job.state, `attempt ${job.attempts}`, ...job.overrides, job.message].filter(Boolean).join(" · ");
+  const of = (what) => ask(`api/jobs/${job.id}/${what}`);
+  const [log, history, curve] = await Promise.all([
+    of("log").then((r) => r.text()), of("history").then((r) => r.json()), of("curve").then((r) => r.json())]);
+  if (job.id !== chosen) return;
+  const box = at("log");
+  const following = box.scrollTop + box.clientHeight >= box.scrollHeight - 8;
+  box.textContent = log;
+  if (following) box.scrollTop = box.scrollHeight;
+  at("history").replaceChildren(...history.map((step) =>
+    element("li", `${time(step.time_s)}  ${step.state}${step.attempt > 0 ? `, attempt ${step.attempt}` : ""}: ${step.why}`)));
+  showCurve(curve);
+}
+
+function showWatched(state) {
+  at("watched").hidden = state === null;
+  if (state === null) return;
+  const numbers = (list) => list.map((value) => value.toFixed(3)).join("  ");
+  const rows = [["source", state.source], ["time", `${state.t_s.toFixed(2)} s`], ["position", `${numbers(state.position_m)} m`],
+    ["attitude", numbers(state.q_WB)], ["velocity", `${numbers(state.v_WB_W_m_s)} m/s`],
+    ["body rate", `${numbers(state.w_WB_B_rad_s)} rad/s`]];
+  if (state.battery_V !== null) rows.push(["battery", `${state.battery_V.toFixed(2)} V`]);
+  at("state").replaceChildren(...rows.flatMap(([name, value]) => [element("dt", name), element("dd", value)]));
+}
+
+let busy = false;
+let again = false;
+
+// One request at a time, and one more where something changed meanwhile.
+async function refresh() {
+  if (busy) {
+    again = true;
+    return;
+  }
+  busy = true;
+  try {
+    jobs = await (await ask("api/jobs")).json();
+    if (chosen === null && jobs.length > 0) chosen = (jobs.find((job) => job.state === "running") ?? jobs[0]).id;
+    showJobs();
+    await showChosen();
+  } catch {
+    at("link").textContent = "no answer";
+  }
+  busy = false;
+  if (again) {
+    again = false;
+    setTimeout(refresh, 500);
+  }
+}
+
+const events = new EventSource("events");
+events.addEventListener("open", () => { at("link").textContent = "live"; });
+events.addEventListener("error", () => { at("link").textContent = "not live"; });
+events.addEventListener("jobs", refresh);
+events.addEventListener("watched", (event) => showWatched(JSON.parse(event.data)));
+refresh();
+setInterval(() => { if (events.readyState !== EventSource.OPEN) refresh(); }, 10000);

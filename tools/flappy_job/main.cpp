@@ -1,0 +1,114 @@
+// flappy-job: asks a flappy-server, on this machine or another, to run jobs.
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "io/program.hpp"
+#include "io/progress.hpp"
+#include "server/commands/command_client.hpp"
+
+namespace flappy::job {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void print(const server::JobStatus& j) {
+  std::printf("%6llu  %-9s %-9s %4.0f %%  %-32s %s\n", static_cast<unsigned long long>(j.id), j.state.c_str(),
+              j.kind.c_str(), 100 * j.progress, j.config.c_str(), j.message.c_str());
+  std::fflush(stdout);
+}
+
+Json json_of(const server::JobStatus& j) {
+  return {{"id", j.id},
+          {"kind", j.kind},
+          {"config", j.config},
+          {"state", j.state},
+          {"attempts", j.attempts},
+          {"exit_code", j.exit_code},
+          {"progress", j.progress},
+          {"message", j.message},
+          {"folder", j.folder}};
+}
+
+bool is_over(const server::JobStatus& j) { return j.state == "done" || j.state == "failed" || j.state == "cancelled"; }
+
+}  // namespace
+}  // namespace flappy::job
+
+int main(int argc, char** argv) {
+  using namespace flappy;
+  io::Program program("flappy-job", "Asks a flappy-server to run jobs, and fetches what they left.", {});
+  const io::Command& app = program.app();
+  std::vector<std::string> dds;
+  double timeout_s = 5;
+  app.option("--dds", dds, "where the server is, as a key of [dds]: domain=3, reach=network").one_at_a_time();
+  app.option("--timeout", timeout_s, "seconds without an answer").range(0.1, 3600.0).shows_default();
+
+  server::Command asked;
+  std::string out;
+  std::uint64_t watched = 0;
+  const io::Command submit = app.command("submit", "a new job; prints its number");
+  submit.option("kind", asked.kind, "train, evaluate, export or diagnose").required();
+  submit
+      .option("config", asked.config, "train/escape.toml, below the server's folder; of others a job's folder: 000001")
+      .required();
+  submit.option("--set", asked.overrides, "override a key: learn.updates=1000").one_at_a_time();
+  submit.option("--id", asked.id, "the same one twice is one job");
+  const io::Command list = app.command("list", "all jobs, newest first");
+  const io::Command watch = app.command("watch", "jobs as they change; one of them until it is over");
+  watch.option("job", watched, "its number");
+  std::vector<std::pair<io::Command, const char*>> verbs;
+  for (const auto& [verb, help] : {std::pair{"pause", "stops a job cleanly, to go on later"},
+                                   std::pair{"resume", "goes on with a job that is paused or failed"},
+                                   std::pair{"cancel", "ends a job for good"}}) {
+    verbs.emplace_back(app.command(verb, help), verb);
+    verbs.back().first.option("job", asked.job, "its number").required();
+  }
+  const io::Command fetch = app.command("fetch", "the files that a job left");
+  fetch.option("job", asked.job, "its number").required();
+  fetch.option("--out", out, "folder for them").required();
+  app.expect_commands(1, 1);
+
+  return program.run(argc, argv, [&] {
+    std::vector<std::string> overrides = {"dds.enabled=true"};
+    for (const std::string& each : dds) overrides.push_back("dds." + each);
+    const io::Config config = io::Config::parse("", "--dds", overrides);
+    const io::DdsConfig where = io::read_dds_config(config.root());
+    config.root().finish();
+    server::CommandClient client(where, timeout_s);
+    io::stop_on_interrupt();
+
+    if (list.given()) {
+      nlohmann::ordered_json all = nlohmann::ordered_json::array();
+      for (const server::JobStatus& each : client.list()) job::print(each), all.push_back(job::json_of(each));
+      return program.write_json({{"jobs", all}});
+    }
+    if (watch.given()) {
+      bool over = false;
+      for (const server::JobStatus& each : client.list())
+        if (watched == 0 || each.id == watched) job::print(each), over |= each.id == watched && job::is_over(each);
+      if (!over)
+        client.watch(
+            [&](const server::JobStatus& each) {
+              if (watched != 0 && each.id != watched) return true;
+              job::print(each);
+              return watched == 0 || !job::is_over(each);
+            },
+            [] { return !io::interrupted(); });
+      return;
+    }
+    if (fetch.given()) {
+      const std::size_t count = client.fetch(asked.job, out, [](const server::JobFile& file) {
+        std::printf("%12llu  %s\n", static_cast<unsigned long long>(file.bytes), file.name.c_str());
+      });
+      std::printf("%zu files in %s\n", count, out.c_str());
+      return program.write_json({{"job", asked.job}, {"files", count}});
+    }
+    asked.verb = "submit";
+    for (const auto& [command, verb] : verbs)
+      if (command.given()) asked.verb = verb;
+    const server::CommandResult result = client.ask(asked);
+    if (!result.accepted) throw io::InputError(result.message);
+    std::printf("%s\n", result.message.c_str());
+    program.write_json({{"id", result.id}, {"job", result.job}, {"message", result.message}});
+  });
+}
