@@ -169,7 +169,10 @@ void Runner::start(const Job& queued) {
       delay != delays_.end() && io::steady_seconds() < delay->second.until_s)
     return;
   const fs::path folder = folder_of(queued);
-  io::make_folder(folder);
+  if (!fs::exists(folder)) {
+    io::make_folder(folder);
+    io::sync_folder(options_.config.folders.output);  // or a job could be done, and its folder gone with the power
+  }
   const std::optional<JobLock> lock = JobLock::take(folder);
   if (!lock) return;  // what an earlier attempt left is about to end
   std::vector<std::string> command;
