@@ -23,9 +23,7 @@ int main(int argc, char** argv) {
   program.app().option("--http", listen, "dashboard to look at: 127.0.0.1:8080; else http.listen, else none");
   program.app().option("--set", overrides, "override a key: jobs.at_once=2").one_at_a_time();
   return program.run(argc, argv, [&] {
-    io::DdsConfig dds;
-    server::ServerConfig config = server::read_server_config(
-        config_name, overrides, [&](const io::Table& root) { dds = io::read_dds_config(root); });
+    server::ServerConfig config = server::read_server_config(config_name, overrides);
     if (!listen.empty()) config.http.listen = listen;
     io::stop_on_interrupt();
     server::Queue queue(config.jobs.folders.output);
@@ -39,7 +37,7 @@ int main(int argc, char** argv) {
       std::printf("dashboard: http://%s/\n", dashboard->address().c_str());
     }
     std::optional<server::CommandServer> command_server;
-    if (dds.enabled) command_server.emplace(dds, commands, watched);
+    if (config.dds.enabled) command_server.emplace(config.dds, commands, watched);
     std::printf("%s: %zu jobs to go on with\n", config.jobs.folders.output.c_str(),
                 queue.jobs_in(server::State::running).size() + queue.jobs_in(server::State::queued).size());
     std::fflush(stdout);

@@ -146,7 +146,12 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
   const auto ask_for = [&](const std::string& name, const std::function<void(const FileChunk&)>& piece) {
     Command command{
         .id = fresh_id(), .client = {}, .verb = "fetch", .kind = {}, .config = name, .job = job, .overrides = {}};
-    const CommandResult r = ask(command);
+    CommandResult r = ask(command);
+    for (const double until_s = io::steady_seconds() + timeout_s_; !r.accepted && r.message.starts_with(kTooMany);) {
+      if (io::steady_seconds() > until_s) break;
+      io::sleep_until(io::steady_seconds() + 0.2);  // one command for each file
+      r = ask(command);
+    }
     if (!r.accepted) throw io::InputError(r.message);
     bool over = r.message == "0 files";
     for (double heard_s = io::steady_seconds(); !over;) {

@@ -57,7 +57,8 @@ void secure(dds_qos_t* q, const fs::path& keys) {
   file("dds.sec.access.governance", "governance.p7s");
   file("dds.sec.access.permissions", "permissions.p7s");
   const auto plugin = [&](const std::string& kind, const char* library, const std::string& names) {
-    dds_qset_prop(q, ("dds.sec." + kind + ".library.path").c_str(), library);
+    dds_qset_prop(q, ("dds.sec." + kind + ".library.path").c_str(),
+                  (std::string(FLAPPY_DDS_SECURITY) + "/lib" + library + ".so").c_str());
     dds_qset_prop(q, ("dds.sec." + kind + ".library.init").c_str(), ("init_" + names).c_str());
     dds_qset_prop(q, ("dds.sec." + kind + ".library.finalize").c_str(), ("finalize_" + names).c_str());
   };

@@ -64,7 +64,7 @@ CommandResult Commands::execute(const Command& command) {
     const std::lock_guard guard(mutex_);
     in_time = limit_.take(command.client.substr(0, kMostOfId), now);
   }
-  if (!in_time) return refused(command, "too many commands at a time; accepted: the same one later", now);
+  if (!in_time) return refused(command, std::string(kTooMany) + "; accepted: the same one later", now);
   try {
     check(command);
     return done(command);

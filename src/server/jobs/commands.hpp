@@ -23,6 +23,9 @@ struct Command {
   std::vector<std::string> overrides;
 };
 
+/// Where a client came too often: the same command is accepted later.
+inline constexpr const char* kTooMany = "too many commands at a time";
+
 struct CommandResult {
   std::string id;  ///< of the command
   bool accepted = false;

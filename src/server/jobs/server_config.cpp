@@ -55,8 +55,7 @@ RateConfig read_rates(const io::Table& table) {
 
 }  // namespace
 
-ServerConfig read_server_config(const fs::path& path, const std::vector<std::string>& overrides,
-                                const ReadTransport& read_transport) {
+ServerConfig read_server_config(const fs::path& path, const std::vector<std::string>& overrides) {
   const io::Config config = io::Config::load(path, overrides);
   const io::Table root = config.root();
   root.accept({"schema", "jobs", "http", "rates", "dds"});
@@ -64,11 +63,7 @@ ServerConfig read_server_config(const fs::path& path, const std::vector<std::str
   ServerConfig c;
   if (const auto table = root.optional_table("http")) c.http = read_http(*table);
   if (const auto table = root.optional_table("rates")) c.rates = read_rates(*table);
-  if (const auto table = root.optional_table("dds")) {
-    if (!read_transport)
-      root.fail("dds", "is not known to this build", "a flappy-server that was built with Cyclone DDS");
-    read_transport(*table);
-  }
+  c.dds = io::read_dds_config(root);
   c.jobs = read_jobs(root.table("jobs"));
   root.finish();
   return c;

@@ -1,11 +1,11 @@
 // The configuration of flappy-server.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "io/config.hpp"
+#include "io/dds_config.hpp"
 #include "server/jobs/kinds.hpp"
 
 namespace flappy::server {
@@ -39,12 +39,9 @@ struct ServerConfig {
   JobsConfig jobs;
   HttpConfig http;
   RateConfig rates;
+  io::DdsConfig dds;
 };
 
-/// The table [dds] belongs to the transport, which reads it here; without one the table is refused.
-using ReadTransport = std::function<void(const io::Table& dds)>;
-
-ServerConfig read_server_config(const std::filesystem::path& path, const std::vector<std::string>& overrides = {},
-                                const ReadTransport& read_transport = {});
+ServerConfig read_server_config(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
 
 }  // namespace flappy::server
