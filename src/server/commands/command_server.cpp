@@ -42,7 +42,8 @@ CommandServer::CommandServer(const io::DdsConfig& config, Commands& commands, Wa
       waiting_(participant_) {
   state_.source = "/" + config.name_space;
   if (config.commands) {
-    asked_.emplace(participant_, "/" + config.name_space + "/command", kAnswers);
+    asked_.emplace(participant_, "/" + config.name_space + "/command",
+                   kPieces);  // who asks too fast waits, and is answered
     waiting_.add(asked_->entity());
   }
   thread_ = std::thread([this] { run(); });
