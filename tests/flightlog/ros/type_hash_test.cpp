@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "flightlog/ros/messages.hpp"
+#include "io/files.hpp"
 
 namespace flappy::flightlog::ros {
 namespace {
@@ -40,6 +41,8 @@ constexpr Known kKnown[] = {
     {"diagnostic_msgs/msg/DiagnosticStatus", "RIHS01_b0e3e692ea2d54a8af2f4ef1930e81556a2db55216b771f8a7d2724ed47bf0e4"},
     {"diagnostic_msgs/msg/DiagnosticArray", "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"},
     {"flappy_msgs/msg/WingInput", "RIHS01_76ec0876742ebe870164ee1988ae6d520858db186866214c9920e0688c83ae39"},
+    {"flappy_msgs/msg/Tick", "RIHS01_4e640bc98920a6e7f6d279cb27c32cb3e0faf853545a3b37e553adc089a065b1"},
+    {"flappy_msgs/msg/FileChunk", "RIHS01_75dbe1f2d05377189803ca776ab72fcd0ef6fc91808f63f6569b02ff9f2fb2f2"},
     {"flappy_msgs/msg/TrainingMetrics", "RIHS01_7a3128f71c52a18cc588ac1c5f045f6d78e765ba7922698ced1893a1195c9785"},
     {"flappy_msgs/msg/JobStatus", "RIHS01_1fe92e02681ffc894d92924649633287afb4b4bfdaa1a16a8432c92aebfff09d"},
     {"flappy_msgs/msg/Watch", "RIHS01_dce66d00161926bcdc4ab102153afc2cd164084483aa7b1ef7e64e185de9a1e0"},
@@ -53,6 +56,21 @@ TEST(TypeHash, IsThatOfRos2) {
 }
 
 TEST(TypeHash, IsKnownOfAllMessages) { EXPECT_EQ(standard_messages().names().size(), std::size(kKnown)); }
+
+/// What a ROS 2 machine builds from, beside what is compiled in here.
+TEST(TypeHash, IsThatOfThePackageForRos2) {
+  std::size_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(FLAPPY_SOURCE_DIR "/examples/ros2/flappy_msgs/msg")) {
+    const std::string stem = entry.path().stem(), type = "flappy_msgs/msg/" + stem;
+    Definitions fresh;
+    fresh.add(type, io::read_text(entry.path()));
+    for (const char* other : {"std_msgs/msg/Header", "builtin_interfaces/msg/Time"})
+      fresh.add(other, standard_messages().concatenated(other));
+    EXPECT_EQ(type_hash(*fresh.layout(type)), type_hash(*standard_messages().layout(type))) << type;
+    ++count;
+  }
+  EXPECT_EQ(count, 8U);
+}
 
 TEST(TypeHash, IsOfJsonWithSpacesAndTypesByName) {
   Definitions d;
