@@ -72,4 +72,15 @@ void log_error(std::string_view text) {
     if (sink != log.screen) sink->log({"", spdlog::level::err, text}), sink->flush();
 }
 
+void CalmLog::warn(const std::string& line, double now_s) {
+  if (now_s < said_s_ + 1) {
+    ++unsaid_;
+    return;
+  }
+  log(LogLevel::warning,
+      line + (unsaid_ > 0 ? " (and " + std::to_string(unsaid_) + " more since the last such line)" : ""));
+  said_s_ = now_s;
+  unsaid_ = 0;
+}
+
 }  // namespace flappy::io

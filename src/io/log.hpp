@@ -2,6 +2,7 @@
 // lines there carry the time of day and are outside the determinism contract.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -20,5 +21,15 @@ void log_into(const std::filesystem::path& folder);
 void log(LogLevel level, std::string_view text);
 /// The user's mistake or ours: the text alone on stderr.
 void log_error(std::string_view text);
+
+/// Says what happens often once a second at most, and how often it did.
+class CalmLog {
+ public:
+  void warn(const std::string& line, double now_s);
+
+ private:
+  double said_s_ = -1e9;
+  std::uint64_t unsaid_ = 0;
+};
 
 }  // namespace flappy::io

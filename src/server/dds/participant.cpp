@@ -9,6 +9,8 @@
 #include "flightlog/ros/messages.hpp"
 #include "flightlog/ros/type_hash.hpp"
 #include "io/files.hpp"
+#include "io/log.hpp"
+#include "io/progress.hpp"
 
 namespace flappy::server {
 namespace {
@@ -65,6 +67,21 @@ void secure(dds_qos_t* q, const fs::path& keys) {
   plugin("auth", "dds_security_auth", "authentication");
   plugin("crypto", "dds_security_crypto", "crypto");
   plugin("access", "dds_security_ac", "access_control");
+}
+
+/// What Cyclone DDS says, a line a second at most: a stranger's malformed packets would fill the log, a line each.
+void hear_cyclone() {
+  static std::mutex mutex;
+  static io::CalmLog log;
+  const auto sink = [](void*, const dds_log_data_t* said) {
+    std::string line = said->message;
+    if (line.find("is not multicast-capable") != std::string::npos) return;  // as the loopback interface is not
+    while (line.ends_with('\n')) line.pop_back();
+    const std::lock_guard lock(mutex);
+    log.warn("dds: " + line.substr(0, 300), io::steady_seconds());
+  };
+  static std::once_flag once;
+  std::call_once(once, [&] { dds_set_log_sink(sink, nullptr); });
 }
 
 /// The domain of a configuration, told how to find others by the first participant of this process in it. One that is made so does
@@ -154,6 +171,7 @@ std::string cyclone_xml(const io::DdsConfig& c) {
 }
 
 Participant::Participant(const io::DdsConfig& c) {
+  hear_cyclone();
   const auto domain = static_cast<dds_domainid_t>(c.domain);
   if (!c.from_environment) domain_ = domain_of(c);
   Qos q(dds_create_qos());

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "io/log.hpp"
 #include "server/jobs/kinds.hpp"
 #include "server/jobs/queue.hpp"
 #include "server/jobs/rate_limit.hpp"
@@ -78,7 +79,7 @@ class Commands {
   std::vector<Kind> kinds_;
   std::mutex mutex_;  ///< of what follows
   RateLimit limit_;
-  CalmLog log_;
+  io::CalmLog log_;
 };
 
 }  // namespace flappy::server

@@ -38,15 +38,4 @@ TokenBucket& RateLimit::bucket_of(const std::string& client, double now_s) {
   return clients_.emplace(client, TokenBucket(config_.per_client_hz, most)).first->second;
 }
 
-void CalmLog::warn(const std::string& line, double now_s) {
-  if (now_s < said_s_ + 1) {
-    ++unsaid_;
-    return;
-  }
-  io::log(io::LogLevel::warning,
-          line + (unsaid_ > 0 ? " (and " + std::to_string(unsaid_) + " more since the last such line)" : ""));
-  said_s_ = now_s;
-  unsaid_ = 0;
-}
-
 }  // namespace flappy::server

@@ -41,14 +41,4 @@ class RateLimit {
   double forgot_s_ = -1;
 };
 
-/// Says what happens often once a second at most, and how often it did.
-class CalmLog {
- public:
-  void warn(const std::string& line, double now_s);
-
- private:
-  double said_s_ = -1e9;
-  std::uint64_t unsaid_ = 0;
-};
-
 }  // namespace flappy::server
