@@ -34,7 +34,7 @@ TEST(Mapping, ShippedOnesAreRead) {
     EXPECT_EQ(m.header.vehicle, "hummingbird_nominal.toml");
     ++count;
   }
-  EXPECT_EQ(count, 3);
+  EXPECT_EQ(count, 4);
 }
 
 TEST(Mapping, WantsTheFieldsOfItsColumns) {
