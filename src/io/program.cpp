@@ -48,6 +48,12 @@ std::string explained(const CLI::App& app, const CLI::ParseError& error) {
 
 std::string commit() { return FLAPPY_COMMIT; }
 
+std::string hexadecimal(std::uint64_t value) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+  return text;
+}
+
 Program::Program(const std::string& name, const std::string& description, const std::vector<std::string>& facts)
     : app_(std::make_unique<CLI::App>(description, name)) {
   std::string version = name + " " FLAPPY_VERSION "\ncommit " + commit() + "\ncompiler " + __VERSION__;

@@ -1,6 +1,7 @@
 // What every program has: --version, --json FILE, --log-level, one line for each mistake of the user, exit codes.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
@@ -14,6 +15,8 @@ namespace flappy::io {
 
 /// Commit this program was built from, with "-dirty" where the tree differed.
 std::string commit();
+/// A hash as results show it: 16 digits.
+std::string hexadecimal(std::uint64_t value);
 
 class Program {
  public:

@@ -191,12 +191,6 @@ void print_failures(const std::vector<Column>& columns) {
   }
 }
 
-std::string hexadecimal(std::uint64_t value) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
-  return text;
-}
-
 void print(const Request& request, const FlyConfig& config, const std::vector<Column>& columns) {
   for (const Column& c : columns)
     if (c.stopped) std::printf("stopped: %s flew %zu of %zu flights\n", c.name, c.flights.flights, c.asked);
@@ -224,7 +218,7 @@ void print(const Request& request, const FlyConfig& config, const std::vector<Co
   double wall_s = 0, steps = 0;
   for (const Column& c : columns) wall_s += c.wall_s, steps += c.steps;
   std::printf("  %.1f s, %.1f million steps/s, hash %s\n", wall_s, wall_s > 0 ? steps / wall_s / 1e6 : 0,
-              hexadecimal(columns[0].flights.hash).c_str());
+              io::hexadecimal(columns[0].flights.hash).c_str());
 }
 
 Json or_null(Number x) { return finite(x) ? Json(*x) : Json(nullptr); }
@@ -265,7 +259,7 @@ Json json_of(const Column& c) {
                      {"success_rate", or_null(if_flown(c.nominal, c.nominal.success.value))},
                      {"strict_rate", or_null(if_flown(c.nominal, c.nominal.strict.value))}};
   put_quantiles(json["nominal"], "time_to_strict", "s", c.nominal.strict_s);
-  json["hash"] = hexadecimal(s.hash);
+  json["hash"] = io::hexadecimal(s.hash);
   return json;
 }
 
@@ -358,7 +352,7 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
                                  {"rate", figure([&] { return flown->success.value; })},
                                  {"low", figure([&] { return flown->success.low; })},
                                  {"high", figure([&] { return flown->success.high; })},
-                                 {"hash", figure([&] { return hexadecimal(flown->hash); })}});
+                                 {"hash", figure([&] { return io::hexadecimal(flown->hash); })}});
     }
     char name[64];
     std::snprintf(name, sizeof name, "  %-28s", effect.info.id);
@@ -381,7 +375,7 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
                       {"episodes", request.episodes},
                       {"stopped", over},
                       {"success_rate", without ? Json(without->success.value) : Json(nullptr)},
-                      {"hash", without ? Json(hexadecimal(without->hash)) : Json(nullptr)},
+                      {"hash", without ? Json(io::hexadecimal(without->hash)) : Json(nullptr)},
                       {"effects", list},
                       {"commit", io::commit()}});
 }

@@ -35,12 +35,6 @@ void print_row(const std::string& name, const rollout::Errors& e) {
   std::printf("\n");
 }
 
-std::string hexadecimal(std::uint64_t value) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
-  return text;
-}
-
 void print_score(const rollout::FlyConfig& config, const rollout::FlightSummary& s) {
   std::printf("  %-22s", "rms in degrees and mm");
   for (const char* axis : kAxes) std::printf("%8s", axis);
@@ -95,7 +89,7 @@ void print(const rollout::FlyConfig& config, const rollout::FlyOptions& options,
   if (r.mcap) std::printf("  topics in %s\n", options.mcap.c_str());
   else if (!options.mcap.empty()) std::printf("  the flight was too short for topics\n");
   std::printf("  %.2f s, %.1f million steps/s, %.0f times real time, hash %s\n", r.wall_s, r.steps / r.wall_s / 1e6,
-              r.steps * config.fleet.batch.step_s / r.wall_s, hexadecimal(r.hash).c_str());
+              r.steps * config.fleet.batch.step_s / r.wall_s, io::hexadecimal(r.hash).c_str());
 }
 
 Json json_of(const rollout::FlyConfig& config, const rollout::FlyOptions& options, const rollout::FlyResult& r) {
@@ -132,7 +126,7 @@ Json json_of(const rollout::FlyConfig& config, const rollout::FlyOptions& option
     json["time_to_capture_median_s"] = io::median(r.capture_s);
     json["time_to_capture_p90_s"] = io::quantile(r.capture_s, 0.9);
   }
-  json["hash"] = hexadecimal(r.hash);
+  json["hash"] = io::hexadecimal(r.hash);
   json["logs"] = options.log_folder.empty() ? Json(nullptr) : Json(r.logs);
   json["mcap"] = options.mcap.empty() ? Json(nullptr) : Json(r.mcap);
   json["wall"] = {{"total_s", r.wall_s},

@@ -11,12 +11,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string hexadecimal(std::uint64_t value) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
-  return text;
-}
-
 void print(const server::SitlResult& r, const server::SitlOptions& options) {
   const auto number = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
   std::printf("%s%llu control periods in %s%s\n", r.stopped ? "stopped: " : "", number(r.periods),
@@ -27,7 +21,7 @@ void print(const server::SitlResult& r, const server::SitlOptions& options) {
               number(r.refused));
   if (!options.log_folder.empty())
     std::printf("  %s %s\n", r.logged ? "log in" : "too short for a log:", options.log_folder.c_str());
-  std::printf("  hash %s\n", hexadecimal(r.hash).c_str());
+  std::printf("  hash %s\n", io::hexadecimal(r.hash).c_str());
 }
 
 Json json_of(const server::SitlResult& r, const server::SitlOptions& options) {
@@ -41,7 +35,7 @@ Json json_of(const server::SitlResult& r, const server::SitlOptions& options) {
           {"round_trip_most_s", r.round_trip_most_s},
           {"crashed", r.crashed},
           {"stopped", r.stopped},
-          {"hash", hexadecimal(r.hash)},
+          {"hash", io::hexadecimal(r.hash)},
           {"commit", io::commit()}};
 }
 
