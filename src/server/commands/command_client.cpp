@@ -43,7 +43,7 @@ JobStatus status_of(const JobStatusMessage& m) {
 
 /// A file's name as a server gives it: below a folder, whatever the server is.
 fs::path safe(const std::string& name) {
-  const fs::path path(name);
+  fs::path path(name);
   const bool odd = name.empty() || path.is_absolute() ||
                    std::ranges::any_of(path, [](const fs::path& part) { return part == ".." || part == "."; });
   if (odd) throw io::InputError("the server names a file \"" + shown(name) + "\"; accepted: names below a folder");

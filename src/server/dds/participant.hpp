@@ -36,7 +36,10 @@ class Entity {
   Entity(dds_entity_t handle, const std::string& what);
   ~Entity();
   Entity(Entity&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
-  Entity& operator=(Entity&& other) noexcept { return std::swap(handle_, other.handle_), *this; }
+  Entity& operator=(Entity&& other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
   dds_entity_t get() const { return handle_; }
 
  private:

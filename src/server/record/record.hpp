@@ -31,7 +31,7 @@ struct Recorded {
 };
 
 /// What a sample of a sensor never has.
-inline constexpr std::size_t kMostBytes = 64 * 1024;
+inline constexpr std::size_t kMostBytes = 65'536;
 
 /// InputError where a topic has a type that is not known here, or the messages make no flight log; the MCAP file stays.
 Recorded record(const io::DdsConfig& dds, const flightlog::Mapping& mapping, const RecordOptions& options);

@@ -47,13 +47,13 @@ class FlapperTopics {
                 const flight::Sensors& sensors, const Quality& samples = kSensorData);
 
   /// True pose and joints, IMU without noise, inputs.
-  void write(const rollout::FlightSample& sample) const;
+  void write(const rollout::FlightSample& s) const;
   void write(const PoseSample& pose) const;
   void write(const ImuReading& imu) const;
   void write(const BatterySample& battery) const;
-  void write(double t_s, const sim::FlapperState& joints) const;
-  void write(double t_s, std::uint64_t tick, const sim::Input& input) const;
-  void write(const AppliedSample& applied) const;
+  void write(double t_s, const sim::FlapperState& s) const;
+  void write(double t_s, std::uint64_t tick, const sim::Input& u) const;
+  void write(const AppliedSample& a) const;
   void write_transform(const PoseSample& pose) const;
 
  private:
