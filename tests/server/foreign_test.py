@@ -7,7 +7,6 @@ and Jazzy, and the hashes of types that we announce are those that it works out.
 import os
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 

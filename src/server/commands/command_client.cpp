@@ -15,7 +15,6 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 
-constexpr Quality kAnswers{true, false, 1000}, kPieces{true, false, kAllOfIt};
 constexpr milliseconds kLook{50};
 
 std::string fresh_id() {
@@ -55,10 +54,10 @@ fs::path safe(const std::string& name) {
 CommandClient::CommandClient(const io::DdsConfig& config, double timeout_s)
     : timeout_s_(timeout_s),
       participant_(config),
-      command_(participant_, "/" + config.name_space + "/command", kAnswers),
-      results_(participant_, "/" + config.name_space + "/command_result", kAnswers),
-      jobs_(participant_, "/" + config.name_space + "/jobs", kAnswers),
-      files_(participant_, "/" + config.name_space + "/files", kPieces),
+      command_(participant_, topic_name(config.name_space, 0, "command"), kAnswers),
+      results_(participant_, topic_name(config.name_space, 0, "command_result"), kAnswers),
+      jobs_(participant_, topic_name(config.name_space, 0, "jobs"), kAnswers),
+      files_(participant_, topic_name(config.name_space, 0, "files"), kPieces),
       waiting_(participant_) {
   for (const Entity* reader : {&results_.entity(), &jobs_.entity(), &files_.entity()}) waiting_.add(*reader);
   const double until_s = io::steady_seconds() + timeout_s_;
@@ -93,7 +92,7 @@ CommandResult CommandClient::await(const std::string& id, const std::function<vo
 CommandResult CommandClient::ask(Command command) {
   if (command.id.empty()) command.id = fresh_id();
   CommandMessage m{};
-  m.stamp = time_of(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count());
+  m.stamp = now();
   put(m.id, command.id, "id");
   put(m.verb, command.verb, "verb");
   put(m.kind, command.kind, "kind");

@@ -13,7 +13,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr Quality kAnswers{true, false, 1000}, kPieces{true, false, kAllOfIt};
 constexpr milliseconds kLook{100};  // between looks at the queue
 constexpr std::size_t kMostTransfers = 16;
 constexpr double kMostOfSpeed_m_s = 100;  // beyond it, two poses are of two flights
@@ -25,24 +24,22 @@ void put(char (&to)[kSize], const std::string& from) {
   to[size] = '\0';
 }
 
-double now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
-
 }  // namespace
 
 CommandServer::CommandServer(const io::DdsConfig& config, Commands& commands, Watched& watched)
     : commands_(commands),
       watched_(watched),
       participant_(config),
-      jobs_(participant_, "/" + config.name_space + "/jobs", kAnswers),
-      results_(participant_, "/" + config.name_space + "/command_result", kAnswers),
-      files_(participant_, "/" + config.name_space + "/files", kPieces),
-      pose_(participant_, "/" + config.name_space + "/pose", kSensorData),
-      imu_(participant_, "/" + config.name_space + "/imu", kSensorData),
-      battery_(participant_, "/" + config.name_space + "/battery", kSensorData),
+      jobs_(participant_, topic_name(config.name_space, 0, "jobs"), kAnswers),
+      results_(participant_, topic_name(config.name_space, 0, "command_result"), kAnswers),
+      files_(participant_, topic_name(config.name_space, 0, "files"), kPieces),
+      pose_(participant_, topic_name(config.name_space, 0, "pose"), kSensorData),
+      imu_(participant_, topic_name(config.name_space, 0, "imu"), kSensorData),
+      battery_(participant_, topic_name(config.name_space, 0, "battery"), kSensorData),
       waiting_(participant_) {
   state_.source = "/" + config.name_space;
   if (config.commands) {
-    asked_.emplace(participant_, "/" + config.name_space + "/command",
+    asked_.emplace(participant_, topic_name(config.name_space, 0, "command"),
                    kPieces);  // who asks too fast waits, and is answered
     waiting_.add(asked_->entity());
   }
@@ -155,14 +152,14 @@ void CommandServer::send_pieces() {
 }
 
 void CommandServer::show_changes(bool all) {
-  std::map<std::uint64_t, JobStatus> now;
-  for (JobStatus& s : commands_.statuses()) now.emplace(s.id, std::move(s));
-  for (const auto& [id, s] : now) {
+  std::map<std::uint64_t, JobStatus> jobs;
+  for (JobStatus& s : commands_.statuses()) jobs.emplace(s.id, std::move(s));
+  for (const auto& [id, s] : jobs) {
     const auto before = shown_.find(id);
     if (!all && before != shown_.end() && before->second == s) continue;
     char no_frame[] = "";
     JobStatusMessage m{};
-    m.header = {time_of(now_s()), no_frame};
+    m.header = {now(), no_frame};
     m.id = id;
     put(m.kind, s.kind);
     put(m.config, s.config);
@@ -174,7 +171,7 @@ void CommandServer::show_changes(bool all) {
     put(m.folder, s.folder);
     jobs_.write(m);
   }
-  shown_ = std::move(now);
+  shown_ = std::move(jobs);
 }
 
 /// What the watched flapper's topics say.

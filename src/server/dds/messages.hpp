@@ -58,5 +58,7 @@ std::string ros_name(const std::string& dds_name);
 /// Seconds as ROS 2 has them: whole nanoseconds, rounded.
 Time time_of(double t_s);
 double seconds_of(const Time& t);
+/// Of the wall clock: what belongs to no flight.
+Time now();
 
 }  // namespace flappy::server

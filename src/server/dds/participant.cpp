@@ -130,7 +130,15 @@ Time time_of(double t_s) {
   return {static_cast<std::int32_t>(whole), static_cast<std::uint32_t>(nano)};
 }
 
+Time now() {
+  return time_of(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count());
+}
+
 double seconds_of(const Time& t) { return t.sec + 1e-9 * t.nanosec; }
+
+std::string topic_name(const std::string& name_space, std::size_t slot, const std::string& name) {
+  return "/" + name_space + (slot == 0 ? "" : "_" + std::to_string(slot)) + "/" + name;
+}
 
 Entity::Entity(dds_entity_t handle, const std::string& what) : handle_(handle) {
   if (handle < 0) {

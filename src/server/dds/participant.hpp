@@ -24,6 +24,11 @@ struct Quality {
 };
 inline constexpr int kAllOfIt = 0;
 inline constexpr Quality kSensorData{false, false, 5}, kReliable{true, false, 10}, kLatched{true, true, 1};
+/// What both ends of a conversation offer and ask for.
+inline constexpr Quality kAnswers{true, false, 1000}, kPieces{true, false, kAllOfIt};
+
+/// "/flappy/pose" of the first flapper, "/flappy_3/pose" of the fourth.
+std::string topic_name(const std::string& name_space, std::size_t slot, const std::string& name);
 
 /// What Cyclone DDS is told of interfaces and peers; empty where the environment alone says it.
 std::string cyclone_xml(const io::DdsConfig& config);

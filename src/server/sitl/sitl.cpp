@@ -55,6 +55,10 @@ class Flight {
     while (period_ < periods) {
       tell(wish());
       const bool answered = await_input();
+      if (!answered && io::interrupted()) {
+        result_.stopped = true;
+        break;
+      }
       if (!answered && options_.lock_step)
         throw io::InputError("no input for tick " + std::to_string(period_) + " within " +
                              io::shortest_digits(options_.timeout_s) +

@@ -10,10 +10,6 @@ namespace {
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr char kWorld[] = "world";
 
-std::string space(const std::string& name_space, std::size_t slot) {
-  return slot == 0 ? name_space : name_space + "_" + std::to_string(slot);
-}
-
 /// Messages only point to text while they are written.
 char* text(const char* of) { return const_cast<char*>(of); }
 
@@ -43,13 +39,9 @@ WingInput message(double t_s, std::uint64_t tick, const sim::Input& u, const std
 
 }  // namespace
 
-std::string topic_name(const std::string& name_space, std::size_t slot, const std::string& name) {
-  return "/" + space(name_space, slot) + "/" + name;
-}
-
 FlapperTopics::FlapperTopics(const Participant& p, const std::string& name_space, std::size_t slot,
                              const flight::Sensors& sensors, const Quality& samples)
-    : frame_(space(name_space, slot) + "/torso"),
+    : frame_(topic_name(name_space, slot, "torso").substr(1)),
       imu_covariance_{sensors.imu.gyro_noise_rad_s * sensors.imu.gyro_noise_rad_s,
                       sensors.imu.accel_noise_m_s2 * sensors.imu.accel_noise_m_s2},
       pose_(p, topic_name(name_space, slot, "pose"), samples),

@@ -69,7 +69,4 @@ class FlapperTopics {
   Writer<TFMessage> tf_;
 };
 
-/// "/flappy/pose" of the first flapper, "/flappy_3/pose" of the fourth.
-std::string topic_name(const std::string& name_space, std::size_t slot, const std::string& name);
-
 }  // namespace flappy::server

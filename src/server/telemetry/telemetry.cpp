@@ -12,9 +12,6 @@ using std::chrono::milliseconds;
 constexpr double kServed_s = 0.1, kDiagnosed_s = 1;  // between looks at what comes less often than samples
 constexpr milliseconds kIdle{1};                     // between looks at an empty ring
 
-/// Of the wall clock: what a training says belongs to no flight.
-double now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
-
 }  // namespace
 
 Telemetry::Telemetry(const io::DdsConfig& config, const flight::Sensors& sensors)
@@ -59,7 +56,7 @@ void Telemetry::serve() {
   if (training) {
     TrainingMetrics m{};
     char world[] = "";
-    m.header = {time_of(now_s()), world};
+    m.header = {now(), world};
     m.run = training->run.data();
     m.update = training->update, m.updates = training->updates, m.episodes = training->episodes;
     m.env_steps = training->env_steps, m.mean_return = training->mean_return, m.success = training->success;
@@ -80,7 +77,7 @@ void Telemetry::serve() {
   s.hardware_id = nothing.data();
   s.values = {2, 2, pairs, false};
   DiagnosticArray m{};
-  m.header = {time_of(now_s()), nothing.data()};
+  m.header = {now(), nothing.data()};
   m.status = {1, 1, &s, false};
   diagnostics_.write(m);
 }
