@@ -119,12 +119,21 @@ void Fleet<T>::set_actor(const std::shared_ptr<const policy::Actor>& actor) {
 }
 
 template <class T>
-void Fleet<T>::set_action(std::size_t i, const double (&action)[kActions]) {
+void Fleet<T>::set_action(std::size_t i, std::span<const T> action) {
   const auto [f, lane] = storage_->at(i);
-  auto e = get<Episode<double>>(f.episode, lane);
-  for (int k = 0; k < kActions; ++k) e.action[k] = action[k], e.adds[k] = storage_->scaled(k, action[k]);
-  put(e, f.episode, lane);
+  for (std::size_t k = 0; k < action.size(); ++k) {
+    f.episode[offsetof(Episode<T>, action) / sizeof(T) + k][lane] = action[k];
+    f.episode[offsetof(Episode<T>, adds) / sizeof(T) + k][lane] = storage_->scaled(static_cast<int>(k), action[k]);
+  }
+  f.episode[offsetof(Episode<T>, action_reward) / sizeof(T)][lane] = 0;
   storage_->remember(i);
+}
+
+template <class T>
+void Fleet<T>::set_action(std::size_t i, const double (&action)[kActions]) {
+  T rounded[kActions];
+  for (int k = 0; k < kActions; ++k) rounded[k] = static_cast<T>(action[k]);
+  set_action(i, std::span<const T>(rounded));
 }
 
 template <class T>
@@ -271,22 +280,22 @@ sim::Input Fleet<T>::input(std::size_t i) const {
 template <class T>
 double Fleet<T>::reward(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
-  return get<Episode<double>>(f.episode, lane).reward;
+  return f.episode[offsetof(Episode<T>, reward) / sizeof(T)][lane];
 }
 template <class T>
 bool Fleet<T>::handed_back(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
-  return get<Episode<double>>(f.episode, lane).handed_back > 0;
+  return f.episode[offsetof(Episode<T>, handed_back) / sizeof(T)][lane] > 0;
 }
 template <class T>
 double Fleet<T>::captured_s(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
-  return get<Episode<double>>(f.episode, lane).captured_s;
+  return f.episode[offsetof(Episode<T>, captured_s) / sizeof(T)][lane];
 }
 template <class T>
 double Fleet<T>::lost_s(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
-  return get<Episode<double>>(f.episode, lane).lost_s;
+  return f.episode[offsetof(Episode<T>, lost_s) / sizeof(T)][lane];
 }
 template <class T>
 std::uint32_t Fleet<T>::ended(std::size_t i) const {

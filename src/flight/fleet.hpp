@@ -80,6 +80,7 @@ class Fleet {
   void set_actor(const std::shared_ptr<const policy::Actor>& actor);
   /// Action of flapper `i` for the next period, each in [-1, 1], for what it observes now; an actor would overwrite it.
   void set_action(std::size_t i, const double (&action)[kActions]);
+  void set_action(std::size_t i, std::span<const T> action);
   /// The same by what the action adds to the controller's output: V, V, V, split cycle, each within the task's range.
   void set_adds(std::size_t i, const double (&adds)[kActions]);
   /// Adds to the controller's output from now on: open-loop flight, excitation.
@@ -115,7 +116,7 @@ class Fleet {
   void true_observation(std::size_t i, T* row) const;
   std::array<T, kActions> action(std::size_t i) const;  ///< of the policy, its noise included
   std::array<T, kActions> adds(std::size_t i) const;    ///< what that adds: V, V, V, split cycle
-  T action_reward(std::size_t i) const;                 ///< rewards since the policy last acted
+  T action_reward(std::size_t i) const;                 ///< rewards since the policy last acted, or was told how
   /// Squared innovations of the last pose over their variance: angle and position, three degrees of freedom each.
   std::pair<double, double> innovation(std::size_t i) const;
   std::array<double, 3> gyro_bias_rad_s(std::size_t i) const;  ///< true

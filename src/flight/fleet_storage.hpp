@@ -144,7 +144,7 @@ struct Fleet<T>::Storage {
   }
 
   /// What an action adds to input `k`, as the lanes work it out.
-  double scaled(int k, double action) const {
+  T scaled(int k, T action) const {
     using L = model::Lanes<T, 1>;
     return L(scaled_action(plan.task, k, L(action))).raw[0];
   }

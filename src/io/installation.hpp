@@ -10,7 +10,7 @@ namespace flappy::io {
 std::filesystem::path beside_program(const std::filesystem::path& name);
 
 /// The project's own configurations: the folder that the environment variable FLAPPY_CONFIGS names, else
-/// share/flappy/configs of an installation, else configs/ of the source folder.
+/// share/flappy/configs of an installation, else configs/ beside the library that holds this code, else that of the source folder.
 std::filesystem::path configs_folder();
 
 /// One of them, as "vehicles/hummingbird_nominal.toml".

@@ -1,0 +1,238 @@
+"""Gymnasium environments, one (`FlappyEnv`) or many at once (`FlappyVectorEnv`), on the simulator itself.
+
+Environment i depends on (seed, first + i, episode) and its actions: not on `num_envs`, threads or the machine. Episode 0 of
+`reset(seed=s)` is the flight of `flappy-fly` with that seed. Actions are float32 in [-1, 1] and stand for the ranges of the task
+(`env.unwrapped.action_low`, `action_high`: V, V, V and fractions of a beat, or V and V); observations are float32 in SI units, by the
+names in `env.unwrapped.observation_names`.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from . import _core
+
+Floats = NDArray[np.float32]
+Bools = NDArray[np.bool_]
+
+#: Why an episode ended: bits of `causes`; none where the controller was handed back to.
+CAUSES = ("time_out", "contact", "not_finite", "out_of_bounds", "heading_late", "arrival_late")
+
+
+def resolve(config: str | Path) -> Path:
+    """The file that is meant: as it stands, or below the package's own configurations."""
+    path = Path(config)
+    own = Path(_core.configs_folder()) / path
+    return own if not path.exists() and own.exists() else path
+
+
+def _core_of(
+    config: str | Path,
+    overrides: Sequence[str],
+    count: int,
+    mode: AutoresetMode,
+    copy: bool,
+    first: int,
+    threads: int | None,
+) -> _core.Environments:
+    own = [f"flight.first_flapper={first}"] if first else []
+    if threads is not None:
+        own.append(f"flight.threads={threads}")
+    modes = {AutoresetMode.SAME_STEP: "same_step", AutoresetMode.NEXT_STEP: "next_step", AutoresetMode.DISABLED: "disabled"}
+    return _core.Environments(resolve(config), [*overrides, *own], count, modes[mode], copy)
+
+
+def _spaces(core: _core.Environments) -> tuple[Box, Box]:
+    high = np.array([s["high"] for s in core.observed], np.float32)
+    ones = np.ones(len(core.actions), np.float32)
+    return Box(-high, high), Box(-ones, ones)
+
+
+class _Named:
+    """What one environment and many have in common: names and ranges."""
+
+    _core: _core.Environments
+
+    @property
+    def observation_names(self) -> list[str]:
+        """Of each number of an observation."""
+        return [s["name"] for s in self._core.observed]
+
+    @property
+    def action_names(self) -> list[str]:
+        """Of each number of an action."""
+        return [s["name"] for s in self._core.actions]
+
+    @property
+    def action_low(self) -> Floats:
+        """What -1 stands for, in the unit of each action: V, and fractions of a beat."""
+        return np.array([s["low"] for s in self._core.actions], np.float32)
+
+    @property
+    def action_high(self) -> Floats:
+        """What +1 stands for."""
+        return np.array([s["high"] for s in self._core.actions], np.float32)
+
+    @property
+    def step_s(self) -> float:
+        """Duration of a step."""
+        return self._core.step_s
+
+    def pose(self, i: int = 0) -> dict[str, Any]:
+        """True motion and wings of environment `i`: position_m (3,), attitude (4,), stroke_rad (2,), target_m (3,), ..., t_s."""
+        return self._core.pose(i)
+
+    def hash(self, first: int = 0, last: int | None = None) -> int:
+        """Of how vehicles [first, last) move, as `flappy-fly` prints it."""
+        return self._core.hash(first, self._core.count if last is None else last)
+
+
+class FlappyEnv(_Named, gymnasium.Env[Floats, Floats]):
+    """One environment of a configuration of `flappy-fly`.
+
+    Args:
+        config: its file, or the name of one of the package's own ("fly/hover_direct.toml").
+        overrides: "task.end.time_s=2", as `--set` takes them.
+        first: its number: which start, noise and vehicle it has.
+        render_mode: "rgb_array" or None.
+
+    `info` of the step that ends an episode has `is_success` and `causes` (names of `CAUSES`).
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 50}
+
+    def __init__(
+        self, config: str | Path, overrides: Sequence[str] = (), first: int = 0, render_mode: str | None = None
+    ) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode: is {render_mode!r}; accepted: None, 'rgb_array'")
+        self.render_mode = render_mode
+        self._core = _core_of(config, overrides, 1, AutoresetMode.DISABLED, True, first, 1)
+        self.metadata = {**self.metadata, "render_fps": round(1 / self._core.step_s)}
+        self.observation_space, self.action_space = _spaces(self._core)
+        self._shape = self.action_space.shape
+        self._trail: list[Any] = []
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
+        """Starts episode 0 of `seed`, or the next episode; without a seed from the first on, that of the configuration."""
+        super().reset(seed=seed)
+        self._trail.clear()
+        return self._core.reset(seed)[0], {}
+
+    def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+        """One action, float32 (actions,) in [-1, 1], held for `step_s`."""
+        action = np.asarray(action)
+        if action.shape != self._shape:
+            raise ValueError(f"action: is {action.dtype} of shape {action.shape}; accepted: float32 of shape {self._shape}")
+        observation, reward, terminated, truncated, ended = self._core.step(action[None])
+        info: dict[str, Any] = {}
+        if ended:
+            episode = self._core.ended()
+            causes = int(episode["causes"][0])
+            info["is_success"] = bool(episode["success"][0])
+            info["causes"] = [name for k, name in enumerate(CAUSES) if causes >> k & 1]
+        return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """An image, uint8 (height, width, 3): front, side and top, with the way flown since the last reset."""
+        if self.render_mode is None:
+            return None
+        from .render import draw
+
+        pose = self.pose()
+        self._trail.append(pose["position_m"])
+        return draw(pose, np.array(self._trail))
+
+    def close(self) -> None:
+        """Frees the simulator. Calls after it raise RuntimeError."""
+        self._core.close()
+
+
+class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Floats]):
+    """Many environments of a configuration, in one batch.
+
+    Args:
+        num_envs: how many.
+        config, overrides, first: as of `FlappyEnv`; environment i has the number first + i.
+        autoreset_mode: SAME_STEP (default; `info["final_obs"]` with mask `_final_obs`), NEXT_STEP, or DISABLED
+            (`reset(options={"reset_mask": ...})`).
+        copy: True: arrays of each step are Python's, for as long as it wants them; their memory is used again after that. False: views,
+            which the step after the next overwrites.
+        threads: None: one for each processor, fewer where there are few environments.
+
+    Arrays are NumPy's: observation float32 (num_envs, observations), reward float32 (num_envs,), terminated and truncated bool
+    (num_envs,). They speak DLPack (`torch.from_dlpack(observation)`); actions may come from any producer of it. The interpreter is free
+    while the batch steps. Where episodes end, `info` has `final_obs` (SAME_STEP), and `episode` with arrays `r`, `l`, `is_success`,
+    `causes` (bits of `CAUSES`) and the mask `_episode`.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        config: str | Path,
+        overrides: Sequence[str] = (),
+        first: int = 0,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        copy: bool = True,
+        threads: int | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode: is {render_mode!r}; accepted: None, 'rgb_array'")
+        mode = AutoresetMode(autoreset_mode)
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self._core = _core_of(config, overrides, num_envs, mode, copy, first, threads)
+        self._same_step = mode == AutoresetMode.SAME_STEP
+        self.metadata = {"autoreset_mode": mode, "render_modes": ["rgb_array"], "render_fps": round(1 / self._core.step_s)}
+        self.single_observation_space, self.single_action_space = _spaces(self._core)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
+        """Starts episode 0 of `seed` everywhere, or everywhere the next episode; `options["reset_mask"]`: only there."""
+        super().reset(seed=seed)
+        mask = (options or {}).get("reset_mask")
+        if mask is None:
+            return self._core.reset(seed), {}
+        if self.metadata["autoreset_mode"] != AutoresetMode.DISABLED or seed is not None:
+            raise ValueError("reset_mask: accepted with autoreset_mode DISABLED and without a seed")
+        return self._core.reset_some(mask), {}
+
+    def step(self, actions: Floats) -> tuple[Floats, Floats, Bools, Bools, dict[str, Any]]:
+        """One action of each, float32 (num_envs, actions) in [-1, 1]."""
+        observation, reward, terminated, truncated, ended = self._core.step(actions)
+        info: dict[str, Any] = {}
+        if ended:
+            episode = self._core.ended()
+            mask = episode["ended"]
+            if self._same_step:
+                info["final_obs"], info["_final_obs"] = episode["observation"], mask
+            info["episode"] = {
+                "r": episode["return"],
+                "l": episode["length"],
+                "is_success": episode["success"],
+                "causes": episode["causes"],
+            }
+            info["_episode"] = mask
+        return observation, reward, terminated, truncated, info
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
+        """The first environments' images, at most 16, uint8 (height, width, 3) each."""
+        if self.render_mode is None:
+            return None
+        from .render import draw
+
+        return tuple(draw(self.pose(i)) for i in range(min(self.num_envs, 16)))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Frees the simulator. Calls after it raise RuntimeError."""
+        self._core.close()

@@ -1,0 +1,69 @@
+// What the parts of the module share: arrays that Python owns, and errors that name what they were given.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/unique_ptr.h>
+#include <nanobind/stl/vector.h>
+
+#include <atomic>
+#include <span>
+#include <string>
+
+namespace flappy::python {
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+template <class T>
+using Array = nb::ndarray<nb::numpy, T, nb::c_contig, nb::device::cpu>;
+
+/// "float64 of shape (3, 4)", of whatever NumPy makes of it.
+std::string described(nb::handle value);
+std::string shape_text(std::span<const std::size_t> shape);
+
+/// Numbers of Python as an array of this shape: float32 as they are, other floats rounded. TypeError or ValueError, with both
+/// shapes in it, for others, and for what is not finite.
+class Floats {
+ public:
+  Floats(nb::handle value, const char* name, std::initializer_list<std::size_t> shape, float most);
+  const float* data() const { return array_.data(); }
+
+ private:
+  nb::ndarray<const float, nb::c_contig, nb::device::cpu> array_;
+};
+
+/// A new array of Python, to be filled.
+template <class T>
+Array<T> make_array(std::initializer_list<std::size_t> shape) {
+  std::size_t size = 1;
+  for (const std::size_t n : shape) size *= n;
+  auto* data = new T[size]();
+  return Array<T>(data, shape.size(), shape.begin(), nb::capsule(data, [](void* p) noexcept { delete[] static_cast<T*>(p); }));
+}
+
+/// One call at a time: RuntimeError where another thread is in one.
+class Turn {
+ public:
+  Turn(std::atomic_flag& busy, const char* what);
+  ~Turn() { busy_.clear(std::memory_order_release); }
+  Turn(const Turn&) = delete;
+
+ private:
+  std::atomic_flag& busy_;
+};
+
+/// The row of `i`, counted from the end where it is negative. IndexError.
+std::size_t checked_index(std::int64_t i, std::size_t count);
+
+void bind_vehicle(nb::module_& m);
+void bind_environments(nb::module_& m);
+void bind_flights(nb::module_& m);
+void bind_policy(nb::module_& m);
+void bind_diagnosis(nb::module_& m);
+
+}  // namespace flappy::python

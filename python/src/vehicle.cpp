@@ -1,0 +1,4 @@
+#include "bind.hpp"
+namespace flappy::python {
+void bind_vehicle(nb::module_&) {}
+}

@@ -1,0 +1,211 @@
+#include "rollout/environments.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/parallel.hpp"
+#include "rollout/rollout.hpp"
+#include "sim/storage.hpp"
+
+namespace flappy::rollout {
+namespace {
+
+/// Vehicles that hover before episodes start from them, beyond the one of each environment's first.
+constexpr std::uint32_t kSettledVehicles = 256;
+/// Beyond the range in which a vehicle flies, by which observations are bounded: only what is lost is ever clamped.
+constexpr double kObservationRoom = 10;
+
+FlyConfig checked(FlyConfig config) {
+  if (config.excitation.changes())
+    throw io::InputError("excitation: belongs to flights and not to environments, whose actions take its place; accepted: none");
+  config.actor = nullptr;
+  return config;
+}
+
+}  // namespace
+
+Environments::Environments(const FlyConfig& config, const EnvironmentOptions& options)
+    : options_(options),
+      observed_(config.fleet.task.observation()),
+      actions_(config.fleet.task.action()),
+      step_s_(config.fleet.task.action_repeat / config.fleet.control_hz),
+      ended_(std::make_unique<bool[]>(options.count)),
+      episodes_(options.count),
+      final_observation_(options.count * observed_.size()) {
+  for (flight::Signal& s : observed_) {
+    const double most = kObservationRoom * std::max(std::abs(s.low), std::abs(s.high));
+    s.low = -most, s.high = most;
+  }
+}
+
+namespace {
+
+template <class T>
+class EnvironmentsOf final : public Environments {
+ public:
+  EnvironmentsOf(FlyConfig config, const EnvironmentOptions& options)
+      : Environments(config, options),
+        config_(checked(std::move(config))),
+        paid_ticks_(static_cast<std::uint32_t>(
+            std::ceil(config_.fleet.task.constants.reward.until_s * config_.fleet.control_hz - 1e-6))),
+        lives_(options.count) {
+    for (const flight::Signal& s : observed_) bounds_.push_back(static_cast<T>(s.high));
+    prepare();
+  }
+
+  const FlyConfig& config() const override { return config_; }
+
+  void reset(std::optional<std::uint64_t> seed, float* observation) override {
+    if (seed && *seed != config_.fleet.seed) {
+      config_.fleet.seed = *seed;
+      prepare();
+    }
+    fleet_->restored(0);
+    io::parallel_for(count(), fleet_->options().batch.threads, [&](std::size_t i) {
+      lives_[i].episode = seed ? 0 : lives_[i].episode + 1;
+      start(i);
+      observe(i, observation + i * observed_.size());
+    });
+    std::fill_n(ended_.get(), count(), false);
+  }
+
+  void reset(std::span<const bool> which, float* observation) override {
+    for (std::size_t i = 0; i < count(); ++i) {
+      if (!which[i]) continue;
+      ++lives_[i].episode;
+      start(i);
+      observe(i, observation + i * observed_.size());
+    }
+  }
+
+  void step(const float* action, const Transitions& to) override {
+    const std::size_t actions = actions_.size();
+    fleet_->begin(static_cast<int>(config_.fleet.task.action_repeat));
+    io::parallel_for(fleet_->blocks(), fleet_->options().batch.threads, [&](std::size_t block) {
+      const auto [first, last] = fleet_->flappers(block);
+      for (std::size_t i = first; i < last; ++i) {
+        T clamped[flight::kActions];
+        for (std::size_t k = 0; k < actions; ++k)
+          clamped[k] = static_cast<T>(std::min(std::max(action[i * actions + k], -1.0F), 1.0F));
+        fleet_->set_action(i, std::span(clamped, actions));
+      }
+      fleet_->fly_block(block);
+      for (std::size_t i = first; i < last; ++i) gather(i, to);
+    });
+    fleet_->end();
+    if (config_.watch) show(*config_.watch, *fleet_);
+  }
+
+  flight::Motion truth(std::size_t i) const override { return fleet_->truth(i); }
+  flight::Motion estimate(std::size_t i) const override { return fleet_->estimate(i); }
+  flight::Target target(std::size_t i) const override { return fleet_->target(i); }
+  sim::FlapperState state(std::size_t i) const override { return fleet_->batch().state(i); }
+  double time_s(std::size_t i) const override { return fleet_->tick(i) * fleet_->period_s(); }
+  std::uint32_t episode(std::size_t i) const override { return lives_[i].episode; }
+  std::uint64_t hash(std::size_t first, std::size_t last) const override {
+    std::uint64_t hash = 0;
+    for (std::size_t i = first; i < last; ++i) hash = sim::mixed(hash, fleet_->batch().hash(i, i + 1));
+    return hash;
+  }
+
+ private:
+  /// What an environment has been through.
+  struct Life {
+    std::uint32_t episode = 0, steps = 0;
+    double episode_return = 0;
+    bool over = false;  ///< its episode is, and the next has not started
+  };
+
+  /// The fleet of a seed, and what hovers before its episodes.
+  void prepare() {
+    flight::FleetOptions o = config_.fleet;
+    // threads that share a few blocks wait for each other more than they fly
+    const auto most = static_cast<std::size_t>(io::thread_count(o.batch.threads));
+    o.batch.threads = static_cast<int>(std::clamp<std::size_t>(count() / 64, 1, most));
+    fleet_.emplace(count(), config_.vehicle, o);
+    if (config_.fleet.task.start.settled) {
+      const auto vehicle = [&](std::uint32_t flapper) { return config_.vehicle_of(flapper); };
+      own_ = settle<T>(o, count(), kHover_s, vehicle);
+      o.first_flapper = 0;
+      others_ = settle<T>(o, kSettledVehicles, kHover_s, vehicle);
+    }
+    for (std::size_t i = 0; i < count(); ++i) {
+      lives_[i].episode = 0;
+      start(i);
+      fleet_->set_added(i, config_.excitation.at(0));
+    }
+  }
+
+  /// Its first episode starts as flappy-fly has it start; the next ones where the task starts settled from one of the others.
+  void start(std::size_t i) {
+    Life& life = lives_[i];
+    const flight::Snapshot<T>* hover = nullptr;
+    if (!own_.empty()) {
+      const sim::RandomKey key{config_.fleet.seed, config_.fleet.first_flapper + static_cast<std::uint32_t>(i), life.episode,
+                               sim::Stream::snapshot};
+      const auto place = static_cast<std::size_t>(sim::uniform_pair(key, 0).first * static_cast<double>(others_.size()));
+      hover = life.episode == 0 ? &own_[i] : &others_[place];
+    }
+    Rollout<T>::start(*fleet_, config_, i, life.episode, hover);
+    life = {life.episode};
+  }
+
+  void observe(std::size_t i, float* row) const {
+    T seen[flight::kMaxHistory * flight::kMaxObservation];
+    fleet_->observation(i, seen);
+    for (std::size_t k = 0; k < bounds_.size(); ++k)
+      row[k] = static_cast<float>(std::min(std::max(seen[k], -bounds_[k]), bounds_[k]));
+  }
+
+  void gather(std::size_t i, const Transitions& to) {
+    Life& life = lives_[i];
+    float* row = to.observation + i * observed_.size();
+    ended_[i] = false;
+    if (life.over && options_.autoreset == Autoreset::next_step) {
+      ++life.episode;
+      start(i);
+      observe(i, row);
+      to.reward[i] = 0;
+      to.terminated[i] = to.truncated[i] = false;
+      return;
+    }
+    observe(i, row);
+    const float reward = static_cast<float>(fleet_->action_reward(i));
+    const std::uint32_t causes = fleet_->ended(i);
+    const bool paid = fleet_->handed_back(i) && fleet_->tick(i) >= paid_ticks_;
+    to.reward[i] = reward;
+    to.terminated[i] = paid || (causes & ~std::uint32_t{flight::kTimeOut}) != 0;
+    to.truncated[i] = !to.terminated[i] && causes != 0;
+    if (life.over) return;
+    ++life.steps;
+    life.episode_return += reward;
+    if (!to.terminated[i] && !to.truncated[i]) return;
+    life.over = ended_[i] = true;
+    const bool crashed = (causes & ~std::uint32_t{flight::kTimeOut}) != 0;
+    const bool has_success = config_.fleet.task.constants.success.by_s > 0;
+    const bool kept = fleet_->captured_s(i) > 0 && fleet_->lost_s(i) == 0;
+    episodes_[i] = {static_cast<float>(life.episode_return), static_cast<float>(life.steps), !crashed && (!has_success || kept),
+                    causes};
+    std::copy_n(row, observed_.size(), &final_observation_[i * observed_.size()]);
+    if (options_.autoreset != Autoreset::same_step) return;
+    ++life.episode;
+    start(i);
+    observe(i, row);
+  }
+
+  FlyConfig config_;
+  std::uint32_t paid_ticks_;
+  std::optional<flight::Fleet<T>> fleet_;
+  std::vector<flight::Snapshot<T>> own_, others_;
+  std::vector<T> bounds_;
+  std::vector<Life> lives_;
+};
+
+}  // namespace
+
+std::unique_ptr<Environments> make_environments(FlyConfig config, const EnvironmentOptions& options) {
+  if (config.precision == "float") return std::make_unique<EnvironmentsOf<float>>(std::move(config), options);
+  return std::make_unique<EnvironmentsOf<double>>(std::move(config), options);
+}
+
+}  // namespace flappy::rollout
