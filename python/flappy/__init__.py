@@ -6,10 +6,31 @@ Below them: `Batch` flies open loop, `Fleet` in closed loop. `read_flight` and `
 `flappy-identify` say. SI units; quaternions w, x, y, z, body to world; left before right.
 """
 
-from ._core import InputError
-from .envs import FlappyEnv, FlappyVectorEnv
+from ._core import Batch, Fleet, InputError, Vehicle, Wall, World, diagnose, fly, identify, instruction_sets, write_flight
+from .envs import CAUSES, FlappyEnv, FlappyVectorEnv
+from .export import export
+from .flights import read_flight
+from .policy import Policy
 from .register import register
 
 register()
 
-__all__ = ["FlappyEnv", "FlappyVectorEnv", "InputError"]
+__all__ = [
+    "CAUSES",
+    "Batch",
+    "FlappyEnv",
+    "FlappyVectorEnv",
+    "Fleet",
+    "InputError",
+    "Policy",
+    "Vehicle",
+    "Wall",
+    "World",
+    "diagnose",
+    "export",
+    "fly",
+    "identify",
+    "instruction_sets",
+    "read_flight",
+    "write_flight",
+]

@@ -26,13 +26,6 @@ Bools = NDArray[np.bool_]
 CAUSES = ("time_out", "contact", "not_finite", "out_of_bounds", "heading_late", "arrival_late")
 
 
-def resolve(config: str | Path) -> Path:
-    """The file that is meant: as it stands, or below the package's own configurations."""
-    path = Path(config)
-    own = Path(_core.configs_folder()) / path
-    return own if not path.exists() and own.exists() else path
-
-
 def _core_of(
     config: str | Path,
     overrides: Sequence[str],
@@ -46,7 +39,7 @@ def _core_of(
     if threads is not None:
         own.append(f"flight.threads={threads}")
     modes = {AutoresetMode.SAME_STEP: "same_step", AutoresetMode.NEXT_STEP: "next_step", AutoresetMode.DISABLED: "disabled"}
-    return _core.Environments(resolve(config), [*overrides, *own], count, modes[mode], copy)
+    return _core.Environments(Path(config), [*overrides, *own], count, modes[mode], copy)
 
 
 def _spaces(core: _core.Environments) -> tuple[Box, Box]:
@@ -79,6 +72,11 @@ class _Named:
     def action_high(self) -> Floats:
         """What +1 stands for."""
         return np.array([s["high"] for s in self._core.actions], np.float32)
+
+    def to_action(self, physical: Any) -> Floats:
+        """The action that stands for these inputs, in the units of `action_low`; beyond the ranges it is clipped."""
+        low, high = self.action_low, self.action_high
+        return np.clip(2 * (np.asarray(physical, np.float32) - low) / (high - low) - 1, -1, 1).astype(np.float32)
 
     @property
     def step_s(self) -> float:
@@ -114,6 +112,7 @@ class FlappyEnv(_Named, gymnasium.Env[Floats, Floats]):
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode: is {render_mode!r}; accepted: None, 'rgb_array'")
         self.render_mode = render_mode
+        self.config, self.overrides = config, [*overrides]
         self._core = _core_of(config, overrides, 1, AutoresetMode.DISABLED, True, first, 1)
         self.metadata = {**self.metadata, "render_fps": round(1 / self._core.step_s)}
         self.observation_space, self.action_space = _spaces(self._core)
@@ -190,6 +189,7 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Floats]
         mode = AutoresetMode(autoreset_mode)
         self.num_envs = num_envs
         self.render_mode = render_mode
+        self.config, self.overrides = config, [*overrides]
         self._core = _core_of(config, overrides, num_envs, mode, copy, first, threads)
         self._same_step = mode == AutoresetMode.SAME_STEP
         self.metadata = {"autoreset_mode": mode, "render_modes": ["rgb_array"], "render_fps": round(1 / self._core.step_s)}

@@ -57,6 +57,9 @@ class Turn {
   std::atomic_flag& busy_;
 };
 
+/// The file that is meant: as it stands, or of the package's own configurations ("fly/hover.toml").
+std::filesystem::path found(const std::filesystem::path& file);
+
 /// The row of `i`, counted from the end where it is negative. IndexError.
 std::size_t checked_index(std::int64_t i, std::size_t count);
 
@@ -65,5 +68,6 @@ void bind_environments(nb::module_& m);
 void bind_flights(nb::module_& m);
 void bind_policy(nb::module_& m);
 void bind_diagnosis(nb::module_& m);
+void bind_export(nb::module_& m);
 
 }  // namespace flappy::python

@@ -1,4 +1,110 @@
+// What measurements say of a vehicle: flappy-gap diagnose, flappy-identify forces.
+#include <csignal>
+
 #include "bind.hpp"
+#include "flappy/vehicle_file.hpp"
+#include "gap/diagnose/diagnose_command.hpp"
+#include "identify/force_fit.hpp"
+#include "io/progress.hpp"
+
 namespace flappy::python {
-void bind_diagnosis(nb::module_&) {}
+namespace {
+
+/// Ctrl-C ends our work early meanwhile, and is Python's again after it.
+class Interruptible {
+ public:
+  Interruptible() {
+    sigaction(SIGINT, nullptr, &interrupt_);
+    sigaction(SIGTERM, nullptr, &terminate_);
+    io::stop_on_interrupt();
+  }
+  ~Interruptible() {
+    sigaction(SIGINT, &interrupt_, nullptr);
+    sigaction(SIGTERM, &terminate_, nullptr);
+    io::forget_interrupt();
+  }
+  Interruptible(const Interruptible&) = delete;
+
+ private:
+  struct sigaction interrupt_ {}, terminate_ {};
+};
+
+nb::object of_json(const nlohmann::ordered_json& json) { return nb::module_::import_("json").attr("loads")(json.dump()); }
+
+[[noreturn]] void interrupted() {
+  PyErr_SetNone(PyExc_KeyboardInterrupt);
+  throw nb::python_error();
 }
+
+nb::object diagnose(const std::filesystem::path& vehicle, const std::vector<std::string>& flights, const std::string& out,
+                    const std::vector<std::string>& withheld, const std::string& manoeuvre, int threads) {
+  gap::DiagnoseCommand command;
+  command.vehicle = found(vehicle);
+  command.flights = flights;
+  command.out = out;
+  command.withheld = withheld;
+  if (!manoeuvre.empty()) command.manoeuvre = found(manoeuvre);
+  command.threads = threads;
+  command.quiet = true;
+  nlohmann::ordered_json json;
+  bool stopped = false;
+  {
+    const Interruptible until_done;
+    const nb::gil_scoped_release free;
+    json = gap::run_diagnose(command);
+    stopped = io::interrupted();
+  }
+  if (stopped) interrupted();
+  return of_json(json);
+}
+
+nb::dict identify(const std::filesystem::path& vehicle_file, const std::filesystem::path& measured_file, const std::filesystem::path& config_file,
+                  const std::vector<std::string>& parameters, int starts, std::uint64_t seed, int threads) {
+  identify::ForceFit fit;
+  model::Vehicle vehicle;
+  bool stopped = false;
+  {
+    const Interruptible until_done;
+    const nb::gil_scoped_release free;
+    vehicle = model::read_vehicle_for_steps(found(vehicle_file), identify::kStep_s);
+    const identify::FitConfig config = identify::read_fit_config(found(config_file), vehicle, parameters);
+    identify::FitOptions options;
+    options.map.threads = threads;
+    options.starts = starts;
+    options.seed = seed;
+    options.progress = [](const std::string&, double, double) { return !io::interrupted(); };
+    fit = identify::fit_forces(vehicle, identify::read_measured_map(measured_file, vehicle.driver), config, options);
+    stopped = io::interrupted();
+  }
+  if (stopped) interrupted();
+  fit.vehicle.name = vehicle.name + "_fitted";
+  fit.vehicle.posterior.reset();
+  nb::list all;
+  for (const identify::FittedParameter& p : fit.known.parameters) {
+    nb::dict d;
+    d["name"] = p.path, d["value"] = p.value, d["low"] = p.low, d["high"] = p.high, d["nominal"] = p.nominal;
+    d["seen"] = p.seen, d["at_bound"] = p.at_bound, d["at_nominal"] = p.at_nominal;
+    all.append(d);
+  }
+  nb::dict result;
+  result["vehicle"] = nb::cast(fit.vehicle);
+  result["parameters"] = all;
+  result["error_before_percent"] = fit.before.total, result["error_after_percent"] = fit.after.total;
+  result["misfit"] = fit.known.misfit;
+  result["starts_agreed"] = fit.starts_agreed;
+  return result;
+}
+
+}  // namespace
+
+void bind_diagnosis(nb::module_& m) {
+  m.def("diagnose", &diagnose, "vehicle"_a, "flights"_a, "out"_a = "", "withheld"_a = std::vector<std::string>{}, "manoeuvre"_a = "", "threads"_a = 0,
+        "What flappy-gap diagnose says of flight logs: the content of diagnosis.json. `vehicle`: the file as it was believed; `flights`: folders of "
+        "logs; `out`: folder for its files, the corrected vehicle among them. InputError for what cannot be read; KeyboardInterrupt.");
+  m.def("identify", &identify, "vehicle"_a, "measured"_a, "config"_a = "identify/forces.toml", "parameters"_a = std::vector<std::string>{}, "starts"_a = 3,
+        "seed"_a = 1, "threads"_a = 0,
+        "Fits a vehicle to a measured force map, as flappy-identify forces does: vehicle (a Vehicle), parameters (name, value, the 95 % interval low to "
+        "high, ...), error_before_percent, error_after_percent, misfit (1 where noise alone is left), starts_agreed.");
+}
+
+}  // namespace flappy::python

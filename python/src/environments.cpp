@@ -50,7 +50,7 @@ class PyEnvironments {
     if (autoreset == "next_step") options.autoreset = rollout::Autoreset::next_step;
     if (autoreset == "disabled") options.autoreset = rollout::Autoreset::disabled;
     const nb::gil_scoped_release free;
-    all_ = rollout::make_environments(rollout::read_fly_config(config, overrides), options);
+    all_ = rollout::make_environments(rollout::read_fly_config(found(config), overrides), options);
   }
 
   rollout::Environments& all() const {
@@ -209,7 +209,7 @@ void bind_environments(nb::module_& m) {
            "config"_a, "overrides"_a, "count"_a, "autoreset"_a, "copy"_a)
       .def("reset", &PyEnvironments::reset, "seed"_a.none(), "Starts all anew; float32 (count, observations).")
       .def("reset_some", &PyEnvironments::reset_some, "which"_a.noconvert(), "Starts those that are marked anew: bool (count,).")
-      .def("step", &PyEnvironments::step, "action"_a.noconvert(),
+      .def("step", &PyEnvironments::step, "action"_a.noconvert().none(),
            "One action of each, float32 (count, actions) in [-1, 1]: observation, reward, terminated, truncated, and how many ended.")
       .def("ended", &PyEnvironments::ended, "Episodes that ended in the last step.")
       .def("pose", &PyEnvironments::pose, "i"_a, "True pose and wings of one, SI units.")

@@ -8,20 +8,25 @@ namespace flappy::python {
 
 std::string shape_text(std::span<const std::size_t> shape) {
   std::string text = "(";
-  for (const std::size_t n : shape) text += std::to_string(n) + (shape.size() == 1 ? "," : &n == &shape.back() ? "" : ", ");
+  for (const std::size_t& n : shape) text += std::to_string(n) + (shape.size() == 1 ? "," : &n == &shape.back() ? "" : ", ");
   return text + ")";
 }
 
+/// Of a str of Python.
+std::string text_of(const nb::object& str) { return nb::cast<std::string>(str); }
+
 std::string described(nb::handle value) {
   const nb::object array = nb::module_::import_("numpy").attr("asarray")(value);
-  return nb::cast<std::string>(nb::str(array.attr("dtype"))) + " of shape " + nb::cast<std::string>(nb::str(array.attr("shape")));
+  std::vector<std::size_t> shape;
+  for (const nb::handle n : nb::tuple(array.attr("shape"))) shape.push_back(nb::cast<std::size_t>(n));
+  return text_of(array.attr("dtype").attr("name")) + " of shape " + shape_text(shape);
 }
 
 Floats::Floats(nb::handle value, const char* name, std::initializer_list<std::size_t> shape, float most) {
   const std::string accepted = "; accepted: float32 of shape " + shape_text({shape.begin(), shape.size()});
   if (!nb::try_cast(value, array_, false)) {
     nb::object array = nb::module_::import_("numpy").attr("asarray")(value);
-    if (nb::cast<std::string>(array.attr("dtype").attr("kind")) != "f")
+    if (text_of(array.attr("dtype").attr("kind")) != "f")
       throw nb::type_error((std::string(name) + ": is " + described(value) + accepted).c_str());
     array = nb::module_::import_("numpy").attr("ascontiguousarray")(array, "dtype"_a = "float32");
     array_ = nb::cast<decltype(array_)>(array);
@@ -48,6 +53,11 @@ Turn::Turn(std::atomic_flag& busy, const char* what) : busy_(busy) {
     throw std::runtime_error(std::string(what) + ": another thread is in a call to it; accepted: one call at a time");
 }
 
+std::filesystem::path found(const std::filesystem::path& file) {
+  const std::filesystem::path own = io::configs_folder() / file;
+  return !std::filesystem::exists(file) && std::filesystem::exists(own) ? own : file;
+}
+
 std::size_t checked_index(std::int64_t i, std::size_t count) {
   const auto n = static_cast<std::int64_t>(count);
   if (i < -n || i >= n)
@@ -66,4 +76,5 @@ NB_MODULE(_core, m) {
   bind_flights(m);
   bind_policy(m);
   bind_diagnosis(m);
+  bind_export(m);
 }

@@ -1,4 +1,61 @@
+// Policies that were trained or exported, and the way of a network into C.
+#include "policy/policy.hpp"
+
 #include "bind.hpp"
+#include "deploy/header/policy_vectors.hpp"
+#include "learn/run_folder.hpp"
+
 namespace flappy::python {
-void bind_policy(nb::module_&) {}
+namespace {
+
+/// One of a run folder or of a C header.
+class PyPolicy {
+ public:
+  PyPolicy(const std::filesystem::path& path, int observations, int actions) : observations_(observations), actions_(actions) {
+    if (observations > 0) {
+      policy_ = policy::load_policy(path, observations, actions);
+      return;
+    }
+    network_ = deploy::network_of(learn::read_finished_run(path).fly);
+    observations_ = network_.inputs();
+    actions_ = network_.outputs();
+  }
+  int observations() const { return observations_; }
+  int actions() const { return actions_; }
+
+  Array<float> act(nb::handle observation) {
+    const Turn turn(busy_, "the policy");
+    const nb::object array = nb::module_::import_("numpy").attr("asarray")(observation);
+    if (nb::cast<int>(array.attr("ndim")) != 2)
+      throw nb::value_error(("observation: is " + described(observation) + "; accepted: float32 of shape (n, " + std::to_string(observations_) + ")").c_str());
+    const auto rows = nb::cast<std::size_t>(array.attr("shape")[0]);
+    const Floats floats(array, "observation", {rows, static_cast<std::size_t>(observations_)}, std::numeric_limits<float>::max());
+    auto action = make_array<float>({rows, static_cast<std::size_t>(actions_)});
+    const nb::gil_scoped_release free;
+    if (policy_) {
+      policy_->act(rows, floats.data(), action.data());
+    } else {
+      const std::vector<float> result = deploy::evaluate(network_, {floats.data(), floats.data() + rows * static_cast<std::size_t>(observations_)});
+      std::ranges::copy(result, action.data());
+    }
+    return action;
+  }
+
+ private:
+  std::unique_ptr<const policy::Policy> policy_;
+  policy::PolicyNetwork network_;
+  int observations_, actions_;
+  std::atomic_flag busy_ = ATOMIC_FLAG_INIT;
+};
+
+}  // namespace
+
+void bind_policy(nb::module_& m) {
+  nb::class_<PyPolicy>(m, "Policy")
+      .def(nb::init<const std::filesystem::path&, int, int>(), "path"_a, "observations"_a, "actions"_a)
+      .def("act", &PyPolicy::act, "observation"_a)
+      .def_prop_ro("observations", &PyPolicy::observations)
+      .def_prop_ro("actions", &PyPolicy::actions);
 }
+
+}  // namespace flappy::python

@@ -47,6 +47,7 @@ void stop_on_interrupt() {
 }
 
 bool interrupted() { return interrupted_flag != 0; }
+void forget_interrupt() { interrupted_flag = 0; }
 
 double steady_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();

@@ -12,6 +12,8 @@ namespace flappy::io {
 /// From now on the first Ctrl-C (or SIGTERM) makes interrupted() true, the second ends the program.
 void stop_on_interrupt();
 bool interrupted();
+/// As if none had come: for a process that goes on.
+void forget_interrupt();
 
 /// How long work that goes on as it did lately will take: (1 - done) / rate, the rate that of the last 20 s, or of the last
 /// three advances where those took longer.

@@ -17,13 +17,14 @@ inline constexpr int kMaxLayers = 32, kMaxWidth = 2048;
 
 /// Weights of each layer: for every output its bias, then one weight for each input; with layer norm (Ba et al. 2016, arXiv
 /// 1607.06450), those of a hidden layer are followed by a gain for each output, then a shift for each. Hidden layers share one
-/// activation, the last is tanh.
+/// activation; the last is tanh, or `linear`: its sums as they are, within [-1, 1].
 template <class T>
 struct ActorView {
   int layers = 0;                // 0: no actor
   int widths[kMaxLayers + 1]{};  // inputs, then outputs of each layer
   Activation hidden = Activation::relu;
   bool layer_norm = false;     // of the sums of hidden layers, before their activation
+  bool linear = false;         // the last layer
   const T* weights = nullptr;  // of all layers, one after the other
   const T* mean = nullptr;     // of each input
   const T* scale = nullptr;    // input = clamp((observation - mean) * scale, +-clip)
@@ -38,6 +39,7 @@ ActorView<T> view_of(const Shape& shape, const T* weights, const T* mean, const 
   std::ranges::copy(shape.widths, view.widths);
   view.hidden = shape.hidden;
   view.layer_norm = shape.layer_norm;
+  view.linear = shape.linear;
   view.weights = weights, view.mean = mean, view.scale = scale;
   view.clip = static_cast<T>(shape.clip);
   return view;
@@ -124,7 +126,9 @@ FLAPPY_INLINE void evaluate(const ActorView<Element<L>>& actor, const L* observa
       normalise(weights, outputs, out);
       weights += 2 * outputs;
     }
-    activate(last ? Activation::tanh : actor.hidden, outputs, out);
+    if (last && actor.linear)
+      for (int k = 0; k < outputs; ++k) out[k] = clamp(out[k], L(-1), L(1));
+    else activate(last ? Activation::tanh : actor.hidden, outputs, out);
   }
   for (int o = 0; o < actor.widths[actor.layers]; ++o) action[o] = values[actor.layers % 2][o];
 }

@@ -56,6 +56,11 @@ Actor read_actor(const std::filesystem::path& path) {
     if (known == std::end(kActivationNames)) refuse(path, "hidden is \"" + hidden + "\"", "relu, tanh, elu or silu");
     a.hidden = static_cast<Activation>(known - kActivationNames);
     if (json.contains("layer_norm")) a.layer_norm = json.at("layer_norm").get<bool>();
+    if (json.contains("output")) {
+      const auto output = json.at("output").get<std::string>();
+      if (output != "tanh" && output != "linear") refuse(path, "output is \"" + output + "\"", "tanh or linear");
+      a.linear = output == "linear";
+    }
     a.mean = json.at("mean").get<std::vector<double>>();
     a.scale = json.at("scale").get<std::vector<double>>();
     a.clip = json.at("clip").get<double>();
@@ -93,6 +98,7 @@ void write_actor(const std::filesystem::path& path, const Actor& a) {
                {"mean", a.mean},      {"scale", a.scale},   {"clip", a.clip},
                {"weights", a.weights}};
   if (a.layer_norm) json["layer_norm"] = true;
+  if (a.linear) json["output"] = "linear";
   io::write_atomically(path, json.dump() + "\n");
 }
 

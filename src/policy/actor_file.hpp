@@ -16,6 +16,7 @@ struct Actor {
   std::vector<int> widths;                       ///< inputs, then outputs of each layer
   Activation hidden = Activation::relu;
   bool layer_norm = false;  ///< before each hidden activation
+  bool linear = false;      ///< the last layer: its sums as they are, within [-1, 1], in place of their tanh
   std::vector<double> weights, mean, scale;
   double clip = 10;
 };

@@ -13,6 +13,7 @@ struct PolicyNetwork {
   std::vector<int> widths;  ///< inputs, then outputs of each layer
   Activation hidden = Activation::relu;
   bool layer_norm = false;  ///< of the sums of hidden layers, before their activation
+  bool linear = false;      ///< the last layer: its sums as they are, within [-1, 1], in place of their tanh
   float clip = 0;
   std::vector<float> mean, scale;  ///< of each input
   std::vector<float>

@@ -17,7 +17,8 @@ constexpr double kObservationRoom = 10;
 
 FlyConfig checked(FlyConfig config) {
   if (config.excitation.changes())
-    throw io::InputError("excitation: belongs to flights and not to environments, whose actions take its place; accepted: none");
+    throw io::InputError(
+        "excitation: belongs to flights and not to environments, whose actions take its place; accepted: none");
   config.actor = nullptr;
   return config;
 }
@@ -141,9 +142,10 @@ class EnvironmentsOf final : public Environments {
     Life& life = lives_[i];
     const flight::Snapshot<T>* hover = nullptr;
     if (!own_.empty()) {
-      const sim::RandomKey key{config_.fleet.seed, config_.fleet.first_flapper + static_cast<std::uint32_t>(i), life.episode,
-                               sim::Stream::snapshot};
-      const auto place = static_cast<std::size_t>(sim::uniform_pair(key, 0).first * static_cast<double>(others_.size()));
+      const sim::RandomKey key{config_.fleet.seed, config_.fleet.first_flapper + static_cast<std::uint32_t>(i),
+                               life.episode, sim::Stream::snapshot};
+      const auto place =
+          static_cast<std::size_t>(sim::uniform_pair(key, 0).first * static_cast<double>(others_.size()));
       hover = life.episode == 0 ? &own_[i] : &others_[place];
     }
     Rollout<T>::start(*fleet_, config_, i, life.episode, hover);
@@ -184,8 +186,8 @@ class EnvironmentsOf final : public Environments {
     const bool crashed = (causes & ~std::uint32_t{flight::kTimeOut}) != 0;
     const bool has_success = config_.fleet.task.constants.success.by_s > 0;
     const bool kept = fleet_->captured_s(i) > 0 && fleet_->lost_s(i) == 0;
-    episodes_[i] = {static_cast<float>(life.episode_return), static_cast<float>(life.steps), !crashed && (!has_success || kept),
-                    causes};
+    episodes_[i] = {static_cast<float>(life.episode_return), static_cast<float>(life.steps),
+                    !crashed && (!has_success || kept), causes};
     std::copy_n(row, observed_.size(), &final_observation_[i * observed_.size()]);
     if (options_.autoreset != Autoreset::same_step) return;
     ++life.episode;

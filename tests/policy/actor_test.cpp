@@ -25,6 +25,7 @@ policy::Actor random_actor(std::vector<int> widths, policy::Activation hidden, s
   a.widths = std::move(widths);
   a.hidden = hidden;
   a.layer_norm = layer_norm;
+  a.linear = hidden == policy::Activation::elu;
   for (std::size_t layer = 0; layer + 1 < a.widths.size(); ++layer) {
     for (int o = 0; o < a.widths[layer + 1]; ++o)
       for (int i = 0; i <= a.widths[layer]; ++i) a.weights.push_back(normal(engine) / std::sqrt(a.widths[layer] + 1.0));
@@ -64,7 +65,8 @@ std::vector<double> expected(const policy::Actor& a, std::vector<double> x) {
       weight += 2 * y.size();
     }
     for (double& v : y) {
-      if (last || a.hidden == policy::Activation::tanh) v = std::tanh(v);
+      if (last && a.linear) v = std::clamp(v, -1.0, 1.0);
+      else if (last || a.hidden == policy::Activation::tanh) v = std::tanh(v);
       else if (a.hidden == policy::Activation::relu) v = std::max(v, 0.0);
       else if (a.hidden == policy::Activation::elu) v = v > 0 ? v : std::expm1(v);
       else v = v / (1 + std::exp(-v));
@@ -277,6 +279,9 @@ TEST(ActorFile, ReadsBackWhatWasWritten) {
   const policy::Actor c = policy::read_actor(file_name());
   EXPECT_TRUE(c.layer_norm);
   EXPECT_EQ(c.hidden, policy::Activation::silu);
+  EXPECT_FALSE(c.linear);
+  write_actor(file_name(), random_actor({18, 5, 4}, policy::Activation::elu, 11));
+  EXPECT_TRUE(policy::read_actor(file_name()).linear);
 }
 
 std::string refused(const std::string& text) {

@@ -93,9 +93,9 @@ void write_all(const fs::path& folder, const std::map<std::string, std::string>&
 void run(const Request& request, const io::Program& program) {
   const learn::FinishedRun run = learn::read_finished_run(request.run);
   const policy::PolicyNetwork network = deploy::network_of(run.fly);
-  if (request.int8 && (network.layer_norm || network.hidden > policy::Activation::tanh))
+  if (request.int8 && (network.layer_norm || network.linear || network.hidden > policy::Activation::tanh))
     throw io::InputError(
-        "--int8: whole numbers hold no layer norm, elu or silu; accepted: a policy of relu or tanh without layer norm");
+        "--int8: whole numbers hold no layer norm, linear output, elu or silu; accepted: a policy of relu or tanh without them");
   const auto signals = run.fly.fleet.task.observation();
   Export e;
   e.files["flappy_controller.h"] = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));

@@ -75,7 +75,7 @@ static inline int flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float a
     if (layer + 1 < FLAPPY_POLICY_LAYERS) weights = flappy_policy_normalise(weights, out, widths[layer + 1]);
 #endif
     for (i = 0; i < widths[layer + 1]; ++i)
-      out[i] = layer + 1 == FLAPPY_POLICY_LAYERS ? flappy_tanh(out[i]) : FLAPPY_POLICY_HIDDEN(out[i]);
+      out[i] = layer + 1 == FLAPPY_POLICY_LAYERS ? FLAPPY_POLICY_OUTPUT(out[i]) : FLAPPY_POLICY_HIDDEN(out[i]);
   }
   for (i = 0; i < FLAPPY_POLICY_ACT; ++i) {
     const float x = flappy_clamp(values[FLAPPY_POLICY_LAYERS % 2][i], -1.0F, 1.0F);

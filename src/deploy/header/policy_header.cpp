@@ -133,6 +133,7 @@ std::string header(const rollout::FlyConfig& config, const policy::RunInfo& run,
   if constexpr (std::is_same_v<Network, policy::PolicyNetwork>) {
     define("CLIP", c_number(n.clip));
     define("LAYER_NORM", n.layer_norm ? 1 : 0);
+    define("OUTPUT(x)", n.linear ? "flappy_clamp(x, -1.0F, 1.0F)" : "flappy_tanh(x)");
   }
   define("HIDDEN(x)", kind.hidden);
   define("VECTORS", vectors.rows());

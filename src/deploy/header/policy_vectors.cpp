@@ -24,6 +24,7 @@ policy::PolicyNetwork network_of(const rollout::FlyConfig& config) {
   policy::PolicyNetwork n{a.widths,
                           a.hidden,
                           a.layer_norm,
+                          a.linear,
                           static_cast<float>(a.clip),
                           cast<float>(a.mean),
                           cast<float>(a.scale),

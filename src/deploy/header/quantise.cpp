@@ -48,7 +48,7 @@ QuantisedNetwork quantise(const policy::PolicyNetwork& n, const std::vector<floa
   const auto inputs = static_cast<std::size_t>(n.inputs());
   const std::size_t rows = observation.size() / inputs;
   if (rows == 0) throw std::invalid_argument("nothing to fit scales to");
-  if (n.layer_norm || (n.hidden != policy::Activation::relu && n.hidden != policy::Activation::tanh))
+  if (n.layer_norm || n.linear || (n.hidden != policy::Activation::relu && n.hidden != policy::Activation::tanh))
     throw std::invalid_argument("a network that whole numbers do not hold");
   const bool relu = n.hidden == policy::Activation::relu;
   QuantisedNetwork q{n.widths, relu, n.mean, n.scale, {}, {}, {}, n.middle, n.half};

@@ -182,13 +182,16 @@ Json run_diagnose(const DiagnoseCommand& command) {
     if (corrected) look_ahead(command, asked, flights, d, *corrected, report);
   }
   Json json = diagnosis_json(report);
-  for (const std::string& line : summary_of(report, command.out)) std::printf("%s\n", line.c_str());
+  const auto print = [&](const std::string& line) {
+    if (!command.quiet) std::printf("%s\n", line.c_str());
+  };
+  for (const std::string& line : summary_of(report, command.out)) print(line);
   io::log(io::LogLevel::info, faulty       ? "the flights' data have faults: no diagnosis"
                               : d.complete ? "diagnosed"
                                            : "stopped before every effect was weighed");
   if (out.empty()) return json;
   io::write_atomically(out / kJson, json.dump(2) + "\n");
-  std::printf("written to %s: %s\n", command.out.c_str(), written.c_str());
+  print("written to " + command.out + ": " + written);
   return json;
 }
 

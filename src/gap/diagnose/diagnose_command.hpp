@@ -16,8 +16,9 @@ struct DiagnoseCommand {
   std::string
       manoeuvre;  ///< configuration of flappy-fly that the flights flew; empty: the recorded paths, under our hover's
   std::vector<std::string> flights, withheld;
-  std::string out;  ///< folder for all files; empty: none
-  int threads = 0;  ///< 0: one for each processor
+  std::string out;     ///< folder for all files; empty: none
+  int threads = 0;     ///< 0: one for each processor
+  bool quiet = false;  ///< prints nothing
 };
 
 /// Diagnoses, prints, writes; the machine-readable result.

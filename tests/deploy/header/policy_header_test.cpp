@@ -41,6 +41,7 @@ rollout::FlyConfig escape(const std::vector<int>& hidden_widths, Activation hidd
   a.widths.push_back(flight::kActions);
   a.hidden = hidden;
   a.layer_norm = layer_norm;
+  a.linear = hidden == Activation::elu;
   std::mt19937 engine(5);
   const auto random = [&](double size) {
     a.weights.push_back(static_cast<float>((static_cast<double>(engine()) / 0x1p31 - 1) * size));

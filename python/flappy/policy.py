@@ -1,0 +1,51 @@
+"""Policies that were trained or exported."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core
+
+
+class Policy:
+    """What acts upon observations: a run folder of `flappy-train`, a C header (.h), which is compiled, or TorchScript (.pt).
+
+    TorchScript is read by the torch of this Python, which is imported for it. `policy(observation)`: float32 (n, observations) or
+    (observations,), raw and in SI units, to float32 of as many rows: what is added to the controller's output or, without one, set: V
+    and fractions of a beat. `env.unwrapped.to_action(...)` makes an action of it.
+
+    Raises:
+        InputError: one line, where the file is no policy, does not compile or fails its own test.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        path = Path(path)
+        self._script: Any = None
+        if path.suffix == ".pt":
+            import torch
+
+            self._script = torch.jit.load(str(path))
+            return
+        sizes = {"OBS": 0, "ACT": 0}
+        if path.suffix == ".h" and path.is_file():
+            text = path.read_text(errors="replace")
+            for name in sizes:
+                if not (found := re.search(rf"#\s*define\s+FLAPPY_POLICY_{name}\s+(\d+)", text)) or int(found[1]) < 1:
+                    raise _core.InputError(f"{path}: FLAPPY_POLICY_{name} is missing; accepted: a header of flappy-export")
+                sizes[name] = int(found[1])
+        self._own = _core.Policy(path, sizes["OBS"], sizes["ACT"])
+
+    def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Acts."""
+        rows = np.atleast_2d(np.asarray(observation, np.float32))
+        if self._script is None:
+            action: NDArray[np.float32] = self._own.act(rows)
+        else:
+            import torch
+
+            with torch.no_grad():
+                action = self._script(torch.from_numpy(rows)).numpy()
+        return action if np.ndim(observation) == 2 else action[0]
