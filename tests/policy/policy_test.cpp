@@ -8,10 +8,6 @@
 
 #include "rollout/fly_fixture.hpp"
 
-#ifdef FLAPPY_HAVE_TORCH
-#include <torch/script.h>
-#endif
-
 namespace flappy::deploy {
 namespace {
 
@@ -111,25 +107,18 @@ TEST(Policy, SaysWhatItReads) {
 }
 
 #ifdef FLAPPY_HAVE_TORCH
-/// x W + b, then what `end` makes of it.
-std::string torch_script(const Folder& folder, const std::string& end = "return y") {
-  torch::jit::Module module("policy");
-  module.register_parameter("w", torch::tensor({{1.0F, 0.5F}, {2.0F, -1.0F}, {0.0F, 4.0F}}), false);
-  module.register_parameter("b", torch::tensor({0.25F, -2.0F}), false);
-  module.define("def forward(self, x):\n  y = torch.matmul(x, self.w) + self.b\n  " + end + "\n");
-  module.save(folder / "p.pt");
-  return folder / "p.pt";
-}
+/// x W + b of powers of two, as torch.jit.save of torch 1.13 left it; of "strided" the rows are not contiguous, and the others make
+/// something else of it.
+std::string script(const std::string& name) { return test::source_path("tests/data/torch_script/" + name + ".pt"); }
 
 TEST(TorchScriptPolicy, ActsOnRows) {
-  const Folder folder;
   EXPECT_TRUE(policy::reads_torch_script());
-  const auto policy = policy::load_policy(torch_script(folder), 3, 2);
+  const auto policy = policy::load_policy(script("rows"), 3, 2);
   // powers of two: exact in any order
   const std::vector<float> done = {5.25F, 10.5F, -0.25F, -4.75F};
   EXPECT_EQ(acts(*policy, 2, kSeen), done);
   EXPECT_EQ(acts(*policy, 1, kSeen), std::vector<float>(done.begin(), done.begin() + 2));
-  EXPECT_EQ(acts(*policy::load_policy(torch_script(folder, "return y.t().contiguous().t()"), 3, 2), 2, kSeen), done);
+  EXPECT_EQ(acts(*policy::load_policy(script("strided"), 3, 2), 2, kSeen), done);
 }
 
 TEST(TorchScriptPolicy, RefusesWhatIsNone) {
@@ -138,20 +127,20 @@ TEST(TorchScriptPolicy, RefusesWhatIsNone) {
   const auto refused = [](const std::string& name, int inputs = 3, int outputs = 2) {
     return message([&] { policy::load_policy(name, inputs, outputs); });
   };
-  const std::string name = torch_script(folder);
+  const std::string name = script("rows");
   EXPECT_EQ(refused(name), "accepted");
   EXPECT_EQ(refused(name, 4), name +
                                   ": does not take 4 inputs: mat1 and mat2 shapes cannot be multiplied (2x4 and 3x2)" +
                                   "; accepted: float[n][4] to float[n][2], as the task has");
   EXPECT_EQ(refused(name, 3, 4),
             name + ": makes Float[2, 2] of float[2, 3]; accepted: float[n][3] to float[n][4], as the task has");
-  EXPECT_EQ(refused(torch_script(folder, "return y[0]")), name + ": makes Float[2] of float[2, 3]" + sizes);
-  EXPECT_EQ(refused(torch_script(folder, "return y.double()")), name + ": makes Double[2, 2] of float[2, 3]" + sizes);
-  EXPECT_EQ(refused(torch_script(folder, "return (y, y)")).find(name + ": does not take 3 inputs: "), 0u);
+  EXPECT_EQ(refused(script("vector")), script("vector") + ": makes Float[2] of float[2, 3]" + sizes);
+  EXPECT_EQ(refused(script("doubles")), script("doubles") + ": makes Double[2, 2] of float[2, 3]" + sizes);
+  EXPECT_EQ(refused(script("tuple")).find(script("tuple") + ": does not take 3 inputs: "), 0u);
   const std::string good = io::read_text(name);
   for (const std::string& text : {std::string("not a zip file"), std::string(), good.substr(0, good.size() / 2)}) {
-    const std::string said = refused(folder.write("p.pt", text));
-    EXPECT_EQ(said.find(name + ": is no TorchScript file: "), 0u) << said;
+    const std::string damaged = folder.write("p.pt", text), said = refused(damaged);
+    EXPECT_EQ(said.find(damaged + ": is no TorchScript file: "), 0u) << said;
     EXPECT_EQ(said.find("\\x0a"), std::string::npos) << said;  // one line
   }
 }

@@ -310,7 +310,7 @@ TEST(ControllerHeader, TestsItself) {
                                                   "sensors.mocap.latency_s=0.0"});
   for (const int begin : {1, 60}) {
     const ControllerTrace trace = record_controller(lossy, 20, begin);
-    const ControllerLibrary late(controller_header(lossy, kRun, trace), {"gcc", "-O2"});
+    const ControllerLibrary late(controller_header(lossy, kRun, trace), {"gcc", "-O0"});
     EXPECT_EQ(late.function<float()>("w_selftest_error")(), 0) << begin;
   }
   // what is computed otherwise is found, by the trace or by a sample that gets in
@@ -320,7 +320,7 @@ TEST(ControllerHeader, TestsItself) {
     std::string text = header;
     if (text.find(right) == std::string::npos) return -1;
     text.replace(text.find(right), right.size(), wrong);
-    return ControllerLibrary(text, {"gcc", "-O2"}).function<int()>("w_selftest")();
+    return ControllerLibrary(text, {"gcc", "-O0"}).function<int()>("w_selftest")();
   };
   EXPECT_EQ(test_of("/* forward */", "/* forward */"), 0);
   EXPECT_EQ(test_of("m->integral_x += flappy", "m->integral_x += 2.0F * flappy"), 2);
