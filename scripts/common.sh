@@ -52,7 +52,13 @@ build() {
   (cd "$root" && quietly cmake --preset "$preset" "${options[@]}" && quietly cmake --build --preset "$preset" "$@")
 }
 
+# Of packages that Debian 12 does not have: installs those given into build/venv, which sees Debian's too.
+pip_install() {
+  { [ -x "$root/build/venv/bin/python" ] || /usr/bin/python3 -m venv --system-site-packages "$root/build/venv"; } &&
+    "$root/build/venv/bin/pip" install --quiet "$@"
+}
+
 # All C++ files of the project, each ended by a zero byte.
 sources() {
-  (cd "$root" && find include src tools tests examples -name '*.[ch]pp' -print0)
+  (cd "$root" && find include src tools tests examples python -name '*.[ch]pp' -print0)
 }

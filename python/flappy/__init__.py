@@ -6,20 +6,15 @@ Below them: `Batch` flies open loop, `Fleet` in closed loop. `read_flight` and `
 `flappy-identify` say. SI units; quaternions w, x, y, z, body to world; left before right.
 """
 
+from importlib.util import find_spec
+
 from ._core import Batch, Fleet, InputError, Vehicle, Wall, World, diagnose, fly, identify, instruction_sets, write_flight
-from .envs import CAUSES, FlappyEnv, FlappyVectorEnv
 from .export import export
 from .flights import read_flight
 from .policy import Policy
-from .register import register
-
-register()
 
 __all__ = [
-    "CAUSES",
     "Batch",
-    "FlappyEnv",
-    "FlappyVectorEnv",
     "Fleet",
     "InputError",
     "Policy",
@@ -34,3 +29,9 @@ __all__ = [
     "read_flight",
     "write_flight",
 ]
+
+if find_spec("gymnasium") is not None:  # pip installs it; the rest does without
+    from .envs import CAUSES, FlappyEnv, FlappyVectorEnv, register
+
+    register()
+    __all__ += ["CAUSES", "FlappyEnv", "FlappyVectorEnv"]

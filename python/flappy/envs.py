@@ -8,7 +8,7 @@ names in `env.unwrapped.observation_names`.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -42,7 +42,7 @@ def _core_of(
     return _core.Environments(Path(config), [*overrides, *own], count, modes[mode], copy)
 
 
-def _spaces(core: _core.Environments) -> tuple[Box, Box]:
+def _spaces(core: _core.Environments) -> tuple[Any, Any]:
     high = np.array([s["high"] for s in core.observed], np.float32)
     ones = np.ones(len(core.actions), np.float32)
     return Box(-high, high), Box(-ones, ones)
@@ -76,7 +76,8 @@ class _Named:
     def to_action(self, physical: Any) -> Floats:
         """The action that stands for these inputs, in the units of `action_low`; beyond the ranges it is clipped."""
         low, high = self.action_low, self.action_high
-        return np.clip(2 * (np.asarray(physical, np.float32) - low) / (high - low) - 1, -1, 1).astype(np.float32)
+        action: Floats = np.clip(2 * (np.asarray(physical, np.float32) - low) / (high - low) - 1, -1, 1)
+        return action
 
     @property
     def step_s(self) -> float:
@@ -104,11 +105,9 @@ class FlappyEnv(_Named, gymnasium.Env[Floats, Floats]):
     `info` of the step that ends an episode has `is_success` and `causes` (names of `CAUSES`).
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 50}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012 as Gymnasium has it
 
-    def __init__(
-        self, config: str | Path, overrides: Sequence[str] = (), first: int = 0, render_mode: str | None = None
-    ) -> None:
+    def __init__(self, config: str | Path, overrides: Sequence[str] = (), first: int = 0, render_mode: str | None = None) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode: is {render_mode!r}; accepted: None, 'rgb_array'")
         self.render_mode = render_mode
@@ -116,7 +115,7 @@ class FlappyEnv(_Named, gymnasium.Env[Floats, Floats]):
         self._core = _core_of(config, overrides, 1, AutoresetMode.DISABLED, True, first, 1)
         self.metadata = {**self.metadata, "render_fps": round(1 / self._core.step_s)}
         self.observation_space, self.action_space = _spaces(self._core)
-        self._shape = self.action_space.shape
+        self._shape = (len(self._core.actions),)
         self._trail: list[Any] = []
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
@@ -135,11 +134,11 @@ class FlappyEnv(_Named, gymnasium.Env[Floats, Floats]):
         if ended:
             episode = self._core.ended()
             causes = int(episode["causes"][0])
-            info["is_success"] = bool(episode["success"][0])
+            info["is_success"] = bool(episode["is_success"][0])
             info["causes"] = [name for k, name in enumerate(CAUSES) if causes >> k & 1]
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """An image, uint8 (height, width, 3): front, side and top, with the way flown since the last reset."""
         if self.render_mode is None:
             return None
@@ -154,7 +153,7 @@ class FlappyEnv(_Named, gymnasium.Env[Floats, Floats]):
         self._core.close()
 
 
-class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Floats]):
+class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Any]):
     """Many environments of a configuration, in one batch.
 
     Args:
@@ -168,8 +167,8 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Floats]
 
     Arrays are NumPy's: observation float32 (num_envs, observations), reward float32 (num_envs,), terminated and truncated bool
     (num_envs,). They speak DLPack (`torch.from_dlpack(observation)`); actions may come from any producer of it. The interpreter is free
-    while the batch steps. Where episodes end, `info` has `final_obs` (SAME_STEP), and `episode` with arrays `r`, `l`, `is_success`,
-    `causes` (bits of `CAUSES`) and the mask `_episode`.
+    while the batch steps. Where episodes end, `info` has arrays `is_success`, `causes` (bits of `CAUSES`), `return` and `length` (steps),
+    each with a mask (`_is_success`, ...); with SAME_STEP they are in `info["final_info"]`, beside `info["final_obs"]`, as Gymnasium has it.
     """
 
     def __init__(
@@ -214,18 +213,16 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Floats]
         if ended:
             episode = self._core.ended()
             mask = episode["ended"]
+            how: dict[str, Any] = {}
+            for name in ("is_success", "causes", "return", "length"):
+                how[name], how["_" + name] = episode[name], mask
             if self._same_step:
-                info["final_obs"], info["_final_obs"] = episode["observation"], mask
-            info["episode"] = {
-                "r": episode["return"],
-                "l": episode["length"],
-                "is_success": episode["success"],
-                "causes": episode["causes"],
-            }
-            info["_episode"] = mask
+                info = {"final_obs": episode["observation"], "_final_obs": mask, "final_info": how, "_final_info": mask}
+            else:
+                info = how
         return observation, reward, terminated, truncated, info
 
-    def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """The first environments' images, at most 16, uint8 (height, width, 3) each."""
         if self.render_mode is None:
             return None
@@ -236,3 +233,28 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Floats]
     def close_extras(self, **kwargs: Any) -> None:
         """Frees the simulator. Calls after it raise RuntimeError."""
         self._core.close()
+
+
+#: Each name and its configuration. Hover-v0: the four inputs of the wing beat, nobody else steers. Hover-v1: both motors' voltages.
+#: Escape-v0 and Waypoints-v0: what a policy adds to the controller. Fly-v0: any configuration, `config="my_fly.toml"`.
+CONFIGS = {
+    "Hover-v0": "fly/hover_direct.toml",
+    "Hover-v1": "fly/hover_voltages.toml",
+    "Escape-v0": "fly/escape.toml",
+    "Waypoints-v0": "fly/waypoints.toml",
+    "Fly-v0": None,
+}
+
+
+def register() -> None:
+    """Registers `flappy/...`; `import flappy` has done it, as has Gymnasium where the package is installed."""
+    for name, config in CONFIGS.items():
+        full = f"flappy/{name}"
+        if full in gymnasium.registry:
+            continue
+        gymnasium.register(
+            full,
+            entry_point="flappy.envs:FlappyEnv",
+            vector_entry_point="flappy.envs:FlappyVectorEnv",
+            kwargs={} if config is None else {"config": config},
+        )

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -80,7 +79,7 @@ def _network(module: Any) -> dict[str, Any]:
 
 def export(
     module: Any,
-    task: str | Path | gymnasium.Env[Any, Any] | gymnasium.vector.VectorEnv[Any, Any, Any],
+    task: Any,
     out: str | Path,
     *,
     overrides: Sequence[str] = (),
@@ -97,8 +96,9 @@ def export(
         task: configuration of flappy-fly or the name of one of the package's own, or an environment of it.
         out: folder.
         overrides: as `--set` takes them; an environment has its own.
-        mean, scale: (observations,): the module sees clip((observation - mean) * scale, -clip, clip), as running normalisation leaves it.
-        clip: see `mean`.
+        mean: (observations,): the module sees clip((observation - mean) * scale, -clip, clip), as running normalisation leaves it.
+        scale: (observations,).
+        clip: the end of both sides.
         everywhere: proves on every gcc and clang at hand and on a Cortex-M4F, not on `cc` alone.
 
     Returns:
@@ -113,7 +113,7 @@ def export(
 
     if not isinstance(task, str | Path):
         own = task.unwrapped
-        task, overrides = own.config, own.overrides  # type: ignore[union-attr]
+        task, overrides = own.config, own.overrides
     network = _network(module)
     inputs, outputs = _core.task_sizes(Path(task), list(overrides))
     if (network["widths"][0], network["widths"][-1]) != (inputs, outputs):
@@ -124,9 +124,7 @@ def export(
     for name, given in (("mean", shift), ("scale", factor)):
         if given.shape != (inputs,) or not np.isfinite(given).all():
             raise ValueError(f"{name}: is of shape {given.shape}; accepted: finite numbers of shape ({inputs},)")
-    result = _core.Export(
-        Path(task), list(overrides), *network.values(), mean=shift.tolist(), scale=factor.tolist(), clip=float(clip)
-    )
+    result = _core.Export(Path(task), list(overrides), **network, mean=shift.tolist(), scale=factor.tolist(), clip=float(clip))
     observation, action = result.flown()
     seen = np.clip((observation - shift.astype(np.float32)) * factor.astype(np.float32), -clip, clip).astype(np.float32)
     parameter = next(module.parameters())

@@ -43,7 +43,8 @@ Array<T> make_array(std::initializer_list<std::size_t> shape) {
   std::size_t size = 1;
   for (const std::size_t n : shape) size *= n;
   auto* data = new T[size]();
-  return Array<T>(data, shape.size(), shape.begin(), nb::capsule(data, [](void* p) noexcept { delete[] static_cast<T*>(p); }));
+  return Array<T>(data, shape.size(), shape.begin(),
+                  nb::capsule(data, [](void* p) noexcept { delete[] static_cast<T*>(p); }));
 }
 
 /// One call at a time: RuntimeError where another thread is in one.

@@ -26,18 +26,22 @@ class Interruptible {
   Interruptible(const Interruptible&) = delete;
 
  private:
-  struct sigaction interrupt_ {}, terminate_ {};
+  struct sigaction interrupt_ {
+  }, terminate_{};
 };
 
-nb::object of_json(const nlohmann::ordered_json& json) { return nb::module_::import_("json").attr("loads")(json.dump()); }
+nb::object of_json(const nlohmann::ordered_json& json) {
+  return nb::module_::import_("json").attr("loads")(json.dump());
+}
 
 [[noreturn]] void interrupted() {
   PyErr_SetNone(PyExc_KeyboardInterrupt);
   throw nb::python_error();
 }
 
-nb::object diagnose(const std::filesystem::path& vehicle, const std::vector<std::string>& flights, const std::string& out,
-                    const std::vector<std::string>& withheld, const std::string& manoeuvre, int threads) {
+nb::object diagnose(const std::filesystem::path& vehicle, const std::vector<std::string>& flights,
+                    const std::string& out, const std::vector<std::string>& withheld, const std::string& manoeuvre,
+                    int threads) {
   gap::DiagnoseCommand command;
   command.vehicle = found(vehicle);
   command.flights = flights;
@@ -58,8 +62,9 @@ nb::object diagnose(const std::filesystem::path& vehicle, const std::vector<std:
   return of_json(json);
 }
 
-nb::dict identify(const std::filesystem::path& vehicle_file, const std::filesystem::path& measured_file, const std::filesystem::path& config_file,
-                  const std::vector<std::string>& parameters, int starts, std::uint64_t seed, int threads) {
+nb::dict identify(const std::filesystem::path& vehicle_file, const std::filesystem::path& measured_file,
+                  const std::filesystem::path& config_file, const std::vector<std::string>& parameters, int starts,
+                  std::uint64_t seed, int threads) {
   identify::ForceFit fit;
   model::Vehicle vehicle;
   bool stopped = false;
@@ -98,12 +103,16 @@ nb::dict identify(const std::filesystem::path& vehicle_file, const std::filesyst
 }  // namespace
 
 void bind_diagnosis(nb::module_& m) {
-  m.def("diagnose", &diagnose, "vehicle"_a, "flights"_a, "out"_a = "", "withheld"_a = std::vector<std::string>{}, "manoeuvre"_a = "", "threads"_a = 0,
-        "What flappy-gap diagnose says of flight logs: the content of diagnosis.json. `vehicle`: the file as it was believed; `flights`: folders of "
-        "logs; `out`: folder for its files, the corrected vehicle among them. InputError for what cannot be read; KeyboardInterrupt.");
-  m.def("identify", &identify, "vehicle"_a, "measured"_a, "config"_a = "identify/forces.toml", "parameters"_a = std::vector<std::string>{}, "starts"_a = 3,
-        "seed"_a = 1, "threads"_a = 0,
-        "Fits a vehicle to a measured force map, as flappy-identify forces does: vehicle (a Vehicle), parameters (name, value, the 95 % interval low to "
+  m.def("diagnose", &diagnose, "vehicle"_a, "flights"_a, "out"_a = "", "withheld"_a = std::vector<std::string>{},
+        "manoeuvre"_a = "", "threads"_a = 0,
+        "What flappy-gap diagnose says of flight logs: the content of diagnosis.json. `vehicle`: the file as it was "
+        "believed; `flights`: folders of "
+        "logs; `out`: folder for its files, the corrected vehicle among them. InputError for what cannot be read; "
+        "KeyboardInterrupt.");
+  m.def("identify", &identify, "vehicle"_a, "measured"_a, "config"_a = "identify/forces.toml",
+        "parameters"_a = std::vector<std::string>{}, "starts"_a = 3, "seed"_a = 1, "threads"_a = 0,
+        "Fits a vehicle to a measured force map, as flappy-identify forces does: vehicle (a Vehicle), parameters "
+        "(name, value, the 95 % interval low to "
         "high, ...), error_before_percent, error_after_percent, misfit (1 where noise alone is left), starts_agreed.");
 }
 

@@ -42,11 +42,12 @@ using Shown = std::array<nb::object, 4>;
 
 class PyEnvironments {
  public:
-  PyEnvironments(const std::filesystem::path& config, const std::vector<std::string>& overrides, std::size_t count,
+  PyEnvironments(const std::filesystem::path& config, const std::vector<std::string>& overrides, std::int64_t count,
                  const std::string& autoreset, bool copy)
       : pool_(std::make_shared<Pool>()), copy_(copy) {
-    rollout::EnvironmentOptions options{count, rollout::Autoreset::same_step};
-    if (count < 1 || count > 1'000'000) throw nb::value_error(("num_envs: is " + std::to_string(count) + "; accepted: 1 to 1000000").c_str());
+    rollout::EnvironmentOptions options{static_cast<std::size_t>(count), rollout::Autoreset::same_step};
+    if (count < 1 || count > 1'000'000)
+      throw nb::value_error(("num_envs: is " + std::to_string(count) + "; accepted: 1 to 1000000").c_str());
     if (autoreset == "next_step") options.autoreset = rollout::Autoreset::next_step;
     if (autoreset == "disabled") options.autoreset = rollout::Autoreset::disabled;
     const nb::gil_scoped_release free;
@@ -74,7 +75,9 @@ class PyEnvironments {
     const Turn turn(busy_, "the environment");
     const std::size_t count = all().count();
     if (which.size() != count)
-      throw nb::value_error(("reset_mask: has shape " + shape_text({{which.size()}}) + "; accepted: bool of shape " + shape_text({{count}})).c_str());
+      throw nb::value_error(("reset_mask: has shape " + shape_text({{which.size()}}) + "; accepted: bool of shape " +
+                             shape_text({{count}}))
+                                .c_str());
     Buffer& buffer = fresh();
     std::copy(last_.begin(), last_.end(), buffer.observation.begin());
     {
@@ -91,7 +94,8 @@ class PyEnvironments {
     Buffer& buffer = fresh();
     {
       const nb::gil_scoped_release free;
-      all().step(floats.data(), {buffer.observation.data(), buffer.reward.data(), buffer.terminated.get(), buffer.truncated.get()});
+      all().step(floats.data(),
+                 {buffer.observation.data(), buffer.reward.data(), buffer.terminated.get(), buffer.truncated.get()});
     }
     keep(buffer);
     return nb::make_tuple(shown_[0], shown_[1], shown_[2], shown_[3], std::ranges::count(all().ended(), true));
@@ -110,7 +114,8 @@ class PyEnvironments {
     for (std::size_t i = 0; i < n; ++i) {
       if (!(mask.data()[i] = e.ended()[i])) continue;
       const rollout::EndedEpisode& episode = e.episodes()[i];
-      std::copy_n(e.final_observation() + i * observations(), observations(), final_observation.data() + i * observations());
+      std::copy_n(e.final_observation() + i * observations(), observations(),
+                  final_observation.data() + i * observations());
       episode_return.data()[i] = episode.episode_return;
       length.data()[i] = static_cast<std::int32_t>(episode.length);
       success.data()[i] = episode.success;
@@ -118,7 +123,7 @@ class PyEnvironments {
     }
     nb::dict d;
     d["ended"] = mask, d["observation"] = final_observation, d["return"] = episode_return, d["length"] = length;
-    d["success"] = success, d["causes"] = causes;
+    d["is_success"] = success, d["causes"] = causes;
     return d;
   }
 
@@ -147,7 +152,6 @@ class PyEnvironments {
     all_.reset();
   }
 
-
  private:
   /// Where the next step is written: what nobody looks at any more, or, of views, the other one of two.
   Buffer& fresh() {
@@ -168,8 +172,10 @@ class PyEnvironments {
     if (!lease->buffer) lease->buffer = std::make_unique<Buffer>(n, m);
     Buffer& b = *lease->buffer;
     const nb::capsule owner(lease.release(), [](void* p) noexcept { delete static_cast<Lease*>(p); });
-    shown_ = {nb::cast(Array<float>(b.observation.data(), {n, m}, owner)), nb::cast(Array<float>(b.reward.data(), {n}, owner)),
-              nb::cast(Array<bool>(b.terminated.get(), {n}, owner)), nb::cast(Array<bool>(b.truncated.get(), {n}, owner))};
+    shown_ = {nb::cast(Array<float>(b.observation.data(), {n, m}, owner)),
+              nb::cast(Array<float>(b.reward.data(), {n}, owner)),
+              nb::cast(Array<bool>(b.terminated.get(), {n}, owner)),
+              nb::cast(Array<bool>(b.truncated.get(), {n}, owner))};
     if (!copy_) {
       turn_ = views_.size();
       views_.emplace_back(&b, shown_);
@@ -204,19 +210,33 @@ nb::list signals(const std::vector<flight::Signal>& list) {
 }  // namespace
 
 void bind_environments(nb::module_& m) {
-  nb::class_<PyEnvironments>(m, "Environments", "Many environments of one configuration, stepped together; flappy.envs shows them to Gymnasium.")
-      .def(nb::init<const std::filesystem::path&, const std::vector<std::string>&, std::size_t, const std::string&, bool>(),
+  nb::class_<PyEnvironments>(
+      m, "Environments",
+      "Many environments of one configuration, stepped together; flappy.envs shows them to Gymnasium.")
+      .def(nb::init<const std::filesystem::path&, const std::vector<std::string>&, std::int64_t, const std::string&,
+                    bool>(),
            "config"_a, "overrides"_a, "count"_a, "autoreset"_a, "copy"_a)
-      .def("reset", &PyEnvironments::reset, "seed"_a.none(), "Starts all anew; float32 (count, observations).")
-      .def("reset_some", &PyEnvironments::reset_some, "which"_a.noconvert(), "Starts those that are marked anew: bool (count,).")
-      .def("step", &PyEnvironments::step, "action"_a.noconvert().none(),
-           "One action of each, float32 (count, actions) in [-1, 1]: observation, reward, terminated, truncated, and how many ended.")
+      .def("reset", &PyEnvironments::reset, nb::sig("def reset(self, seed: int | None) -> NDArray[numpy.float32]"),
+           "seed"_a.none(), "Starts all anew; float32 (count, observations).")
+      .def("reset_some", &PyEnvironments::reset_some,
+           nb::sig("def reset_some(self, which: NDArray[numpy.bool_]) -> NDArray[numpy.float32]"),
+           "which"_a.noconvert(), "Starts those that are marked anew: bool (count,).")
+      .def("step", &PyEnvironments::step,
+           nb::sig("def step(self, action: object) -> tuple[NDArray[numpy.float32], NDArray[numpy.float32], "
+                   "NDArray[numpy.bool_], NDArray[numpy.bool_], int]"),
+           "action"_a.noconvert().none(),
+           "One action of each, float32 (count, actions) in [-1, 1]: observation, reward, terminated, truncated, and "
+           "how many ended.")
       .def("ended", &PyEnvironments::ended, "Episodes that ended in the last step.")
       .def("pose", &PyEnvironments::pose, "i"_a, "True pose and wings of one, SI units.")
-      .def("hash", [](const PyEnvironments& e, std::size_t first, std::size_t last) {
-             if (first > last || last > e.all().count()) throw nb::index_error("hash: accepted: first <= last <= num_envs");
-             return e.all().hash(first, last);
-           }, "first"_a, "last"_a, "Of how vehicles [first, last) move, as flappy-fly prints it.")
+      .def(
+          "hash",
+          [](const PyEnvironments& e, std::size_t first, std::size_t last) {
+            if (first > last || last > e.all().count())
+              throw nb::index_error("hash: accepted: first <= last <= num_envs");
+            return e.all().hash(first, last);
+          },
+          "first"_a, "last"_a, "Of how vehicles [first, last) move, as flappy-fly prints it.")
       .def("close", &PyEnvironments::close)
       .def_prop_ro("count", [](const PyEnvironments& e) { return e.all().count(); })
       .def_prop_ro("step_s", [](const PyEnvironments& e) { return e.all().step_s(); })

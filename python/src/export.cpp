@@ -24,8 +24,9 @@ using Numbers = std::vector<double>;
 /// What is exported, in memory until it is proven.
 class PyExport {
  public:
-  PyExport(const std::filesystem::path& config, const std::vector<std::string>& overrides, const std::vector<int>& widths, const std::string& hidden,
-           bool layer_norm, bool linear, const Numbers& weights, const Numbers& mean, const Numbers& scale, double clip) {
+  PyExport(const std::filesystem::path& config, const std::vector<std::string>& overrides,
+           const std::vector<int>& widths, const std::string& hidden, bool layer_norm, bool linear,
+           const Numbers& weights, const Numbers& mean, const Numbers& scale, double clip) {
     const nb::gil_scoped_release free;
     rollout::FlyConfig fly = rollout::read_fly_config(found(config), overrides);
     const flight::Task& task = fly.fleet.task;
@@ -35,7 +36,8 @@ class PyExport {
     for (const flight::Signal& s : task.action()) actor.action.push_back(s.name);
     actor.widths = widths;
     actor.layer_norm = layer_norm, actor.linear = linear;
-    actor.hidden = static_cast<policy::Activation>(std::ranges::find(policy::kActivationNames, hidden) - policy::kActivationNames);
+    actor.hidden =
+        static_cast<policy::Activation>(std::ranges::find(policy::kActivationNames, hidden) - policy::kActivationNames);
     actor.weights = weights, actor.mean = mean, actor.scale = scale, actor.clip = clip;
     // through its file, which refuses what is no actor
     const io::TemporaryFolder work;
@@ -62,7 +64,8 @@ class PyExport {
   /// Observations of flights, and what the exported network does upon them, in [-1, 1].
   nb::tuple flown() const {
     const policy::PolicyVectors some = deploy::some_of(flown_, kProofVectors);
-    const auto inputs = static_cast<std::size_t>(network_.inputs()), outputs = static_cast<std::size_t>(network_.outputs());
+    const auto inputs = static_cast<std::size_t>(network_.inputs()),
+               outputs = static_cast<std::size_t>(network_.outputs());
     auto observation = make_array<float>({some.rows(), inputs}), action = make_array<float>({some.rows(), outputs});
     std::ranges::copy(some.observation, observation.data());
     const std::vector<float> adds = deploy::evaluate(network_, some.observation);
@@ -85,7 +88,8 @@ class PyExport {
     if (std::ranges::none_of(rows, &deploy::Parity::available))
       throw io::InputError("cc: is not in PATH, and nothing is written that is not proven; accepted: a C compiler");
     if (std::ranges::any_of(rows, &deploy::Parity::failed))
-      throw std::runtime_error("flappy_policy.h does not compute what the network does; nothing is written:\n" + deploy::table_of(rows));
+      throw std::runtime_error("flappy_policy.h does not compute what the network does; nothing is written:\n" +
+                               deploy::table_of(rows));
     return json_of(rows).dump();
   }
 
@@ -109,16 +113,20 @@ class PyExport {
 
 void bind_export(nb::module_& m) {
   nb::class_<PyExport>(m, "Export")
-      .def(nb::init<const std::filesystem::path&, const std::vector<std::string>&, const std::vector<int>&, const std::string&, bool, bool,
-                    const Numbers&, const Numbers&, const Numbers&, double>(),
-           "config"_a, "overrides"_a, "widths"_a, "hidden"_a, "layer_norm"_a, "linear"_a, "weights"_a, "mean"_a, "scale"_a, "clip"_a)
+      .def(nb::init<const std::filesystem::path&, const std::vector<std::string>&, const std::vector<int>&,
+                    const std::string&, bool, bool, const Numbers&, const Numbers&, const Numbers&, double>(),
+           "config"_a, "overrides"_a, "widths"_a, "hidden"_a, "layer_norm"_a, "linear"_a, "weights"_a, "mean"_a,
+           "scale"_a, "clip"_a)
       .def("flown", &PyExport::flown)
       .def("prove", &PyExport::prove, "everywhere"_a)
       .def("write", &PyExport::write, "out"_a);
-  m.def("task_sizes", [](const std::filesystem::path& config, const std::vector<std::string>& overrides) {
-    const rollout::FlyConfig fly = rollout::read_fly_config(found(config), overrides);
-    return std::pair(fly.fleet.task.observation().size(), fly.fleet.task.action().size());
-  }, "config"_a, "overrides"_a);
+  m.def(
+      "task_sizes",
+      [](const std::filesystem::path& config, const std::vector<std::string>& overrides) {
+        const rollout::FlyConfig fly = rollout::read_fly_config(found(config), overrides);
+        return std::pair(fly.fleet.task.observation().size(), fly.fleet.task.action().size());
+      },
+      "config"_a, "overrides"_a);
 }
 
 }  // namespace flappy::python

@@ -36,7 +36,8 @@ class PyFleet {
     const Turn turn(busy_, "the fleet");
     auto array = width > 0 ? make_array<T>({size(), width}) : make_array<T>({size()});
     with([&](auto& f) {
-      for (std::size_t i = 0; i < f.fleet().size(); ++i) put(f.fleet(), i, array.data() + i * std::max<std::size_t>(width, 1));
+      for (std::size_t i = 0; i < f.fleet().size(); ++i)
+        put(f.fleet(), i, array.data() + i * std::max<std::size_t>(width, 1));
     });
     return array;
   }
@@ -49,70 +50,96 @@ class PyFleet {
 
 nb::dict motion(const PyFleet& fleet, const auto& of) {
   nb::dict d;
-  d["position_m"] = fleet.rows(3, [&](auto& f, std::size_t i, double* to) { std::ranges::copy(of(f, i).position_m, to); });
+  d["position_m"] =
+      fleet.rows(3, [&](auto& f, std::size_t i, double* to) { std::ranges::copy(of(f, i).position_m, to); });
   d["attitude"] = fleet.rows(4, [&](auto& f, std::size_t i, double* to) { std::ranges::copy(of(f, i).attitude, to); });
-  d["velocity_m_s"] = fleet.rows(3, [&](auto& f, std::size_t i, double* to) { std::ranges::copy(of(f, i).velocity_m_s, to); });
-  d["body_rate_rad_s"] = fleet.rows(3, [&](auto& f, std::size_t i, double* to) { std::ranges::copy(of(f, i).body_rate_rad_s, to); });
+  d["velocity_m_s"] =
+      fleet.rows(3, [&](auto& f, std::size_t i, double* to) { std::ranges::copy(of(f, i).velocity_m_s, to); });
+  d["body_rate_rad_s"] =
+      fleet.rows(3, [&](auto& f, std::size_t i, double* to) { std::ranges::copy(of(f, i).body_rate_rad_s, to); });
   return d;
 }
 
 void bind_fleet(nb::module_& m) {
   nb::class_<PyFleet>(m, "Fleet",
-                      "Many flights of a configuration of flappy-fly, in closed loop with its sensors, estimator and controller, and its actor "
+                      "Many flights of a configuration of flappy-fly, in closed loop with its sensors, estimator and "
+                      "controller, and its actor "
                       "where it has one. A row for each flapper, SI units.")
-      .def("__init__",
-           [](PyFleet* self, const std::filesystem::path& config, std::int64_t count, const std::vector<std::string>& overrides) {
-             if (count < 1) throw nb::value_error(("count: is " + std::to_string(count) + "; accepted: 1 and more").c_str());
-             new (self) PyFleet(config, overrides, static_cast<std::size_t>(count));
-           },
-           "config"_a, "count"_a = 1, "overrides"_a = std::vector<std::string>{})
+      .def(
+          "__init__",
+          [](PyFleet* self, const std::filesystem::path& config, std::int64_t count,
+             const std::vector<std::string>& overrides) {
+            if (count < 1)
+              throw nb::value_error(("count: is " + std::to_string(count) + "; accepted: 1 and more").c_str());
+            new (self) PyFleet(config, overrides, static_cast<std::size_t>(count));
+          },
+          "config"_a, "count"_a = 1, "overrides"_a = std::vector<std::string>{})
       .def("__len__", &PyFleet::size)
-      .def("step",
-           [](const PyFleet& fleet, int periods) {
-             if (periods < 0) throw nb::value_error("periods: accepted: 0 and more");
-             const Turn turn(fleet.busy(), "the fleet");
-             const nb::gil_scoped_release free;
-             fleet.with([&](auto& f) {
-               for (int k = 0; k < periods; ++k) f.step();
-             });
-           },
-           "periods"_a = 1, "Flies all for so many control periods; the interpreter is free meanwhile.")
+      .def(
+          "step",
+          [](const PyFleet& fleet, int periods) {
+            if (periods < 0) throw nb::value_error("periods: accepted: 0 and more");
+            const Turn turn(fleet.busy(), "the fleet");
+            const nb::gil_scoped_release free;
+            fleet.with([&](auto& f) {
+              for (int k = 0; k < periods; ++k) f.step();
+            });
+          },
+          "periods"_a = 1, "Flies all for so many control periods; the interpreter is free meanwhile.")
       .def_prop_ro("t_s", [](const PyFleet& fleet) { return fleet.with([](auto& f) { return f.t_s(); }); })
-      .def_prop_ro("period_s", [](const PyFleet& fleet) { return fleet.with([](auto& f) { return f.fleet().period_s(); }); })
-      .def("truth", [](const PyFleet& fleet) { return motion(fleet, [](auto& f, std::size_t i) { return f.truth(i); }); },
-           "True motion: position_m (count, 3), attitude (count, 4), velocity_m_s (count, 3), body_rate_rad_s (count, 3).")
-      .def("estimate", [](const PyFleet& fleet) { return motion(fleet, [](auto& f, std::size_t i) { return f.estimate(i); }); },
-           "As the estimator has it.")
-      .def("inputs",
-           [](const PyFleet& fleet) {
-             return fleet.rows(4, [](auto& f, std::size_t i, double* to) {
-               const sim::Input u = f.input(i);
-               to[0] = u.amplitude_V, to[1] = u.difference_V, to[2] = u.bias_V, to[3] = u.split_cycle;
-             });
-           },
-           "Of the wing beat (count, 4): V, V, V and fractions of a beat, as last set, before the driver clips them.")
-      .def("observations",
-           [](const PyFleet& fleet) {
-             const std::size_t width = fleet.with([](auto& f) { return f.fleet().observation(0).size(); });
-             return fleet.rows<float>(width, [](auto& f, std::size_t i, float* to) {
-               for (const double x : f.observation(i)) *to++ = static_cast<float>(x);
-             });
-           },
-           "Of the task, float32 (count, observations).")
-      .def("rewards", [](const PyFleet& fleet) { return fleet.rows(0, [](auto& f, std::size_t i, double* to) { *to = f.reward(i); }); },
-           "Of the last control period (count,).")
-      .def("ended",
-           [](const PyFleet& fleet) { return fleet.rows<std::uint32_t>(0, [](auto& f, std::size_t i, std::uint32_t* to) { *to = f.ended(i); }); },
-           "Why each one's task is over, bits, uint32 (count,): 1 time out, 2 contact, 4 not finite, 8 out of bounds, 16 heading late, 32 arrival late.")
-      .def("hash",
-           [](const PyFleet& fleet) {
-             return fleet.with([](auto& f) {
-               std::uint64_t hash = 0;
-               for (std::size_t i = 0; i < f.fleet().size(); ++i) hash = sim::mixed(hash, f.fleet().batch().hash(i, i + 1));
-               return hash;
-             });
-           },
-           "Of how all vehicles move, as flappy-fly prints it.");
+      .def_prop_ro("period_s",
+                   [](const PyFleet& fleet) { return fleet.with([](auto& f) { return f.fleet().period_s(); }); })
+      .def(
+          "truth",
+          [](const PyFleet& fleet) { return motion(fleet, [](auto& f, std::size_t i) { return f.truth(i); }); },
+          "True motion: position_m (count, 3), attitude (count, 4), velocity_m_s (count, 3), body_rate_rad_s (count, "
+          "3).")
+      .def(
+          "estimate",
+          [](const PyFleet& fleet) { return motion(fleet, [](auto& f, std::size_t i) { return f.estimate(i); }); },
+          "As the estimator has it.")
+      .def(
+          "inputs",
+          [](const PyFleet& fleet) {
+            return fleet.rows(4, [](auto& f, std::size_t i, double* to) {
+              const sim::Input u = f.input(i);
+              to[0] = u.amplitude_V, to[1] = u.difference_V, to[2] = u.bias_V, to[3] = u.split_cycle;
+            });
+          },
+          "Of the wing beat (count, 4): V, V, V and fractions of a beat, as last set, before the driver clips them.")
+      .def(
+          "observations",
+          [](const PyFleet& fleet) {
+            const std::size_t width = fleet.with([](auto& f) { return f.fleet().observation(0).size(); });
+            return fleet.rows<float>(width, [](auto& f, std::size_t i, float* to) {
+              for (const double x : f.observation(i)) *to++ = static_cast<float>(x);
+            });
+          },
+          "Of the task, float32 (count, observations).")
+      .def(
+          "rewards",
+          [](const PyFleet& fleet) {
+            return fleet.rows(0, [](auto& f, std::size_t i, double* to) { *to = f.reward(i); });
+          },
+          "Of the last control period (count,).")
+      .def(
+          "ended",
+          [](const PyFleet& fleet) {
+            return fleet.rows<std::uint32_t>(0, [](auto& f, std::size_t i, std::uint32_t* to) { *to = f.ended(i); });
+          },
+          "Why each one's task is over, bits, uint32 (count,): 1 time out, 2 contact, 4 not finite, 8 out of bounds, "
+          "16 heading late, 32 arrival late.")
+      .def(
+          "hash",
+          [](const PyFleet& fleet) {
+            return fleet.with([](auto& f) {
+              std::uint64_t hash = 0;
+              for (std::size_t i = 0; i < f.fleet().size(); ++i)
+                hash = sim::mixed(hash, f.fleet().batch().hash(i, i + 1));
+              return hash;
+            });
+          },
+          "Of how all vehicles move, as flappy-fly prints it.");
 }
 
 // ---- flight logs: a dict of streams, each a dict of columns
@@ -125,24 +152,40 @@ struct NamedColumn {
 /// Calls visit(stream's name, its columns) for all that a log has.
 void streams(FlightLog& log, const auto& visit) {
   auto& c = log.command;
-  std::vector<NamedColumn> command = {{"t_s", &c.t_s}, {"left_voltage_V", &c.left_voltage_V}, {"right_voltage_V", &c.right_voltage_V}};
+  std::vector<NamedColumn> command = {
+      {"t_s", &c.t_s}, {"left_voltage_V", &c.left_voltage_V}, {"right_voltage_V", &c.right_voltage_V}};
   if (c.inputs)
-    command.insert(command.end(), {{"amplitude_V", &c.inputs->amplitude_V}, {"difference_V", &c.inputs->difference_V},
-                                   {"bias_V", &c.inputs->bias_V}, {"split_cycle", &c.inputs->split_cycle}});
+    command.insert(command.end(), {{"amplitude_V", &c.inputs->amplitude_V},
+                                   {"difference_V", &c.inputs->difference_V},
+                                   {"bias_V", &c.inputs->bias_V},
+                                   {"split_cycle", &c.inputs->split_cycle}});
   if (c.phase_rad) command.push_back({"phase_rad", &*c.phase_rad});
   visit("command", command);
   auto& p = log.mocap;
-  visit("mocap", std::vector<NamedColumn>{{"t_s", &p.t_s}, {"x_m", &p.x_m}, {"y_m", &p.y_m}, {"z_m", &p.z_m}, {"qw", &p.qw}, {"qx", &p.qx},
-                                          {"qy", &p.qy}, {"qz", &p.qz}});
+  visit("mocap", std::vector<NamedColumn>{{"t_s", &p.t_s},
+                                          {"x_m", &p.x_m},
+                                          {"y_m", &p.y_m},
+                                          {"z_m", &p.z_m},
+                                          {"qw", &p.qw},
+                                          {"qx", &p.qx},
+                                          {"qy", &p.qy},
+                                          {"qz", &p.qz}});
   auto& u = log.imu;
-  visit("imu", std::vector<NamedColumn>{{"t_s", &u.t_s}, {"gyro_x_rad_s", &u.gyro_x_rad_s}, {"gyro_y_rad_s", &u.gyro_y_rad_s},
-                                        {"gyro_z_rad_s", &u.gyro_z_rad_s}, {"accel_x_m_s2", &u.accel_x_m_s2},
-                                        {"accel_y_m_s2", &u.accel_y_m_s2}, {"accel_z_m_s2", &u.accel_z_m_s2}});
+  visit("imu", std::vector<NamedColumn>{{"t_s", &u.t_s},
+                                        {"gyro_x_rad_s", &u.gyro_x_rad_s},
+                                        {"gyro_y_rad_s", &u.gyro_y_rad_s},
+                                        {"gyro_z_rad_s", &u.gyro_z_rad_s},
+                                        {"accel_x_m_s2", &u.accel_x_m_s2},
+                                        {"accel_y_m_s2", &u.accel_y_m_s2},
+                                        {"accel_z_m_s2", &u.accel_z_m_s2}});
   if (log.power)
-    visit("power", std::vector<NamedColumn>{{"t_s", &log.power->t_s}, {"battery_V", &log.power->battery_V},
-                                            {"left_current_A", &log.power->left_current_A}, {"right_current_A", &log.power->right_current_A}});
+    visit("power", std::vector<NamedColumn>{{"t_s", &log.power->t_s},
+                                            {"battery_V", &log.power->battery_V},
+                                            {"left_current_A", &log.power->left_current_A},
+                                            {"right_current_A", &log.power->right_current_A}});
   if (log.wings)
-    visit("wings", std::vector<NamedColumn>{{"t_s", &log.wings->t_s}, {"left_stroke_rad", &log.wings->left_stroke_rad},
+    visit("wings", std::vector<NamedColumn>{{"t_s", &log.wings->t_s},
+                                            {"left_stroke_rad", &log.wings->left_stroke_rad},
                                             {"left_rotation_rad", &log.wings->left_rotation_rad},
                                             {"right_stroke_rad", &log.wings->right_stroke_rad},
                                             {"right_rotation_rad", &log.wings->right_rotation_rad}});
@@ -178,9 +221,12 @@ void write_flight(const std::filesystem::path& folder, const nb::dict& flight) {
     for (const nb::handle column : value.attr("keys")()) {
       const std::string column_name = nb::cast<std::string>(column);
       head += (head.empty() ? "" : ",") + column_name;
-      const nb::object array = nb::module_::import_("numpy").attr("ascontiguousarray")(value[column], "dtype"_a = "float64");
+      const nb::object array =
+          nb::module_::import_("numpy").attr("ascontiguousarray")(value[column], "dtype"_a = "float64");
       if (!nb::try_cast(array, columns.emplace_back(), false) || columns.back().size() != columns.front().size())
-        throw nb::value_error((name + "." + column_name + ": is " + described(value[column]) + "; accepted: one number in each row").c_str());
+        throw nb::value_error(
+            (name + "." + column_name + ": is " + described(value[column]) + "; accepted: one number in each row")
+                .c_str());
     }
     std::string text = head + "\n";
     for (std::size_t row = 0; !columns.empty() && row < columns.front().size(); ++row)
@@ -192,7 +238,8 @@ void write_flight(const std::filesystem::path& folder, const nb::dict& flight) {
 }
 
 /// Seconds that `steps` steps of `periods` control periods take the fleet alone: what environments are measured by.
-double fleet_seconds(const std::filesystem::path& config, const std::vector<std::string>& overrides, std::size_t count, int periods, int steps) {
+double fleet_seconds(const std::filesystem::path& config, const std::vector<std::string>& overrides, std::size_t count,
+                     int periods, int steps) {
   const rollout::FlyConfig fly = rollout::read_fly_config(found(config), overrides);
   const nb::gil_scoped_release free;
   flight::Fleet<float> fleet(count, fly.vehicle, fly.fleet);
@@ -227,10 +274,13 @@ nb::dict fly(const std::filesystem::path& config, const std::vector<std::string>
 void bind_flights(nb::module_& m) {
   bind_fleet(m);
   m.def("read_flight", &read_flight, "folder"_a,
-        "A flight log: \"header\" (the text of flight.toml) and the streams command, mocap, imu, and power and wings where it has them, each a dict "
-        "of columns, float64 (samples,), in the units that their names end with. InputError: \"file:line: what; what is accepted\".");
+        "A flight log: \"header\" (the text of flight.toml) and the streams command, mocap, imu, and power and wings "
+        "where it has them, each a dict "
+        "of columns, float64 (samples,), in the units that their names end with. InputError: \"file:line: what; what "
+        "is accepted\".");
   m.def("write_flight", &write_flight, "folder"_a, "flight"_a,
-        "Writes what read_flight reads, whole or not at all; streams may be pandas frames. InputError for what would be refused when read.");
+        "Writes what read_flight reads, whole or not at all; streams may be pandas frames. InputError for what would "
+        "be refused when read.");
   m.def("fleet_seconds", &fleet_seconds, "config"_a, "overrides"_a, "count"_a, "periods"_a, "steps"_a);
   m.def("fly", &fly, "config"_a, "overrides"_a = std::vector<std::string>{}, "count"_a = 1, "log"_a = nb::none(),
         "What flappy-fly does: hash, successes, flown_s, logs.");

@@ -8,7 +8,8 @@ namespace flappy::python {
 
 std::string shape_text(std::span<const std::size_t> shape) {
   std::string text = "(";
-  for (const std::size_t& n : shape) text += std::to_string(n) + (shape.size() == 1 ? "," : &n == &shape.back() ? "" : ", ");
+  for (const std::size_t& n : shape)
+    text += std::to_string(n) + (shape.size() == 1 ? "," : &n == &shape.back() ? "" : ", ");
   return text + ")";
 }
 
@@ -44,7 +45,8 @@ Floats::Floats(nb::handle value, const char* name, std::initializer_list<std::si
     place = "[" + std::to_string(rest % shape.begin()[k]) + "]" + place;
   throw nb::value_error((name + place + ": is " + io::shortest_digits(static_cast<double>(array_.data()[first])) +
                          ", one of " + std::to_string(outside) + " outside" + accepted + ", each from " +
-                         io::shortest_digits(-static_cast<double>(most)) + " to " + io::shortest_digits(static_cast<double>(most)))
+                         io::shortest_digits(-static_cast<double>(most)) + " to " +
+                         io::shortest_digits(static_cast<double>(most)))
                             .c_str());
 }
 
@@ -61,7 +63,8 @@ std::filesystem::path found(const std::filesystem::path& file) {
 std::size_t checked_index(std::int64_t i, std::size_t count) {
   const auto n = static_cast<std::int64_t>(count);
   if (i < -n || i >= n)
-    throw nb::index_error(("index " + std::to_string(i) + ": accepted: " + std::to_string(-n) + " to " + std::to_string(n - 1)).c_str());
+    throw nb::index_error(
+        ("index " + std::to_string(i) + ": accepted: " + std::to_string(-n) + " to " + std::to_string(n - 1)).c_str());
   return static_cast<std::size_t>(i < 0 ? i + n : i);
 }
 

@@ -11,7 +11,8 @@ namespace {
 /// One of a run folder or of a C header.
 class PyPolicy {
  public:
-  PyPolicy(const std::filesystem::path& path, int observations, int actions) : observations_(observations), actions_(actions) {
+  PyPolicy(const std::filesystem::path& path, int observations, int actions)
+      : observations_(observations), actions_(actions) {
     if (observations > 0) {
       policy_ = policy::load_policy(path, observations, actions);
       return;
@@ -27,15 +28,19 @@ class PyPolicy {
     const Turn turn(busy_, "the policy");
     const nb::object array = nb::module_::import_("numpy").attr("asarray")(observation);
     if (nb::cast<int>(array.attr("ndim")) != 2)
-      throw nb::value_error(("observation: is " + described(observation) + "; accepted: float32 of shape (n, " + std::to_string(observations_) + ")").c_str());
+      throw nb::value_error(("observation: is " + described(observation) + "; accepted: float32 of shape (n, " +
+                             std::to_string(observations_) + ")")
+                                .c_str());
     const auto rows = nb::cast<std::size_t>(array.attr("shape")[0]);
-    const Floats floats(array, "observation", {rows, static_cast<std::size_t>(observations_)}, std::numeric_limits<float>::max());
+    const Floats floats(array, "observation", {rows, static_cast<std::size_t>(observations_)},
+                        std::numeric_limits<float>::max());
     auto action = make_array<float>({rows, static_cast<std::size_t>(actions_)});
     const nb::gil_scoped_release free;
     if (policy_) {
       policy_->act(rows, floats.data(), action.data());
     } else {
-      const std::vector<float> result = deploy::evaluate(network_, {floats.data(), floats.data() + rows * static_cast<std::size_t>(observations_)});
+      const std::vector<float> result =
+          deploy::evaluate(network_, {floats.data(), floats.data() + rows * static_cast<std::size_t>(observations_)});
       std::ranges::copy(result, action.data());
     }
     return action;
