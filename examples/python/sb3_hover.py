@@ -57,29 +57,22 @@ class Curve(BaseCallback):
 
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
-parser.add_argument("--steps", type=int, default=1_000_000, help="of all environments together")
+parser.add_argument("--steps", type=int, default=300_000, help="of all environments together")
 parser.add_argument("--envs", type=int, default=256)
 parser.add_argument("--seed", type=int, default=1)
 parser.add_argument("--curve", default="sb3_hover.csv")
-parser.add_argument("--lr", type=float, default=1e-3)
-parser.add_argument("--nsteps", type=int, default=128)
-parser.add_argument("--batch", type=int, default=4096)
-parser.add_argument("--epochs", type=int, default=10)
-parser.add_argument("--gamma", type=float, default=0.99)
-parser.add_argument("--logstd", type=float, default=-1)
 args = parser.parse_args()
 
 torch.set_num_threads(1)
-env = VecNormalize(FlappyVecEnv("flappy/Hover-v0", args.envs), gamma=args.gamma)
+env = VecNormalize(FlappyVecEnv("flappy/Hover-v0", args.envs))
 model = PPO(
     "MlpPolicy",
     env,
-    n_steps=args.nsteps,
-    batch_size=args.batch,
-    n_epochs=args.epochs,
-    learning_rate=lambda left: args.lr * left,
-    gamma=args.gamma,
-    policy_kwargs={"log_std_init": args.logstd},
+    n_steps=32,
+    batch_size=1024,
+    n_epochs=10,
+    learning_rate=lambda left: 1e-3 * left,
+    policy_kwargs={"log_std_init": -1},  # a standard deviation of 0.37 of half the range
     seed=args.seed,
     device="cpu",
 )

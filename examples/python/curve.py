@@ -1,0 +1,40 @@
+"""Draws learning curves: `python curve.py figure.svg "PPO of Stable-Baselines3=sb3_*.csv" "CleanRL=cleanrl_*.csv"`.
+
+Each file is what sb3_hover.py or cleanrl_hover.py wrote, one for each seed. Beside the figure, it leaves all rows in one CSV.
+"""
+
+import csv
+import glob
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("svg")
+matplotlib.rcParams["svg.hashsalt"] = "flappy"  # the same bytes for the same curves
+import matplotlib.pyplot as plt
+
+figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True)
+rows = []
+for colour, argument in zip(("#2f81f7", "#e0702c", "#3fa45b", "#8250df"), sys.argv[2:], strict=False):
+    name, pattern = argument.split("=", 1)
+    for seed, path in enumerate(sorted(glob.glob(pattern)), 1):
+        with open(path, newline="") as file:
+            curve = [{"learner": name, "run": seed, **row} for row in csv.DictReader(file)]
+        rows += curve
+        for axis, column in zip(axes, ("steps", "wall_s"), strict=True):
+            x, y = [float(row[column]) for row in curve], [100 * float(row["success"]) for row in curve]
+            axis.plot(x, y, color=colour, linewidth=1.2, label=name if seed == 1 else None)
+for axis, title in zip(axes, ("steps of all environments", "wall-clock time without evaluation, s"), strict=True):
+    axis.set_xscale("log")
+    axis.axhline(90, color="#7d8590", linewidth=0.8, linestyle=":")
+    axis.set_xlabel(title)
+    axis.spines[["top", "right"]].set_visible(False)
+axes[0].set_ylabel("success, % of 1,000 flights")
+axes[0].legend(frameon=False)
+figure.tight_layout()
+figure.savefig(sys.argv[1], metadata={"Date": None})
+with open(Path(sys.argv[1]).with_suffix(".csv"), "w", newline="") as file:
+    writer = csv.DictWriter(file, rows[0], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
