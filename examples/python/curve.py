@@ -8,12 +8,10 @@ import glob
 import sys
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("svg")
-matplotlib.rcParams["svg.hashsalt"] = "flappy"  # the same bytes for the same curves
 import matplotlib.pyplot as plt
 
+plt.switch_backend("svg")
+plt.rcParams["svg.hashsalt"] = "flappy"  # the same bytes for the same curves
 figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True)
 rows = []
 for colour, argument in zip(("#2f81f7", "#e0702c", "#3fa45b", "#8250df"), sys.argv[2:], strict=False):

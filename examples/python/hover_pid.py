@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 
 env = gymnasium.make("flappy:flappy/Hover-v0")
-low, high, dt = env.unwrapped.action_low, env.unwrapped.action_high, env.unwrapped.step_s  # V, V, V, fraction of a beat
+low, high, dt = (env.get_wrapper_attr(name) for name in ("action_low", "action_high", "step_s"))  # V, V, V, fractions; s
 observation, info = env.reset(seed=0)
 integral, total, done = np.array([9.8, 0.0, 0.0, 0.0]), 0.0, False  # it begins at about what carries the weight
 while not done:
@@ -15,5 +15,5 @@ while not done:
     inputs = np.array([8, 15, 15, 0.18]) * error - np.array([4, 0.5, 0.4, 0.01]) * [velocity[2], *rate] + integral
     action = np.clip(2 * (inputs - low) / (high - low) - 1, -1, 1).astype(np.float32)
     observation, reward, terminated, truncated, info = env.step(action)
-    total, done = total + reward, terminated or truncated
+    total, done = total + float(reward), terminated or truncated
 print(f"success {info['is_success']}, return {total:.1f}")

@@ -25,6 +25,7 @@ class Curve(BaseCallback):
         super().__init__()
         self.path = path
         self.rows: list[dict[str, float]] = []
+        self.start_s = 0.0
 
     def policy(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """As it is now, without exploration."""

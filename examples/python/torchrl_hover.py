@@ -1,12 +1,10 @@
-"""A rollout with TorchRL: `python torchrl_hover.py`."""
+"""Many flights with TorchRL: `python torchrl_hover.py`."""
 
-import flappy  # noqa: F401
-from torchrl.envs import GymEnv, RewardSum, StepCounter, TransformedEnv
+import gymnasium
+from torchrl.envs import GymWrapper, RewardSum, TransformedEnv
 
-env = TransformedEnv(GymEnv("flappy/Hover-v0", device="cpu"))
-env.append_transform(RewardSum())
-env.append_transform(StepCounter())
-env.set_seed(0)
-flight = env.rollout(300)
-print(flight["next", "observation"].shape, flight["next", "episode_reward"][-1].item(), flight["next", "truncated"][-1].item())
+env = TransformedEnv(GymWrapper(gymnasium.make_vec("flappy:flappy/Hover-v0", num_envs=256)), RewardSum())
+flights = env.rollout(300, break_when_any_done=False)  # of random actions
+ended = flights["next", "done"].squeeze(-1)
+print(flights["next", "observation"].shape, f"{int(ended.sum())} flights, return {flights['next', 'episode_reward'][ended].mean():.2f}")
 env.close()

@@ -187,6 +187,7 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Any]):
             raise ValueError(f"render_mode: is {render_mode!r}; accepted: None, 'rgb_array'")
         mode = AutoresetMode(autoreset_mode)
         self.num_envs = num_envs
+        self.autoreset_mode = mode  # as Gymnasium's own have it: TorchRL reads it
         self.render_mode = render_mode
         self.config, self.overrides = config, [*overrides]
         self._core = _core_of(config, overrides, num_envs, mode, copy, first, threads)

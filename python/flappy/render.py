@@ -31,8 +31,10 @@ SHOULDER_M = (0.0, 0.01395, 0.0189913)  # left; configs/vehicles/hummingbird_nom
 WING_M = np.array([[0, 0], [0.066, 0], [0.069, 0.001], [0.070, 0.004], [0.069, 0.0145], [0.067, 0.0157], [0.004, 0.0268]])
 #: Outline of the body, which is round: height and radius.
 BODY_M = np.array(
-    [[-0.040, 0], [-0.030, 0.004], [-0.016, 0.009], [0.0, 0.0105], [0.012, 0.0085], [0.022, 0.0045], [0.026, 0.0062], [0.031, 0.0068]]
-    + [[0.036, 0.0048], [0.0375, 0]]
+    [
+        *([-0.040, 0], [-0.030, 0.004], [-0.016, 0.009], [0.0, 0.0105], [0.012, 0.0085], [0.022, 0.0045]),
+        *([0.026, 0.0062], [0.031, 0.0068], [0.036, 0.0048], [0.0375, 0]),
+    ]
 )
 BEAK_M = np.array([[0.0, 0, 0.031], [0.022, 0, 0.029]])
 SMALLEST_M = 0.13  # half of what a view shows: the span and a rim
@@ -64,7 +66,8 @@ def wing(side: int, stroke_rad: float, rotation_rad: float) -> Doubles:
     x = -chord * np.sin(rotation_rad)
     outline = np.stack([x, side * span, -chord * np.cos(rotation_rad)])
     turn = np.array([[np.cos(beta), -np.sin(beta), 0], [np.sin(beta), np.cos(beta), 0], [0, 0, 1]])
-    return (turn @ outline).T + np.multiply(SHOULDER_M, (1, side, 1))
+    turned: Doubles = (turn @ outline).T + np.multiply(SHOULDER_M, (1, side, 1))
+    return turned
 
 
 def _window(points: Doubles, centre: Doubles) -> float:

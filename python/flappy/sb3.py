@@ -37,7 +37,7 @@ class FlappyVecEnv(VecEnv):
         self.env = env
         super().__init__(num_envs, env.single_observation_space, env.single_action_space)
         self.metadata = {**env.metadata, "render_modes": self.metadata["render_modes"]}
-        self._actions: Floats = np.zeros(env.action_space.shape, np.float32)
+        self._actions: Floats = np.zeros((num_envs, len(env.action_names)), np.float32)
         self._nothing: list[dict[str, Any]] = [{} for _ in range(num_envs)]
         self._start_s = time.monotonic()
 

@@ -15,7 +15,8 @@ WING = (np.array([47, 129, 247]) * 110 + 255 * 145) // 255  # as drawn on white
 def pose(roll_rad: float = 0, **other: Any) -> dict[str, Any]:
     """At the target, level but for its roll."""
     attitude = [np.cos(roll_rad / 2), np.sin(roll_rad / 2), 0, 0]
-    return {"position_m": [0, 0, 0], "attitude": attitude, "stroke_rad": [0.4, 0.4], "rotation_rad": [0.5, 0.5], "target_m": [0, 0, 0]} | other
+    wings = {"stroke_rad": [0.4, 0.4], "rotation_rad": [0.5, 0.5]}
+    return {"position_m": [0, 0, 0], "attitude": attitude, "target_m": [0, 0, 0]} | wings | other
 
 
 def wings(image: np.ndarray) -> np.ndarray:
