@@ -32,9 +32,9 @@ def evaluate(
     while not ended.all():
         observation, _, _, _, info = env.step(policy(observation))
         if info:
-            first = info["_episode"] & ~ended
-            success[first] = info["episode"]["is_success"][first]
-            returns[first] = info["episode"]["r"][first]
+            first = info["_final_info"] & ~ended
+            success[first] = info["final_info"]["is_success"][first]
+            returns[first] = info["final_info"]["return"][first]
             ended |= first
     env.close()
     return float(success.mean()), float(returns.mean())

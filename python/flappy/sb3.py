@@ -67,12 +67,12 @@ class FlappyVecEnv(VecEnv):
         done = terminated | truncated
         if info:
             elapsed_s = round(time.monotonic() - self._start_s, 6)
-            episode, final = info["episode"], info["final_obs"]
+            episode, final = info["final_info"], info["final_obs"]
             for i in np.flatnonzero(done).tolist():
                 infos[i] = {
                     "terminal_observation": final[i],
                     "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
-                    "episode": {"r": float(episode["r"][i]), "l": int(episode["l"][i]), "t": elapsed_s},
+                    "episode": {"r": float(episode["return"][i]), "l": int(episode["length"][i]), "t": elapsed_s},
                     "is_success": bool(episode["is_success"][i]),
                     "causes": int(episode["causes"][i]),
                 }

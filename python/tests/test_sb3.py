@@ -44,9 +44,9 @@ def test_rows_are_those_of_gymnasium() -> None:
                 ended += 1
                 np.testing.assert_array_equal(infos[i]["terminal_observation"], info["final_obs"][i])
                 assert infos[i]["TimeLimit.truncated"] == (truncated[i] and not terminated[i])
-                assert infos[i]["episode"]["r"] == info["episode"]["r"][i]
-                assert infos[i]["episode"]["l"] == info["episode"]["l"][i]
-                assert infos[i]["is_success"] == info["episode"]["is_success"][i]
+                assert infos[i]["episode"]["r"] == info["final_info"]["return"][i]
+                assert infos[i]["episode"]["l"] == info["final_info"]["length"][i]
+                assert infos[i]["is_success"] == info["final_info"]["is_success"][i]
     assert ended > 5
     ours.close()
     theirs.close()
