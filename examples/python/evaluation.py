@@ -6,14 +6,15 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-import flappy  # noqa: F401
-
 #: No training uses it.
 SEED = 1_000_000
 
 
 def evaluate(
-    policy: Callable[[NDArray[np.float32]], NDArray[np.float32]], env_id: str = "flappy/Hover-v0", flights: int = 1000, seed: int = SEED
+    policy: Callable[[NDArray[np.float32]], NDArray[np.float32]],
+    env_id: str = "flappy:flappy/Hover-v0",
+    flights: int = 1000,
+    seed: int = SEED,
 ) -> tuple[float, float]:
     """Flies one episode in each of `flights` environments.
 
