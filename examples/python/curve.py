@@ -1,4 +1,4 @@
-"""Draws learning curves: `python curve.py figure.svg "PPO of Stable-Baselines3=sb3_*.csv" "CleanRL=cleanrl_*.csv"`.
+"""Draws learning curves: `python curve.py figure.svg "Stable-Baselines3=sb3_*.csv" "CleanRL=cleanrl_*.csv"`.
 
 Each file is what sb3_hover.py or cleanrl_hover.py wrote, one for each seed. Beside the figure, it leaves all rows in one CSV.
 """
@@ -11,7 +11,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 plt.switch_backend("svg")
-plt.rcParams["svg.hashsalt"] = "flappy"  # the same bytes for the same curves
+plt.rcParams |= {"svg.hashsalt": "flappy", "svg.fonttype": "none"}  # the same bytes for the same curves
 figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True)
 rows = []
 for colour, argument in zip(("#2f81f7", "#e0702c", "#3fa45b", "#8250df"), sys.argv[2:], strict=False):
@@ -29,7 +29,7 @@ for axis, title in zip(axes, ("steps of all environments", "wall-clock time with
     axis.set_xlabel(title)
     axis.spines[["top", "right"]].set_visible(False)
 axes[0].set_ylabel("success, % of 1,000 flights")
-axes[0].legend(frameon=False)
+axes[0].legend(frameon=False, loc="upper left", bbox_to_anchor=(0, 0.95))
 figure.tight_layout()
 figure.savefig(sys.argv[1], metadata={"Date": None})
 with open(Path(sys.argv[1]).with_suffix(".csv"), "w", newline="") as file:

@@ -98,7 +98,8 @@ def _picture(pose: Mapping[str, Any], trail: Doubles, size: tuple[int, int], cen
             return list(zip((panel / 2 + right * pixels).tolist(), (high / 2 - up * pixels).tolist(), strict=True))
 
         if len(trail) > 1:
-            pen.line(at(trail), TRAIL, 2 * FINE, "curve")
+            thin = [*range(0, len(trail) - 1, len(trail) // 400 + 1), len(trail) - 1]
+            pen.line(at(trail[thin]), TRAIL, 2 * FINE, "curve")
         depths = [(w @ view[2]).mean() for w in wings]
         behind = [w for w, depth in zip(wings, depths, strict=True) if depth < view[2] @ position]
         before = [w for w, depth in zip(wings, depths, strict=True) if depth >= view[2] @ position]
