@@ -74,6 +74,10 @@ class Batch {
   /// Starts flapper `i` anew at beat phase 0, with no voltage, no input and no status.
   void reset(std::size_t i, const FlapperState& state, Start start = Start::flying);
   void set_input(std::size_t i, const Input& input);
+  /// Puts these voltages on the motors of flapper `i` in place of the wing beat's, each clipped to what its motor takes (not a
+  /// number: to the least, as an input), until they are set again, or set_input() or reset() give the motors back to the driver.
+  /// The beat's clock runs on meanwhile.
+  void set_voltages(std::size_t i, double left_V, double right_V);
 
   /// Advances every flapper by `steps` physics steps. Plausibility and contact are looked at once, at the
   /// end. std::invalid_argument for a number below 0.

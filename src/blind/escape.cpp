@@ -39,7 +39,7 @@ class Escaper {
         start_(hold(start.position_m, start.heading_rad)) {
     const auto& at = rules.task.path.front().coefficients;
     goal_ = hold({at[0][0], at[1][0], at[2][0] + kHeight_m}, at[3][0]);
-    for (int i = 0; i < flight::kActions; ++i) episode_.adds[i] = flight::scaled_action(rules.constants, i, 0.0);
+    for (int i = 0; i < rules.task.actions(); ++i) episode_.adds[i] = flight::scaled_action(rules.constants, i, 0.0);
   }
 
   Inputs steer(double t_s, double beat, const Torso& torso) {
@@ -72,7 +72,8 @@ class Escaper {
   void act(const flight::Estimate<double>& seen, double beat, double t_s, const model::WingBeat<double>& learnt) {
     double row[flight::kMaxObservation];
     const double fraction = beat < 0.5 ? beat : beat - 1;
-    const int n = flight::observe(rules_.task.parts, seen, goal_, episode_, fraction, std::max(t_s, 0.0), learnt, row);
+    const int n = flight::observe(rules_.task.parts, rules_.task.actions(), seen, goal_, episode_, fraction,
+                                  std::max(t_s, 0.0), learnt, flight::Wings<double>{}, row);
     std::vector<double> now(row, row + n);
     if (past_.empty())
       for (std::uint32_t ago = 1; ago < rules_.task.history; ++ago) past_.insert(past_.end(), row, row + n);

@@ -49,7 +49,7 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
   }
   if (!any_due) return;
   const auto acts = L<T>::load(due) > L<T>(0);
-  L<T> observation[kMaxHistory * kMaxObservation], action[kActions];
+  L<T> observation[kMaxHistory * kMaxObservation], action[kMaxActions];
   for (int i = 0; i < plan.observed; ++i) observation[i] = L<T>::load(f.observation[i] + first);
   L<T>* const past = observation + plan.observed;
   for (int i = 0; i < plan.past; ++i) past[i] = L<T>::load(s.past + i * kLanes<T> + first);
@@ -59,13 +59,13 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
     const auto fresh = sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::exploration), plan.period,
                                           f.flapper + first, f.flight + first);
     const L<T> size = L<T>(plan.noise_low) + L<T>(plan.noise_more) * L<T>::load(index);
-    for (int i = 0; i < kActions; ++i) {
+    for (int i = 0; i < plan.actions; ++i) {
       const L<T> noise = L<T>(plan.noise_kept) * episode.noise[i] + L<T>(plan.noise_fresh) * fresh.n[i];
       episode.noise[i] = where(acts, noise, episode.noise[i]);
       action[i] = clamp(L<T>(action[i] + size * noise), L<T>(-1), L<T>(1));
     }
   }
-  for (int i = 0; i < kActions; ++i) {
+  for (int i = 0; i < plan.actions; ++i) {
     episode.action[i] = where(acts, action[i], episode.action[i]);
     episode.adds[i] = where(acts, scaled_action(plan.task, i, action[i]), episode.adds[i]);
   }
@@ -83,7 +83,15 @@ FLAPPY_INLINE WingBeat<L<T>> learnt_trim(const FlightBlock<T>& f, const FlightPl
   return trim;
 }
 
-/// Policy and controller set the inputs of the wing beat.
+/// The policy's voltages, within what the motors take.
+template <class T>
+FLAPPY_INLINE sim::Voltages<L<T>> commanded(const FlightSpace<T>& s, const Episode<L<T>>& episode, int first) {
+  const auto& p = view_rows<Parameters<L<T>>>(s.body.parameters, first);
+  const auto clip = [](const L<T>& voltage, const L<T>& limit) { return clamp(voltage, L<T>(-limit), limit); };
+  return {clip(episode.adds[0], p.left.voltage_limit_V), clip(episode.adds[1], p.right.voltage_limit_V)};
+}
+
+/// Policy and controller set the inputs of the wing beat; or the policy alone sets the motors' voltages.
 template <class T>
 FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;
@@ -108,7 +116,9 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
     store_rows(memory, f.controller, first);
   });
   auto drive = load_rows<sim::Drive<L<T>>>(s.body.drive, first);
-  drive.input = add_action(episode, base);
+  drive.direct = L<T>(plan.sets_voltages ? 1 : 0);
+  if (plan.sets_voltages) drive.voltages = commanded(s, episode, first);
+  else drive.input = add_action(episode, base);
   store_rows(drive, s.body.drive, first);
 }
 
@@ -260,7 +270,7 @@ FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPla
   episode.reward = reward_of(plan.task.reward, score, truth, now, L<T>(plan.task.tick_s), done, episode);
   episode.action_reward += episode.reward;
   episode.handed_back = where(done, L<T>(1), episode.handed_back);
-  for (int i = 0; i < kActions; ++i) episode.previous[i] = episode.action[i];
+  for (int i = 0; i < kMaxActions; ++i) episode.previous[i] = episode.action[i];
 
   check_termination(plan.task.limits, score, now, [&](typename L<T>::Mask mask, std::uint32_t bit) {
     if (!rarely(mask)) return;
@@ -273,8 +283,8 @@ FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPla
     if (plan.task.contact_ends > 0 && (status & ~std::uint32_t{sim::kFrozen})) f.ended[first + i] |= kContact;
   }
   L<T> row[kMaxObservation];
-  const int rows =
-      observe(plan.parts, estimate, ref, episode, beat_phase(s.body, first), now, learnt_trim(f, plan, first), row);
+  const int rows = observe(plan.parts, plan.actions, estimate, ref, episode, beat_phase(s.body, first), now,
+                           learnt_trim(f, plan, first), wings_of(view_rows<State<L<T>>>(s.body.state, first)), row);
   for (int i = 0; i < rows; ++i) row[i].store(f.observation[i] + first);
   store_rows(episode, f.episode, first);
 }

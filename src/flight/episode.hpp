@@ -15,19 +15,20 @@ inline namespace FLAPPY_ISA {
 /// What an episode remembers, as rows.
 template <class T>
 struct Episode {
-  T action[kActions];    // of the policy, in [-1, 1]
-  T previous[kActions];  // the one before
-  T adds[kActions];      // what its action adds to the controller's output: V, V, V, split cycle
-  T added[kActions];     // besides
-  T handed_back;         // 0 or 1
-  T reward;              // of the last control period
-  T action_reward;       // sum of rewards since the policy last acted
-  T noise[kActions];     // on its actions, of deviation 1
-  T captured_s;          // when the goal was captured first; 0: not yet
-  T lost_s;              // when it was not kept first; 0: never
+  // of actions, the numbers beyond the task's are 0
+  T action[kMaxActions];    // of the policy, in [-1, 1]
+  T previous[kMaxActions];  // the one before
+  T adds[kMaxActions];      // what its action adds to the controller's output, V, V, V, split cycle; or the motors' voltages
+  T added[kMaxActions];     // besides
+  T handed_back;            // 0 or 1
+  T reward;                 // of the last control period
+  T action_reward;          // sum of rewards since the policy last acted
+  T noise[kMaxActions];     // on its actions, of deviation 1
+  T captured_s;             // when the goal was captured first; 0: not yet
+  T lost_s;                 // when it was not kept first; 0: never
 };
 
-/// What an action of the policy adds to input `i`.
+/// What an action of the policy adds to input `i`, or the voltage of motor `i`.
 template <class T>
 FLAPPY_INLINE T scaled_action(const TaskConstants<Element<T>>& k, int i, const T& action) {
   const T middle(0.5 * (k.action_low[i] + k.action_high[i])), half(0.5 * (k.action_high[i] - k.action_low[i]));
@@ -38,8 +39,8 @@ FLAPPY_INLINE T scaled_action(const TaskConstants<Element<T>>& k, int i, const T
 /// What a policy and whoever else may add do to the controller's output.
 template <class T>
 FLAPPY_INLINE WingBeat<T> add_action(const Episode<T>& e, const WingBeat<T>& base) {
-  T sum[kActions] = {base.amplitude_V, base.difference_V, base.bias_V, base.split_cycle};
-  for (int i = 0; i < kActions; ++i) sum[i] = sum[i] + (e.added[i] + where(e.handed_back > T(0), T(0), e.adds[i]));
+  T sum[kMaxActions] = {base.amplitude_V, base.difference_V, base.bias_V, base.split_cycle};
+  for (int i = 0; i < kMaxActions; ++i) sum[i] = sum[i] + (e.added[i] + where(e.handed_back > T(0), T(0), e.adds[i]));
   return {sum[0], sum[1], sum[2], sum[3]};
 }
 
@@ -71,7 +72,7 @@ FLAPPY_INLINE Score<T> score_of(const Truth<T>& t, const Setpoint<T>& ref) {
 template <class T>
 FLAPPY_INLINE T running_reward(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t, const Episode<T>& e) {
   T effort(0), change(0);
-  for (int i = 0; i < kActions; ++i) {
+  for (int i = 0; i < kMaxActions; ++i) {
     const T step = e.action[i] - e.previous[i];
     effort += e.action[i] * e.action[i];
     change += step * step;
@@ -168,10 +169,22 @@ FLAPPY_INLINE void check_termination(const Limits<Element<T>>& k, const Score<T>
   mark(time_s >= T(k.time_s), kTimeOut);
 }
 
-/// Writes the observed parts; returns how many rows they are.
+/// Strokes and their rates.
 template <class T>
-FLAPPY_INLINE int observe(std::uint32_t parts, const Estimate<T>& x, const Setpoint<T>& ref, const Episode<T>& e,
-                          const T& beat_fraction, const T& time_s, const WingBeat<T>& trim, T* row) {
+struct Wings {
+  T left_rad, right_rad, left_rad_s, right_rad_s;
+};
+
+template <class T>
+FLAPPY_INLINE Wings<T> wings_of(const State<T>& x) {
+  return {x.left.stroke_rad, x.right.stroke_rad, x.left.stroke_rate_rad_s, x.right.stroke_rate_rad_s};
+}
+
+/// Writes the observed parts; returns how many rows they are. `actions`: numbers of an action.
+template <class T>
+FLAPPY_INLINE int observe(std::uint32_t parts, int actions, const Estimate<T>& x, const Setpoint<T>& ref,
+                          const Episode<T>& e, const T& beat_fraction, const T& time_s, const WingBeat<T>& trim,
+                          const Wings<T>& wings, T* row) {
   int n = 0;
   const auto observes = [&](Part part) { return (parts >> static_cast<int>(part) & 1) != 0; };
   const auto add = [&](const Vec3<T>& v) { row[n++] = v.x, row[n++] = v.y, row[n++] = v.z; };
@@ -190,7 +203,7 @@ FLAPPY_INLINE int observe(std::uint32_t parts, const Estimate<T>& x, const Setpo
     row[n++] = yaw.cos * ref.heading.cos + yaw.sin * ref.heading.sin;
   }
   if (observes(Part::previous_action))
-    for (int i = 0; i < kActions; ++i) row[n++] = e.adds[i];
+    for (int i = 0; i < actions; ++i) row[n++] = e.adds[i];
   if (observes(Part::goal_rotation)) {
     const auto rotated_back = [&](const Vec3<T>& x_row, const Vec3<T>& y_row) {
       return add_scaled(ref.heading.cos * x_row, ref.heading.sin, y_row);
@@ -202,6 +215,10 @@ FLAPPY_INLINE int observe(std::uint32_t parts, const Estimate<T>& x, const Setpo
   if (observes(Part::trim)) {
     row[n++] = trim.amplitude_V, row[n++] = trim.difference_V;
     row[n++] = trim.bias_V, row[n++] = trim.split_cycle;
+  }
+  if (observes(Part::wings)) {
+    row[n++] = wings.left_rad, row[n++] = wings.right_rad;
+    row[n++] = wings.left_rad_s, row[n++] = wings.right_rad_s;
   }
   return n;
 }

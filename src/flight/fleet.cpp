@@ -29,6 +29,8 @@ Fleet<T>::Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOpt
   if (!(steps >= 1) || std::abs(steps - std::round(steps)) > 1e-6)
     throw std::invalid_argument("the control period is no whole number of physics steps");
   if (options.task.path.empty()) throw std::invalid_argument("the task has no path");
+  if (options.task.sets_voltages() && options.controller.kind != kNoController)
+    throw std::invalid_argument("a task of voltages has no controller");
   storage_ = std::make_unique<Storage>(count, vehicle, options, static_cast<int>(std::lround(steps)),
                                        sim::kernel_of<T>(fly_floats, fly_doubles, options.batch.instruction_set));
   // lanes beyond the last flapper fly along, so that no lane ever holds numbers of no flight
@@ -121,6 +123,7 @@ void Fleet<T>::set_actor(const std::shared_ptr<const policy::Actor>& actor) {
 template <class T>
 void Fleet<T>::set_action(std::size_t i, std::span<const T> action) {
   const auto [f, lane] = storage_->at(i);
+  storage_->check_count(action.size());
   for (std::size_t k = 0; k < action.size(); ++k) {
     f.episode[offsetof(Episode<T>, action) / sizeof(T) + k][lane] = action[k];
     f.episode[offsetof(Episode<T>, adds) / sizeof(T) + k][lane] = storage_->scaled(static_cast<int>(k), action[k]);
@@ -130,18 +133,12 @@ void Fleet<T>::set_action(std::size_t i, std::span<const T> action) {
 }
 
 template <class T>
-void Fleet<T>::set_action(std::size_t i, const double (&action)[kActions]) {
-  T rounded[kActions];
-  for (int k = 0; k < kActions; ++k) rounded[k] = static_cast<T>(action[k]);
-  set_action(i, std::span<const T>(rounded));
-}
-
-template <class T>
-void Fleet<T>::set_adds(std::size_t i, const double (&adds)[kActions]) {
+void Fleet<T>::set_adds(std::size_t i, std::span<const double> adds) {
   const auto [f, lane] = storage_->at(i);
   auto e = get<Episode<double>>(f.episode, lane);
-  for (int k = 0; k < kActions; ++k) {
-    const double low = storage_->scaled(k, -1), high = storage_->scaled(k, 1);
+  storage_->check_count(adds.size());
+  for (std::size_t k = 0; k < adds.size(); ++k) {
+    const double low = storage_->scaled(static_cast<int>(k), -1), high = storage_->scaled(static_cast<int>(k), 1);
     e.adds[k] = std::min(std::max(adds[k], low), high);
     e.action[k] = high > low ? 2 * (e.adds[k] - low) / (high - low) - 1 : 0;
   }
@@ -153,8 +150,10 @@ template <class T>
 void Fleet<T>::set_added(std::size_t i, const sim::Input& input) {
   const auto [f, lane] = storage_->at(i);
   auto e = get<Episode<double>>(f.episode, lane);
-  const double added[kActions] = {input.amplitude_V, input.difference_V, input.bias_V, input.split_cycle};
-  for (int k = 0; k < kActions; ++k) e.added[k] = added[k];
+  const double added[kMaxActions] = {input.amplitude_V, input.difference_V, input.bias_V, input.split_cycle};
+  if (options().task.sets_voltages() && std::ranges::any_of(added, [](double x) { return x != 0; }))
+    throw std::invalid_argument("a task of voltages has no inputs of the wing beat to add to");
+  for (int k = 0; k < kMaxActions; ++k) e.added[k] = added[k];
   put(e, f.episode, lane);
 }
 
@@ -327,18 +326,18 @@ void Fleet<T>::true_observation(std::size_t i, T* row) const {
   for (int k = 0; k < storage_->plan.past; ++k) row[storage_->plan.observed + k] = *storage_->past_at(i, k);
 }
 template <class T>
-std::array<T, kActions> Fleet<T>::action(std::size_t i) const {
+std::array<T, kMaxActions> Fleet<T>::action(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
-  std::array<T, kActions> action;
-  for (int k = 0; k < kActions; ++k) action[static_cast<std::size_t>(k)] = f.episode[k][lane];
+  std::array<T, kMaxActions> action;
+  for (int k = 0; k < kMaxActions; ++k) action[static_cast<std::size_t>(k)] = f.episode[k][lane];
   return action;
 }
 template <class T>
-std::array<T, kActions> Fleet<T>::adds(std::size_t i) const {
+std::array<T, kMaxActions> Fleet<T>::adds(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
-  std::array<T, kActions> adds;
+  std::array<T, kMaxActions> adds;
   constexpr std::size_t kFirst = offsetof(Episode<T>, adds) / sizeof(T);
-  for (std::size_t k = 0; k < kActions; ++k) adds[k] = f.episode[kFirst + k][lane];
+  for (std::size_t k = 0; k < kMaxActions; ++k) adds[k] = f.episode[kFirst + k][lane];
   return adds;
 }
 template <class T>
@@ -451,7 +450,7 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
   for (std::size_t i = first; i < last; ++i) {
     const auto [f, lane] = storage_->at(i);
     std::uint64_t h = 0;
-    for (int r = 0; r < kFlightRows<T>; ++r) h = sim::mixed(h, sim::bits_of(rows_of<T>(f)[r][lane]));
+    for (int r = 0; r < storage_->hashed_rows(); ++r) h = sim::mixed(h, sim::bits_of(rows_of<T>(f)[r][lane]));
     for (const std::uint32_t word : {f.flapper[lane], f.flight[lane], f.tick[lane], f.segment[lane], f.ended[lane]})
       h = sim::mixed(h, word);
     auto& body = sim::storage_of(storage_->batch);

@@ -58,7 +58,8 @@ template <class T>
 class Fleet {
  public:
   /// `count` copies of `vehicle`, each at the start of its episode 0. std::invalid_argument where the control period is no
-  /// whole number of physics steps, a sensor is faster than they are, or the task has no path.
+  /// whole number of physics steps, a sensor is faster than they are, the task has no path, or it is one of voltages and there is
+  /// a controller.
   Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOptions& options);
   ~Fleet();
   Fleet(Fleet&&) noexcept;
@@ -79,11 +80,12 @@ class Fleet {
   /// action are those of the task.
   void set_actor(const std::shared_ptr<const policy::Actor>& actor);
   /// Action of flapper `i` for the next period, each in [-1, 1], for what it observes now; an actor would overwrite it.
-  void set_action(std::size_t i, const double (&action)[kActions]);
+  /// std::invalid_argument unless it has as many numbers as the task's actions.
   void set_action(std::size_t i, std::span<const T> action);
-  /// The same by what the action adds to the controller's output: V, V, V, split cycle, each within the task's range.
-  void set_adds(std::size_t i, const double (&adds)[kActions]);
-  /// Adds to the controller's output from now on: open-loop flight, excitation.
+  /// The same by what the action adds to the controller's output, or the voltages that it sets, each within the task's range.
+  void set_adds(std::size_t i, std::span<const double> adds);
+  /// Adds to the controller's output from now on: open-loop flight, excitation. std::invalid_argument for anything but nothing
+  /// where the task is one of voltages.
   void set_added(std::size_t i, const sim::Input& input);
 
   /// Noise on the actor's actions from now on.
@@ -103,7 +105,8 @@ class Fleet {
   Motion truth(std::size_t i) const;
   Motion estimate(std::size_t i) const;
   Target target(std::size_t i) const;
-  sim::Input input(std::size_t i) const;  ///< as the controller and actor last set it, before the driver clips it
+  /// As the controller and actor last set it, before the driver clips it; nothing where the task is one of voltages.
+  sim::Input input(std::size_t i) const;
   double reward(std::size_t i) const;
   std::uint32_t ended(std::size_t i) const;  ///< bits of Ended, since the start
   std::uint32_t tick(std::size_t i) const;   ///< control periods since the start
@@ -114,9 +117,11 @@ class Fleet {
   void observation(std::size_t i, T* row) const;
   /// What the policy would observe if the estimate were true; what it remembers stays.
   void true_observation(std::size_t i, T* row) const;
-  std::array<T, kActions> action(std::size_t i) const;  ///< of the policy, its noise included
-  std::array<T, kActions> adds(std::size_t i) const;    ///< what that adds: V, V, V, split cycle
-  T action_reward(std::size_t i) const;                 ///< rewards since the policy last acted, or was told how
+  /// Of the policy, its noise included, and what that adds to the controller's output, or the voltages that it sets: numbers of the
+  /// task's actions, then zeros.
+  std::array<T, kMaxActions> action(std::size_t i) const;
+  std::array<T, kMaxActions> adds(std::size_t i) const;
+  T action_reward(std::size_t i) const;  ///< rewards since the policy last acted, or was told how
   /// Squared innovations of the last pose over their variance: angle and position, three degrees of freedom each.
   std::pair<double, double> innovation(std::size_t i) const;
   std::array<double, 3> gyro_bias_rad_s(std::size_t i) const;  ///< true

@@ -88,6 +88,8 @@ struct Fleet<T>::Storage {
     plan.controller = rounded<T>(k.controller);
     plan.task = rounded<T>(k.task);
     plan.parts = options.task.parts;
+    plan.actions = options.task.actions();
+    plan.sets_voltages = options.task.sets_voltages();
     plan.action_repeat = options.task.action_repeat;
     const auto all = static_cast<int>(options.task.observation().size());
     plan.observed = all / static_cast<int>(options.task.history);
@@ -143,7 +145,20 @@ struct Fleet<T>::Storage {
     return out;
   }
 
-  /// What an action adds to input `k`, as the lanes work it out.
+  void check_count(std::size_t count) const {
+    if (count != static_cast<std::size_t>(plan.actions))
+      throw std::invalid_argument("an action of " + std::to_string(count) + " numbers where the task has " +
+                                  std::to_string(plan.actions));
+  }
+
+  /// Rows of a flight that its hash takes in. The last of the observation's rows, which nothing follows, are zeros in tasks that
+  /// observe no more than there were when hashes were first put on record.
+  int hashed_rows() const {
+    constexpr int kOnRecord = 40;
+    return kFlightRows<T> - (plan.observed > kOnRecord ? 0 : kMaxObservation - kOnRecord);
+  }
+
+  /// What an action adds to input `k`, or sets motor `k` to, as the lanes work it out.
   T scaled(int k, T action) const {
     using L = model::Lanes<T, 1>;
     return L(scaled_action(plan.task, k, L(action))).raw[0];
@@ -206,7 +221,7 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
   put(imu, f.imu, lane);
   start_estimator(i, truth, key);
   Episode<double> fresh{};
-  for (int k = 0; k < kActions; ++k) fresh.adds[k] = scaled(k, 0);
+  for (int k = 0; k < plan.actions; ++k) fresh.adds[k] = scaled(k, 0);
   put(fresh, f.episode, lane);
 }
 
@@ -230,11 +245,14 @@ void Fleet<T>::Storage::observe_as(std::size_t i, const Estimate<double>& x, T* 
       i, [&]<class C>(C, auto& memory) { learnt = C::trim(plan.controller.template of<C>(), rounded<L>(memory)); });
   std::uint32_t segment = f.segment[lane];
   const auto ref = setpoint_at<L>(plan.path, &f.tick[lane], &segment);
-  const T fraction = model::beat_fraction<T>(sim::storage_of(batch).at(i).block.phase[lane]);
+  const sim::Block<T>& body = sim::storage_of(batch).at(i).block;
+  const T fraction = model::beat_fraction<T>(body.phase[lane]);
   const T time = static_cast<T>(f.tick[lane]) * plan.task.tick_s;
   L seen[kMaxObservation];
-  const int rows = observe(options.task.parts, rounded<L>(x), ref, rounded<L>(get<Episode<double>>(f.episode, lane)),
-                           L::load(&fraction), L::load(&time), learnt, seen);
+  const auto wings = wings_of(rounded<L>(get<State<double>>(body.state, lane)));
+  const int rows =
+      observe(plan.parts, plan.actions, rounded<L>(x), ref, rounded<L>(get<Episode<double>>(f.episode, lane)),
+              L::load(&fraction), L::load(&time), learnt, wings, seen);
   for (int k = 0; k < rows; ++k) row[k] = seen[k].raw[0];
 }
 

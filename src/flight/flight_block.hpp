@@ -76,6 +76,8 @@ struct FlightPlan {
   int controller_kind;
   ControllerConstants<T> controller;
   TaskConstants<T> task;
+  int actions;          // numbers of an action
+  bool sets_voltages;   // the action is the motors' voltages, not what is added to the wing beat's inputs
   std::uint32_t parts;  // observed
   int observed, past;   // rows of an observation, and of those remembered
   PathView<T> path;

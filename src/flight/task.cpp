@@ -32,15 +32,21 @@ const std::vector<PartInfo>& part_infos() {
         {"previous_action", "", {}},
         {"goal_rotation", "B in the goal's heading frame", {}},
         {"time", "", {{"time", "s", 0, 1}}},
-        {"trim", "", {}}};
+        {"trim", "", {}},
+        {"wings",
+         "",
+         {{"left_stroke", "rad", -1.6, 1.6},
+          {"right_stroke", "rad", -1.6, 1.6},
+          {"left_stroke_rate", "rad/s", -300, 300},
+          {"right_stroke_rate", "rad/s", -300, 300}}}};
     for (const char* row : {"x", "y", "z"})
       for (const char* column : {"x", "y", "z"})
         for (const auto& [part, name] :
              {std::pair{Part::rotation_matrix, "R_"}, std::pair{Part::goal_rotation, "goal_R_"}})
           list[static_cast<std::size_t>(part)].signals.push_back({name + std::string(row) + column, "1", -1, 1});
-    const char* inputs[kActions] = {"amplitude", "difference", "bias", "split_cycle"};
-    const double trim_high[kActions] = {18, 3, 3.5, 0.15};
-    for (int i = 0; i < kActions; ++i) {
+    const char* inputs[] = {"amplitude", "difference", "bias", "split_cycle"};
+    const double trim_high[] = {18, 3, 3.5, 0.15};
+    for (int i = 0; i < 4; ++i) {
       list[9].signals.push_back(
           {std::string("trim_") + inputs[i], i < 3 ? "V" : "1", i > 0 ? -trim_high[i] : 0, trim_high[i]});
     }
@@ -249,6 +255,37 @@ void read_success(const io::Table& table, Success<double>& s) {
        angle("keep.heading_rad")};
 }
 
+/// What an action is, and what -1 and 1 of it are.
+void read_action(const io::Table& table, Task& task) {
+  const bool voltages = table.choice_or("action.kind", "wing_beat", {"wing_beat", "voltages"}) == "voltages";
+  task.action_kind = voltages ? ActionKind::voltages : ActionKind::wing_beat;
+  const std::vector<std::string> keys = voltages
+                                            ? std::vector<std::string>{"left_V", "right_V"}
+                                            : std::vector<std::string>{"amplitude_V", "difference_V", "bias_V", "split_cycle"};
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const std::string key = "action." + keys[i];
+    const std::vector<double> range = table.numbers(key, voltages ? io::Range{-1000, 1000} : io::Range{-18, 18});
+    if (range.size() != 2 || range[0] > range[1])
+      table.fail(key, "is no range", voltages ? "[low, high]: the voltages of -1 and 1" : "[low, high]: what -1 and 1 add");
+    task.constants.action_low[i] = range[0];
+    task.constants.action_high[i] = range[1];
+  }
+}
+
+/// A policy of voltages flies alone: there is no controller that could start, hold or take over, and no wing beat.
+void refuse_control(const io::Table& table, const Task& task) {
+  const std::string alone = ", but an action of kind \"voltages\" has no controller beside it";
+  if (task.constants.holds_trim > 0) table.fail("base", "is \"trim\"" + alone, "no base, or \"controller\"");
+  if (table.has("hand_back")) table.fail("hand_back", "is given" + alone, "a task without it");
+  if (task.start.settled) table.fail("start.kind", "is \"settled\"" + alone, "\"flying\" or \"standing\"");
+  for (const Part part : {Part::trim, Part::beat_phase})
+    if (task.parts >> static_cast<int>(part) & 1)
+      table.fail("observation",
+                 std::string(part_infos()[static_cast<std::size_t>(part)].name) +
+                     " is of a controller or a wing beat, which an action of kind \"voltages\" has not",
+                 "other parts; \"wings\" shows where the strokes are");
+}
+
 }  // namespace
 
 std::vector<std::pair<std::string, std::vector<Signal>>> Task::observed_parts() const {
@@ -258,7 +295,7 @@ std::vector<std::pair<std::string, std::vector<Signal>>> Task::observed_parts() 
     list.emplace_back(part_infos()[i].name, part_infos()[i].signals);
     if (static_cast<Part>(i) != Part::previous_action) continue;
     for (Signal s : action()) {
-      s.name = "added_" + s.name;
+      s.name = (sets_voltages() ? "previous_" : "added_") + s.name;
       list.back().second.push_back(s);
     }
   }
@@ -277,10 +314,12 @@ std::vector<Signal> Task::observation() const {
 }
 
 std::vector<Signal> Task::action() const {
-  const char* names[kActions] = {"amplitude", "difference", "bias", "split_cycle"};
+  static constexpr const char* kInputs[] = {"amplitude", "difference", "bias", "split_cycle"};
+  static constexpr const char* kVoltages[] = {"left_voltage", "right_voltage"};
   std::vector<Signal> list;
-  for (int i = 0; i < kActions; ++i)
-    list.push_back({names[i], i < 3 ? "V" : "1", constants.action_low[i], constants.action_high[i]});
+  for (int i = 0; i < actions(); ++i)
+    list.push_back({sets_voltages() ? kVoltages[i] : kInputs[i], i < 3 ? "V" : "1", constants.action_low[i],
+                    constants.action_high[i]});
   return list;
 }
 
@@ -331,15 +370,8 @@ Task read_task(const io::Table& table, double tick_s) {
 
   task.history = static_cast<std::uint32_t>(table.integer_or("history", 1, 1, kMaxHistory));
 
+  read_action(table, task);
   TaskConstants<double>& k = task.constants;
-  const char* inputs[kActions] = {"amplitude_V", "difference_V", "bias_V", "split_cycle"};
-  for (int i = 0; i < kActions; ++i) {
-    const std::vector<double> range = table.numbers(std::string("action.") + inputs[i], {-18, 18});
-    if (range.size() != 2 || range[0] > range[1])
-      table.fail(std::string("action.") + inputs[i], "is no range", "[low, high]: what -1 and 1 add");
-    k.action_low[i] = range[0];
-    k.action_high[i] = range[1];
-  }
   table.renamed("action.hold_s", "action.repeat_s");
   const double repeat_s = table.number_or("action.repeat_s", tick_s, {tick_s, 1});
   task.action_repeat = static_cast<std::uint32_t>(std::lround(repeat_s / tick_s));
@@ -365,6 +397,7 @@ Task read_task(const io::Table& table, double tick_s) {
   k.holds_trim = table.choice_or("base", "controller", {"controller", "trim"}) == "trim" ? 1 : 0;
   read_hand_back(table, k.hand_back);
   read_success(table, k.success);
+  if (task.sets_voltages()) refuse_control(table, task);
   table.finish();
   return task;
 }

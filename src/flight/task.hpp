@@ -1,5 +1,5 @@
 // What a flapper is to do: where it starts, the path it follows, what it observes, what a policy may add to the
-// controller's output, what that earns, and when it ends. Read from configs/tasks/*.toml.
+// controller's output or put on the motors, what that earns, and when it ends. Read from configs/tasks/*.toml.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@
 
 namespace flappy::flight {
 
-using policy::kActions, policy::kMaxHistory, policy::kMaxObservation;
+using policy::kMaxActions, policy::kMaxHistory, policy::kMaxObservation;
 
 /// A row of the observation or the action, for who reads or exports it.
 struct Signal {
@@ -24,8 +24,9 @@ struct Signal {
 };
 
 /// Parts an observation may have, in the order of their bits. Those of a flapper's state are estimated; goal_rotation is the
-/// attitude seen from the heading of the set point, previous_action is what the policy adds to the controller's output, time
-/// runs from the start, and trim is what the controller has learnt to hold.
+/// attitude seen from the heading of the set point, previous_action is what the policy adds to the controller's output or puts
+/// on the motors, time runs from the start, and trim is what the controller has learnt to hold. The wings' strokes and their
+/// rates are true, without noise or delay: as ideal encoders read them at the end of the control period.
 enum class Part {
   rotation_matrix,
   position_error,
@@ -36,8 +37,13 @@ enum class Part {
   previous_action,
   goal_rotation,
   time,
-  trim
+  trim,
+  wings
 };
+
+/// What a policy's action is: something that is added to a controller's inputs of the wing beat, in V, V, V and split cycle, or
+/// the voltages of the left and the right motor, of which no controller and no wing beat has a part.
+enum class ActionKind { wing_beat, voltages };
 
 /// Why an episode ended; bits. A time-out is a truncation, all others are terminations.
 enum Ended : std::uint32_t {
@@ -93,7 +99,7 @@ struct Success {
 
 template <class T>
 struct TaskConstants {
-  T action_low[kActions], action_high[kActions];  // V, V, V, split cycle: what -1 and 1 add
+  T action_low[kMaxActions], action_high[kMaxActions];  // what -1 and 1 add, or put on the motors; 0 beyond the action's numbers
   Reward<T> reward;
   Limits<T> limits;
   HandBack<T> hand_back;
@@ -124,6 +130,7 @@ struct Task {
   std::uint32_t parts = 0;          ///< bit of each Part observed
   std::uint32_t history = 1;        ///< observations that a policy sees at once: now, and at its last actions
   std::uint32_t action_repeat = 1;  ///< control periods for which a policy's action stays
+  ActionKind action_kind = ActionKind::wing_beat;
   TaskConstants<double> constants{};
 
   /// Names of the parts observed, with their signals as they are now.
@@ -132,6 +139,9 @@ struct Task {
   /// acted so often, the first observation stands for those that are missing.
   std::vector<Signal> observation() const;
   std::vector<Signal> action() const;
+  bool sets_voltages() const { return action_kind == ActionKind::voltages; }
+  /// Numbers of an action, at most kMaxActions.
+  int actions() const { return sets_voltages() ? 2 : 4; }
   /// Nobody acts: not even the middle of the action's range is added.
   void forbid_actions();
   /// Where the episode of this key starts.

@@ -27,12 +27,13 @@ Collector::Collector(const TrainConfig& config, io::Ranks* ranks)
       fly_(of_training(config)),
       fleet_(config.flappers, fly_.vehicle, fly_.fleet),
       inputs_(fly_.fleet.task.observation().size()),
+      outputs_(static_cast<std::size_t>(fly_.fleet.task.actions())),
       kept_(config.return_steps),
       paid_ticks_(static_cast<std::uint32_t>(
           std::ceil(fly_.fleet.task.constants.reward.until_s * fly_.fleet.control_hz - 1e-6))),
       pending_(config.flappers),
       observations_(config.flappers * kept_ * inputs_),
-      actions_(config.flappers * kept_ * flight::kActions),
+      actions_(config.flappers * kept_ * outputs_),
       rewards_(config.flappers * kept_),
       staged_(fleet_.blocks()),
       seconds_(fleet_.blocks()) {
@@ -80,7 +81,7 @@ void Collector::gather(std::size_t i, std::size_t item) {
   p.episode_return += reward;
   if (p.waits == 0) {
     const auto action = fleet_.action(i);
-    std::copy(action.begin(), action.end(), &actions_[(i * kept_ + p.count) * flight::kActions]);
+    std::copy_n(action.begin(), outputs_, &actions_[(i * kept_ + p.count) * outputs_]);
     rewards_[i * kept_ + p.count] = reward;
     ++p.count;
   } else {
@@ -114,7 +115,7 @@ void Collector::gather(std::size_t i, std::size_t item) {
 void Collector::emit(std::size_t i, std::size_t item, const float* next, bool terminated) {
   Pending& p = pending_[i];
   const auto discount = static_cast<float>(config_.discount);
-  float* action = &actions_[i * kept_ * flight::kActions];
+  float* action = &actions_[i * kept_ * outputs_];
   float* reward = &rewards_[i * kept_];
   float n_step_return = 0, weight = 1;
   for (std::uint32_t k = 0; k < p.count; ++k) {
@@ -123,13 +124,13 @@ void Collector::emit(std::size_t i, std::size_t item, const float* next, bool te
   }
   std::vector<float>& to = staged_[item];
   to.insert(to.end(), observation(i, 0), observation(i, 1));
-  to.insert(to.end(), action, action + flight::kActions);
+  to.insert(to.end(), action, action + outputs_);
   to.push_back(n_step_return);
   to.push_back(terminated ? 0 : weight);
   to.insert(to.end(), next, next + inputs_);
   --p.count;
   std::copy_n(observation(i, 1), p.count * inputs_, observation(i, 0));
-  std::copy_n(action + flight::kActions, p.count * flight::kActions, action);
+  std::copy_n(action + outputs_, p.count * outputs_, action);
   std::copy_n(reward + 1, p.count, reward);
 }
 

@@ -60,11 +60,11 @@ class Collector {
   flight::Fleet<float> fleet_;
   std::size_t first_item_ = 0, last_item_ = 0;  // blocks that are flown here
   std::vector<flight::Snapshot<float>> pool_;
-  std::size_t inputs_, kept_;
+  std::size_t inputs_, outputs_, kept_;
   std::uint32_t paid_ticks_;
   std::vector<Pending> pending_;            // of each flapper
   std::vector<float> observations_;         // [flapper][kept_][inputs_]: before each action that is pending
-  std::vector<float> actions_, rewards_;    // [flapper][kept_][kActions], [flapper][kept_]
+  std::vector<float> actions_, rewards_;    // [flapper][kept_][outputs_], [flapper][kept_]
   std::vector<std::vector<float>> staged_;  // of each block: transitions, row after row as Replay has them
   std::vector<double> seconds_;             // of each block
 };

@@ -96,7 +96,7 @@ class Reader {
       for (std::uint32_t ago = 1; ago < c_.fly.fleet.task.history; ++ago)
         list->insert(list->end(), now.begin(), now.end());
     }
-    l.shape = {static_cast<int>(l.actor_input.mean.size()), 0, flight::kActions};
+    l.shape = {static_cast<int>(l.actor_input.mean.size()), 0, c_.fly.fleet.task.actions()};
   }
 
   void read_collection() {

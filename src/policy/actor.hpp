@@ -9,8 +9,8 @@
 
 namespace flappy::policy {
 
-inline constexpr int kActions = 4;
-inline constexpr int kMaxObservation = 40;  // all parts together
+inline constexpr int kMaxActions = 4;       // of the wing beat; two voltages
+inline constexpr int kMaxObservation = 44;  // all parts together
 inline constexpr int kMaxHistory = 8;       // observations that an actor sees at once
 
 inline constexpr int kMaxLayers = 32, kMaxWidth = 2048;

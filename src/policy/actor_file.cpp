@@ -81,8 +81,9 @@ Actor read_actor(const std::filesystem::path& path) {
   count("observation", a.observation.size(), inputs);
   count("mean", a.mean.size(), inputs);
   count("scale", a.scale.size(), inputs);
-  count("action", a.action.size(), kActions);
-  count("widths", static_cast<std::size_t>(a.widths.back()), kActions);
+  if (a.action.empty() || a.action.size() > kMaxActions)
+    refuse(path, "action has " + std::to_string(a.action.size()) + " entries", "1 to " + std::to_string(kMaxActions));
+  count("action", a.action.size(), static_cast<std::size_t>(a.widths.back()));
   count("weights", a.weights.size(), weight_count(a.widths, a.layer_norm));
   for (const auto* numbers : {&a.mean, &a.scale, &a.weights})
     for (const double x : *numbers)

@@ -7,8 +7,8 @@
 
 namespace flappy::policy {
 
-/// A policy from raw physical observations to what it adds to the controller's output: volts, and split cycle in fractions
-/// of a beat.
+/// A policy from raw physical observations to what it adds to the controller's output, volts and split cycle in fractions of a
+/// beat, or to the voltages of both motors.
 class Policy {
  public:
   virtual ~Policy() = default;

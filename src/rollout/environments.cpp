@@ -85,10 +85,10 @@ class EnvironmentsOf final : public Environments {
     io::parallel_for(fleet_->blocks(), fleet_->options().batch.threads, [&](std::size_t block) {
       const auto [first, last] = fleet_->flappers(block);
       for (std::size_t i = first; i < last; ++i) {
-        T clamped[flight::kActions];
+        T clamped[flight::kMaxActions];
         for (std::size_t k = 0; k < actions; ++k)
           clamped[k] = static_cast<T>(std::min(std::max(action[i * actions + k], -1.0F), 1.0F));
-        fleet_->set_action(i, std::span(clamped, actions));
+        fleet_->set_action(i, std::span<const T>(clamped, actions));
       }
       fleet_->fly_block(block);
       for (std::size_t i = first; i < last; ++i) gather(i, to);

@@ -109,6 +109,7 @@ class Reader {
     read_files();
     if (root_.has("actor")) c_.actor = fitting_actor(root_, c_.fleet.task);
     root_.finish();
+    if (c_.fleet.task.sets_voltages()) refuse_inputs();
     if (c_.welded && c_.fleet.task.start.settled)
       root_.fail("flight.support",
                  "is \"welded\", but task " + io::toml_string(c_.fleet.task.name) + " starts from hover", "\"task\"");
@@ -170,6 +171,18 @@ class Reader {
     } else if (!to_["randomisation"].empty()) {
       root_.fail("randomisation", "is missing, but overridden", "a file of [[randomise]] tables");
     }
+  }
+
+  /// Where a policy sets the motors' voltages, nobody else has a say in them.
+  void refuse_inputs() const {
+    const std::string sets = "but the actions of task " + io::toml_string(c_.fleet.task.name) + " are the motors' voltages";
+    if (c_.fleet.controller.kind != flight::kNoController)
+      root_.fail("controller", "is " + io::toml_string(flight::controller_name(c_.fleet.controller.kind)) + ", " + sets,
+                 "a file of kind = \"none\"");
+    flight::Excitation constant;
+    constant.constant = c_.excitation.constant;
+    if (constant.acts()) root_.fail("constant_input", "is added to inputs of the wing beat, " + sets, "none");
+    if (c_.excitation.changes()) root_.fail("excitation", "is added to inputs of the wing beat, " + sets, "none");
   }
 
   void check_times() const {

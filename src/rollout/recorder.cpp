@@ -50,6 +50,8 @@ std::vector<DriverUpdate> driver_updates(flight::Fleet<T>& fleet, std::size_t i)
   auto& body = sim::storage_of(fleet.batch());
   const auto [block, lane] = body.at(i);
   const auto drive = sim::get<sim::Drive<double>>(block.drive, lane);
+  const auto steps = static_cast<std::int64_t>(std::lround(fleet.period_s() / body.step_s));
+  if (drive.direct > 0) return {{body.steps - steps, 0, {}, drive.voltages.left_V, drive.voltages.right_V}};
   const auto parameters = sim::get<model::Parameters<double>>(block.parameters, lane);
   const auto& in = drive.input;
   const auto& limit = drive.limit;
@@ -59,7 +61,6 @@ std::vector<DriverUpdate> driver_updates(flight::Fleet<T>& fleet, std::size_t i)
       clip(in.bias_V, -limit.bias_V, limit.bias_V), clip(in.split_cycle, -limit.split_cycle, limit.split_cycle)};
   const model::WingBeat<L> beat{L(u.amplitude_V), L(u.difference_V), L(u.bias_V), L(u.split_cycle)};
 
-  const auto steps = static_cast<std::int64_t>(std::lround(fleet.period_s() / body.step_s));
   std::vector<DriverUpdate> list;
   const auto every = static_cast<std::int64_t>(body.steps_per_update);
   for (std::int64_t step = (body.steps - steps + every - 1) / every * every; step < body.steps; step += every)
@@ -136,8 +137,7 @@ struct Recorder<T>::Storage {
     h.imu = imu_header(o.sensors.imu);
     h.power = config.log.power;
     h.wings = config.log.wings;
-    log.command.inputs.emplace();
-    log.command.phase_rad.emplace();
+    if (!o.task.sets_voltages()) log.command.inputs.emplace(), log.command.phase_rad.emplace();
     if (h.power) log.power.emplace(), power = TickSampler(h.power->rate_hz);
     if (h.wings) log.wings.emplace(), wings = TickSampler(h.wings->rate_hz);
     if (h.power) {  // a meter needs the rows of effects, whatever is in force
@@ -203,13 +203,14 @@ struct Recorder<T>::Storage {
     c.t_s.push_back(time_s(u.step));
     c.left_voltage_V.push_back(u.left_V);
     c.right_voltage_V.push_back(u.right_V);
+    held_V[0] = u.left_V;
+    held_V[1] = u.right_V;
+    if (!c.inputs) return;  // of voltages that are set directly
     c.inputs->amplitude_V.push_back(u.input.amplitude_V);
     c.inputs->difference_V.push_back(u.input.difference_V);
     c.inputs->bias_V.push_back(u.input.bias_V);
     c.inputs->split_cycle.push_back(u.input.split_cycle);
     c.phase_rad->push_back(2 * kPi * 0x1p-32 * u.phase);
-    held_V[0] = u.left_V;
-    held_V[1] = u.right_V;
   }
 
   double normal(sim::Stream stream, std::uint32_t index) {

@@ -16,7 +16,7 @@ struct DriverUpdate {
 };
 
 /// The updates of flapper `i` within the fleet's last control period: the physics applies them between the samples that
-/// a batch shows, so they are worked out once more, to the bit.
+/// a batch shows, so they are worked out once more, to the bit. Of voltages that were set directly: one, when the period began.
 template <class T>
 std::vector<DriverUpdate> driver_updates(flight::Fleet<T>& fleet, std::size_t i);
 

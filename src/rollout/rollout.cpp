@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 
 namespace flappy::rollout {
@@ -68,7 +69,7 @@ void Rollout<T>::step() {
   if (!recorders_.empty()) each([&](std::size_t i) { recorders_[i].record(); });
 }
 
-/// The policy sees what the task shows and says what is added.
+/// The policy sees what the task shows and says what is added, or the voltages.
 template <class T>
 void Rollout<T>::act() {
   std::vector<std::size_t> acting;
@@ -80,14 +81,14 @@ void Rollout<T>::act() {
   }
   if (acting.empty()) return;
   if (observation.size() != acting.size() * static_cast<std::size_t>(policy_->observations()) ||
-      policy_->actions() != flight::kActions)
+      policy_->actions() != config_.fleet.task.actions())
     throw std::invalid_argument("the policy's observation or action is not that of the task");
-  std::vector<float> action(acting.size() * flight::kActions);
+  const auto outputs = static_cast<std::size_t>(policy_->actions());
+  std::vector<float> action(acting.size() * outputs);
   policy_->act(acting.size(), observation.data(), action.data());
-  for (std::size_t row = 0; row < acting.size(); ++row) {
-    const float* a = &action[row * flight::kActions];
-    fleet_.set_adds(acting[row], {a[0], a[1], a[2], a[3]});
-  }
+  const std::vector<double> adds(action.begin(), action.end());
+  for (std::size_t row = 0; row < acting.size(); ++row)
+    fleet_.set_adds(acting[row], std::span(adds).subspan(row * outputs, outputs));
 }
 
 template <class T>

@@ -33,6 +33,8 @@ void show(Watch& watch, const flight::Fleet<T>& fleet) {
     std::ranges::copy(gyro, s.gyro_rad_s);
     std::ranges::copy(accel, s.accel_m_s2);
     s.input = fleet.input(i);
+    s.sets_voltages = fleet.options().task.sets_voltages();
+    if (s.sets_voltages) s.left_V = fleet.adds(i)[0], s.right_V = fleet.adds(i)[1];
     watch.see(s);
   }
 }

@@ -18,7 +18,9 @@ struct FlightSample {
   double t_s = 0;                       ///< since then
   sim::FlapperState state;              ///< true
   double gyro_rad_s[3], accel_m_s2[3];  ///< as its IMU means them, in B; without noise
-  sim::Input input;                     ///< as controller and actor set it
+  sim::Input input;                     ///< as controller and actor set it; nothing where the actor sets voltages
+  bool sets_voltages = false;
+  double left_V = 0, right_V = 0;  ///< as it sets them, where it does
 };
 
 /// Whoever watches. Flights ask it after each control period; it may be told from another thread whom to watch.

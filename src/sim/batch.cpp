@@ -259,6 +259,7 @@ void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   auto drive = get<Drive<double>>(block.drive, lane);
   drive.input = {0, 0, 0, 0};
   drive.voltages = {0, 0};
+  drive.direct = 0;
   put(drive, block.drive, lane);
   block.phase[lane] = 0;
   storage_->clear_energy(i);
@@ -270,6 +271,18 @@ void Batch<T>::set_input(std::size_t i, const Input& input) {
   const auto [block, lane] = storage_->at(i);
   auto drive = get<Drive<double>>(block.drive, lane);
   drive.input = {input.amplitude_V, input.difference_V, input.bias_V, input.split_cycle};
+  drive.direct = 0;
+  put(drive, block.drive, lane);
+}
+
+template <class T>
+void Batch<T>::set_voltages(std::size_t i, double left_V, double right_V) {
+  const auto [block, lane] = storage_->at(i);
+  const auto p = get<Parameters<double>>(block.parameters, lane);
+  const auto clipped = [](double value, double limit) { return model::clamp(value, -limit, limit); };
+  auto drive = get<Drive<double>>(block.drive, lane);
+  drive.voltages = {clipped(left_V, p.left.voltage_limit_V), clipped(right_V, p.right.voltage_limit_V)};
+  drive.direct = 1;
   put(drive, block.drive, lane);
 }
 
@@ -352,7 +365,9 @@ std::uint64_t Batch<T>::hash(std::size_t first, std::size_t last) const {
     const auto [block, lane] = storage_->at(i);
     std::uint64_t h = 0;
     for (const auto& row : block.state) h = mixed(h, bits_of(row[lane]));
-    for (const auto& row : block.drive) h = mixed(h, bits_of(row[lane]));
+    // the last row is no part of hashes where the wing beat drives: those on record are older
+    for (int r = 0; r < kDirectRow + (block.drive[kDirectRow][lane] > 0); ++r)
+      h = mixed(h, bits_of(block.drive[r][lane]));
     h = mixed(mixed(h, block.phase[lane]), block.status[lane]);
     storage_->for_states(i, storage_->effects_of_lane(i) & ~model::sensor_effects(),
                          [&](T number) { h = mixed(h, bits_of(number)); });

@@ -24,6 +24,7 @@ struct Drive {
   model::WingBeat<T> input;  // as commanded
   model::WingBeat<T> limit;  // |input| is clipped to it
   Voltages<T> voltages;
+  T direct;  // 1: the voltages stay as they were set, 0: the wing beat gives them
 };
 
 }  // namespace FLAPPY_ISA
@@ -35,6 +36,7 @@ inline constexpr int kLanes = 64 / sizeof(T);
 inline constexpr int kParameterRows = model::kRows<model::Parameters>;
 inline constexpr int kStateRows = model::kRows<model::State>;
 inline constexpr int kDriveRows = model::kRows<Drive>;
+inline constexpr int kDirectRow = kDriveRows - 1;  // of Drive: its last
 
 template <class T>
 struct alignas(64) Block {

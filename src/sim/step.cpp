@@ -22,10 +22,11 @@ constexpr double kPlausiblePosition_m = 10000;
 /// A flapper that rose this far has left its support: touching the ground is an event from then on.
 constexpr double kTakeOffClearance_m = 0.005;
 
-/// Driver: new voltages from the wing-beat signal, held until the next update.
+/// Driver: new voltages from the wing-beat signal, held until the next update; `held` where a flapper's are set directly, within
+/// what its motors take now.
 template <class T, class L>
 FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>& left, const SideParameters<L>& right,
-                                        int first) {
+                                        const Voltages<L>& held, int first) {
   T fraction[kWidth<T>];
   for (int i = 0; i < kWidth<T>; ++i) {
     std::uint32_t& phase = block.phase[first + i];
@@ -37,8 +38,13 @@ FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>
   const WingBeat<L> u{clamp(d.input.amplitude_V, L(0), d.limit.amplitude_V),
                       clip(d.input.difference_V, d.limit.difference_V), clip(d.input.bias_V, d.limit.bias_V),
                       clip(d.input.split_cycle, d.limit.split_cycle)};
-  return {wing_beat_voltage<+1>(u, L::load(fraction), left.voltage_limit_V),
-          wing_beat_voltage<-1>(u, L::load(fraction), right.voltage_limit_V)};
+  Voltages<L> next{wing_beat_voltage<+1>(u, L::load(fraction), left.voltage_limit_V),
+                   wing_beat_voltage<-1>(u, L::load(fraction), right.voltage_limit_V)};
+  const auto direct = d.direct > L(0);
+  if (rarely(direct))
+    next = {where(direct, clip(held.left_V, left.voltage_limit_V), next.left_V),
+            where(direct, clip(held.right_V, right.voltage_limit_V), next.right_V)};
+  return next;
 }
 
 /// Voltages that were recorded.
@@ -265,7 +271,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
       if (until_update == 0) {
         measure();
         voltages = recorded_V != nullptr ? next_recorded<T, L>(recorded_V, first)
-                                         : update_driver(block, p.left, p.right, first);
+                                         : update_driver(block, p.left, p.right, voltages, first);
         until_update = plan.steps_per_update;
       }
       prefetch.step();

@@ -43,7 +43,7 @@ std::shared_ptr<const policy::Actor> actor(const Task& task) {
     a.scale.push_back(2 / (s.high - s.low));
   }
   for (const Signal& s : task.action()) a.action.push_back(s.name);
-  a.widths = {static_cast<int>(a.observation.size()), 11, 9, kActions};
+  a.widths = {static_cast<int>(a.observation.size()), 11, 9, static_cast<int>(a.action.size())};
   a.hidden = policy::Activation::tanh;
   for (std::size_t i = 0; i < policy::weight_count(a.widths); ++i)
     a.weights.push_back(static_cast<double>(i * 37 % 101) / 128 - 0.375);
@@ -113,7 +113,7 @@ Fleet<T> fly(const FleetOptions& common, bool acting, std::size_t first, std::si
   for (std::size_t i = 0; i < count; ++i) {
     fleet.set_vehicle(i, vehicle(first + i));
     start(i, 0);
-    fleet.set_added(i, {0.1 * static_cast<double>((first + i) % 9), 0, 0, 0.001});
+    if (!o.task.sets_voltages()) fleet.set_added(i, {0.1 * static_cast<double>((first + i) % 9), 0, 0, 0.001});
   }
   for (int period = 0; period < kPeriods; ++period) {
     fleet.step();
@@ -192,11 +192,46 @@ void one_take_off(std::uint64_t golden) {
 TEST(ClosedLoopDeterminism, TakeOffInFloat) { one_take_off<float>(kGoldenTakeOffFloat); }
 TEST(ClosedLoopDeterminism, TakeOffInDouble) { one_take_off<double>(kGoldenTakeOffDouble); }
 
+// ---- a policy that sets voltages and sees the wings, under exploration
+
+constexpr std::uint64_t kGoldenVoltagesFloat = 0;
+constexpr std::uint64_t kGoldenVoltagesDouble = 0;
+
+template <class T>
+std::uint64_t hash_by_voltages(std::size_t size, int threads, const std::string& set) {
+  FleetOptions o = options("pid");
+  o.controller = {};
+  o.task = task(voltages_task("\"goal_rotation\", \"velocity\", \"body_rate\", \"previous_action\", \"wings\""), 0.001);
+  o.task.action_repeat = 2, o.task.history = 2;
+  std::uint64_t all = 0;
+  for (std::size_t first = 0; first < kSmall; first += size) {
+    const Fleet<T> fleet = fly<T>(o, true, first, std::min(size, kSmall - first), threads, set);
+    EXPECT_EQ(fleet.batch().count_status(sim::kFrozen), 0u);
+    for (std::size_t i = 0; i < fleet.size(); ++i) all = all * 31 + fleet.hash(i, i + 1);
+  }
+  return all;
+}
+
+template <class T>
+void one_hash_by_voltages(std::uint64_t golden) {
+  for (const std::string& set : test::instruction_sets())
+    for (const std::size_t size : test::kBatchSizes)
+      for (const int threads : test::kThreads) {
+        if (size == 1 && threads > 1) continue;
+        const std::uint64_t hash = hash_by_voltages<T>(size, threads, set);
+        EXPECT_EQ(hash, golden) << set << ", batches of " << size << ", " << threads << " threads: 0x" << std::hex
+                                << hash;
+      }
+}
+
+TEST(ClosedLoopDeterminism, VoltagesInFloat) { one_hash_by_voltages<float>(kGoldenVoltagesFloat); }
+TEST(ClosedLoopDeterminism, VoltagesInDouble) { one_hash_by_voltages<double>(kGoldenVoltagesDouble); }
+
 TEST(ClosedLoopDeterminism, HashSeesNoiseActionsAndTime) {
   const FleetOptions o = options("pid");
   Fleet<float> a = fly<float>(o, false, 0, 3, 1, ""), b = fly<float>(o, false, 0, 3, 1, "");
   EXPECT_EQ(a.hash(), b.hash());
-  b.set_action(1, {0, 0, 0, 1e-6});
+  b.set_action(1, std::array{0.0, 0.0, 0.0, 1e-6});
   EXPECT_NE(a.hash(), b.hash());
   EXPECT_EQ(a.hash(0, 1), b.hash(0, 1));
   FleetOptions other = o;

@@ -6,10 +6,12 @@
 #include <Eigen/Geometry>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <random>
 
 #include "flight/fleets.hpp"
+#include "refusal.hpp"
 
 namespace flappy::flight {
 namespace {
@@ -35,7 +37,7 @@ Sample random_sample(std::mt19937& engine) {
   s.truth = {vector(0.5), {q.w(), q.x(), q.y(), q.z()}, vector(1), vector(10)};
   s.ref = {vector(0.5), vector(1), vector(1), {std::sin(heading), std::cos(heading)}, normal(engine)};
   s.episode = {};
-  for (int i = 0; i < kActions; ++i) {
+  for (int i = 0; i < kMaxActions; ++i) {
     s.episode.action[i] = std::tanh(normal(engine)), s.episode.previous[i] = std::tanh(normal(engine));
     s.episode.added[i] = normal(engine);
   }
@@ -130,8 +132,8 @@ TEST(Reward, SeesHowTheActionChanges) {
   Fleet<double> fleet(1, test::nominal(), o);
   const double expected[4] = {-0.5, 0, -0.25, 0};
   for (int period = 0; period < 4; ++period) {
-    if (period == 0) fleet.set_action(0, {0.5, 0, -0.5, 0});
-    if (period == 2) fleet.set_action(0, {0, 0, -0.5, 0});
+    if (period == 0) fleet.set_action(0, std::array{0.5, 0.0, -0.5, 0.0});
+    if (period == 2) fleet.set_action(0, std::array{0.0, 0.0, -0.5, 0.0});
     fleet.step();
     EXPECT_NEAR(fleet.reward(0), expected[period], 1e-12) << period;
   }
@@ -263,7 +265,7 @@ TEST(HandBack, NeedsEveryConditionAndLatches) {
   fleet.start(0, 0, s, sim::Start::flying);
   s.position_m[2] = -0.1;
   fleet.start(1, 0, s, sim::Start::flying);
-  for (std::size_t i = 0; i < 2; ++i) fleet.set_action(i, {1, 1, 1, 1});
+  for (std::size_t i = 0; i < 2; ++i) fleet.set_action(i, std::array{1.0, 1.0, 1.0, 1.0});
   bool was = false;
   for (int period = 0; period < 200; ++period) {
     const bool before = fleet.handed_back(0);
@@ -287,7 +289,7 @@ TEST(Action, SpansItsRangeAboutTheMiddleAndIsClipped) {
   text.replace(text.find("amplitude_V = [-5.0, 5.0]"), 25, "amplitude_V = [-1.0, 3.0]");
   Fleet<double> fleet(1, test::nominal(), fleet_options(sensors("paper"), {}, task(text)));
   const auto amplitude = [&](double a) {
-    fleet.set_action(0, {a, a, a, a});
+    fleet.set_action(0, std::array{a, a, a, a});
     fleet.step();
     EXPECT_NEAR(fleet.input(0).split_cycle, 0.15 * std::min(1.0, std::max(-1.0, a)) + 0.01, 1e-12);
     return fleet.input(0).amplitude_V;
@@ -346,9 +348,121 @@ TEST(Observation, RowsAreWhatTheirNamesSay) {
             << names[k] << ", period " << period;
     }
     for (std::size_t i = 0; i < 3; ++i)
-      fleet.set_action(i, {0.01 * period, 0.01 * period - 0.1, 0.01 * period - 0.2, 0.01 * period - 0.3});
+      fleet.set_action(i, std::array{0.01 * period, 0.01 * period - 0.1, 0.01 * period - 0.2, 0.01 * period - 0.3});
     fleet.step();
   }
+}
+
+/// A batch that is given the voltages by hand flies the same; what is seen of the wings is where they are.
+template <class T>
+void fly_by_voltages() {
+  const Task t = task(voltages_task("\"previous_action\", \"wings\", \"body_rate\""));
+  Fleet<T> fleet(3, test::nominal(), fleet_options(sensors("paper"), {}, t));
+  sim::Batch<T> by_hand(3, test::nominal(), fleet.options().batch);
+  std::vector<std::string> names;
+  for (const Signal& s : t.observation()) names.push_back(s.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"roll_rate", "pitch_rate", "yaw_rate", "previous_left_voltage",
+                                             "previous_right_voltage", "left_stroke", "right_stroke",
+                                             "left_stroke_rate", "right_stroke_rate"}));
+  ASSERT_EQ(t.action().size(), 2u);
+  EXPECT_EQ(t.action()[0].name, "left_voltage");
+  EXPECT_EQ(t.action()[1].unit, "V");
+  EXPECT_EQ(t.action()[0].low, -20);
+  for (std::size_t i = 0; i < 3; ++i) by_hand.reset(i, {});
+  for (int period = 0; period < 60; ++period) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double a = 0.9 * std::sin(0.43 * period + static_cast<double>(i)), b = i == 2 ? -1.3 : 0.8 * a;
+      fleet.set_action(i, std::array{a, b});
+      const auto adds = fleet.adds(i);
+      EXPECT_NEAR(adds[0], -1 + 19 * a, 1e-5);
+      EXPECT_NEAR(adds[1], 17 * std::max(b, -1.0), 1e-5);
+      EXPECT_EQ(adds[2], 0);
+      EXPECT_EQ(fleet.action(i)[3], 0);
+      by_hand.set_voltages(i, adds[0], adds[1]);
+    }
+    fleet.step();
+    by_hand.step(8);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const sim::FlapperState x = fleet.batch().state(i), y = by_hand.state(i);
+      ASSERT_EQ(std::memcmp(&x, &y, sizeof x), 0) << period;
+      EXPECT_EQ(fleet.input(i).amplitude_V, 0);
+      const std::vector<double> seen = fleet.observation(i);
+      ASSERT_EQ(seen.size(), names.size());
+      EXPECT_EQ(seen[3], fleet.adds(i)[0]);
+      for (std::size_t side = 0; side < 2; ++side) {
+        EXPECT_EQ(seen[5 + side], x.stroke_rad[side]);
+        EXPECT_EQ(seen[7 + side], x.stroke_rate_rad_s[side]);
+      }
+      std::vector<T> all(names.size());
+      fleet.true_observation(i, all.data());
+      EXPECT_EQ(all[5], seen[5]);
+    }
+  }
+  EXPECT_GT(std::abs(by_hand.state(0).stroke_rad[0]), 0.1);
+  // as a snapshot has it, it flies on
+  const auto voltages = fleet.adds(0);
+  const auto before = fleet.batch().state(0);
+  fleet.start(1, 5, fleet.snapshot(0));
+  EXPECT_EQ(fleet.batch().state(1).stroke_rate_rad_s[1], before.stroke_rate_rad_s[1]);
+  EXPECT_EQ(fleet.observation(1)[7], fleet.observation(0)[7]);
+  EXPECT_EQ(fleet.adds(1)[0], -1);  // its own action is the middle of the range until it acts
+  EXPECT_NE(fleet.adds(0)[0], -1);
+  EXPECT_EQ(fleet.adds(0), voltages);
+}
+TEST(Voltages, OfAPolicyReachTheMotors) {
+  fly_by_voltages<float>();
+  fly_by_voltages<double>();
+}
+
+TEST(Voltages, AreScoredAsTheirActionsAre) {
+  Task t = task(voltages_task());
+  t.constants.reward.action = 1, t.constants.reward.action_change = 10, t.constants.reward.cost = 1;
+  t.constants.reward.alive = t.constants.reward.position = 0;
+  Fleet<double> fleet(1, test::nominal(), fleet_options(sensors("paper"), {}, t));
+  fleet.set_action(0, std::array{0.5, -0.25});
+  fleet.step();
+  EXPECT_NEAR(fleet.reward(0), -11 * (0.25 + 0.0625), 1e-12);
+  fleet.step();
+  EXPECT_NEAR(fleet.reward(0), -(0.25 + 0.0625), 1e-12);
+}
+
+TEST(Voltages, HaveNoControllerBesideThem) {
+  const auto o = fleet_options(sensors("paper"), {}, task(voltages_task()));
+  Fleet<float> fleet(1, test::nominal(), o);
+  EXPECT_THROW(fleet.set_action(0, std::array{0.0, 0.0, 0.0, 0.0}), std::invalid_argument);
+  EXPECT_THROW(fleet.set_adds(0, std::array{0.0}), std::invalid_argument);
+  EXPECT_THROW(fleet.set_added(0, {1, 0, 0, 0}), std::invalid_argument);
+  fleet.set_added(0, {});
+  FleetOptions led = o;
+  led.controller = controller("pid");
+  EXPECT_THROW(Fleet<float>(1, test::nominal(), led), std::invalid_argument);
+
+  const auto refused = [](const std::string& text) { return test::refusal([&] { task(text); }); };
+  EXPECT_EQ(refused(voltages_task()), "accepted");
+  const auto with = [&](const std::string& line) { return refused(voltages_task().insert(0, line + "\n")); };
+  EXPECT_EQ(with("base = \"trim\""),
+            "task.toml:1:1: base: is \"trim\", but an action of kind \"voltages\" has no controller beside it; accepted: "
+            "no base, or \"controller\"");
+  EXPECT_EQ(with("hand_back = {at_s = 1.0}"),
+            "task.toml:1:1: hand_back: is given, but an action of kind \"voltages\" has no controller beside it; "
+            "accepted: a task without it");
+  EXPECT_NE(refused(voltages_task("\"wings\"", "kind = \"settled\"")).find("start.kind: is \"settled\", but"),
+            std::string::npos);
+  for (const char* part : {"trim", "beat_phase"})
+    EXPECT_NE(refused(voltages_task("\"" + std::string(part) + "\""))
+                  .find("observation: " + std::string(part) + " is of a controller or a wing beat"),
+              std::string::npos);
+  const auto replaced = [&](const std::string& from, const std::string& to) {
+    std::string text = voltages_task();
+    return refused(text.replace(text.find(from), from.size(), to));
+  };
+  EXPECT_NE(replaced("kind = \"voltages\"\nleft_V", "kind = \"volts\"\nleft_V").find("did you mean \"voltages\"?"),
+            std::string::npos);
+  EXPECT_NE(replaced("left_V = [-20.0, 18.0]", "left_V = [1.0, -1.0]").find("action.left_V: is no range; accepted: [low"),
+            std::string::npos);
+  EXPECT_NE(replaced("left_V = [-20.0, 18.0]", "bias_V = [-1.0, 1.0]").find("action.left_V: "), std::string::npos);
+  EXPECT_NE(replaced("right_V = [", "bias_V = [-1.0, 1.0]\nright_V = [").find("action.bias_V: unknown key"),
+            std::string::npos);
 }
 
 TEST(Starts, FallWithinTheirRangesAndDependOnTheirKeyAlone) {

@@ -53,6 +53,15 @@ inline std::string staying(const std::string& start = "kind = \"flying\"") {
   return along(waypoint(0, 0, 0, 0), start);
 }
 
+/// A task whose actions are the motors' voltages.
+inline std::string voltages_task(const std::string& observation = "\"position_error\", \"wings\"",
+                                 const std::string& start = "kind = \"flying\"") {
+  std::string text = along(waypoint(0, 0, 0, 0), start, observation);
+  const std::size_t action = text.find("amplitude_V"), reward = text.find("[reward]");
+  return text.replace(action, reward - action,
+                      "kind = \"voltages\"\nleft_V = [-20.0, 18.0]\nright_V = [-17.0, 17.0]\n");
+}
+
 inline FleetOptions fleet_options(const Sensors& sensors, const Controller& controller, const Task& task,
                                   int threads = 1) {
   FleetOptions o;

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "learn/training.hpp"
+#include "sim/lanes.hpp"
 
 namespace flappy::learn {
 namespace {
@@ -17,7 +18,7 @@ constexpr int kSteps = 60;  // of 10 ms: every flight begins again
 /// A policy that stirs.
 std::shared_ptr<const policy::Actor> actor_of(const TrainConfig& c) {
   policy::Actor a = c.blank_actor();
-  a.widths = {static_cast<int>(a.observation.size()), 5, flight::kActions};
+  a.widths = {static_cast<int>(a.observation.size()), 5, static_cast<int>(a.action.size())};
   a.mean.assign(a.observation.size(), 0);
   a.scale.assign(a.observation.size(), 0.3);
   for (std::size_t k = 0; k < policy::weight_count(a.widths); ++k)
@@ -194,6 +195,35 @@ TEST(Collector, ATimeOutIsNoTermination) {
   }
   EXPECT_EQ(of_one, 2 * c.flappers);  // the last action of each episode
   EXPECT_EQ(of_one + of_two, all.replay.size());
+}
+
+/// Every transition's action is what the policy makes of its observation, and its two numbers are followed by its return.
+TEST(Collector, KeepsTwoVoltagesOfEachAction) {
+  Overrides list = plain(3);
+  std::erase(list, "task.reward.until_s=0");
+  for (const char* more : {"collect.noise_low=0", "collect.noise_high=0", "task.end.distance_m=0.03"}) list.push_back(more);
+  const TrainConfig c = small_training(list, "hover_voltages");
+  ASSERT_EQ(c.learner.shape.action, 2);
+  const Collected all = collect(c, 90);
+  const policy::Actor a = *actor_of(c);
+  const std::vector<float> weights(a.weights.begin(), a.weights.end()), mean(a.mean.begin(), a.mean.end()),
+      scale(a.scale.begin(), a.scale.end());
+  const auto view = policy::view_of(a, weights.data(), mean.data(), scale.data());
+  using L = model::Lanes<float, 1>;
+  const TransitionLayout& at = all.replay.layout();
+  ASSERT_GT(all.replay.size(), 80 * c.flappers);
+  EXPECT_GT(all.sums.terminated, 0);
+  std::set<float> left;
+  for (std::size_t k = 0; k < all.replay.size(); ++k) {
+    const float* row = all.replay.row(k);
+    std::vector<L> seen, acted(2);
+    for (std::size_t i = 0; i < a.observation.size(); ++i) seen.push_back(L::load(row + at.actor_observation + i));
+    policy::evaluate(view, seen.data(), acted.data());
+    for (std::size_t i = 0; i < 2; ++i) ASSERT_EQ(row[at.action + i], acted[i].raw[0]) << k;
+    ASSERT_GT(row[at.reward], 0);
+    left.insert(row[at.action]);
+  }
+  EXPECT_GT(left.size(), all.replay.size() / 2);
 }
 
 TEST(Collector, VehiclesAndStartsDiffer) {

@@ -9,6 +9,7 @@
 #include "learn/checkpoint.hpp"
 #include "learn/metrics.hpp"
 #include "learn/training.hpp"
+#include "rollout/rollout.hpp"
 
 namespace flappy::learn {
 namespace {
@@ -62,6 +63,29 @@ TEST(Trainer, LeavesTheSameBytesWhateverTheThreadsAndTheInstructionSet) {
   const fs::path seeded = fresh("seed");
   train_in(seeded, small_training({"seed=4"}));
   EXPECT_FALSE(left_in(seeded) == expected);
+}
+
+/// Two actions instead of four: on either engine, through a stop, to a policy that is evaluated and flies.
+TEST(Trainer, TrainsVoltages) {
+  for (const char* engine : {"lanes", "libtorch"}) {
+    if (std::string(engine) == "libtorch" && !has_libtorch()) continue;
+    const TrainConfig c =
+        small_training({std::string("learn.engine=") + engine, "collect.flappers=17", "threads=2"}, "hover_voltages");
+    const fs::path whole = fresh("voltages"), stopped = fresh("voltages_stopped");
+    EXPECT_EQ(train_in(whole, c).updates, 24u);
+    train_in(stopped, c, [](const TrainProgress& p) { return p.update < 10; });
+    const auto from = unfinished_run_in(stopped);
+    ASSERT_TRUE(from);
+    train_in(stopped, c, {}, from);
+    EXPECT_TRUE(left_in(stopped) == left_in(whole)) << engine;
+    const policy::Actor best = policy::read_actor(whole / "best.json");
+    EXPECT_EQ(best.action, (std::vector<std::string>{"left_voltage", "right_voltage"}));
+    EXPECT_EQ(best.widths, (std::vector<int>{22, 16, 2}));
+    rollout::Rollout<float> flight(rollout::read_fly_config(whole / "config" / "fly.toml", {"flight.duration_s=0.02"}), 1);
+    while (!flight.over()) flight.step();
+    EXPECT_GT(std::abs(flight.fleet().adds(0)[1]), 0);
+    EXPECT_GT(std::abs(flight.fleet().batch().state(0).stroke_rate_rad_s[1]), 0);
+  }
 }
 
 TEST(Trainer, GoesOnFromAnyStopAsIfNothingHadBeen) {

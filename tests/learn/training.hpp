@@ -11,8 +11,8 @@ namespace flappy::learn {
 
 using Overrides = std::vector<std::string>;
 
-/// The escape with a few flappers and small networks; later overrides win.
-inline TrainConfig small_training(const Overrides& overrides = {}) {
+/// The escape, or another training, with a few flappers and small networks; later overrides win.
+inline TrainConfig small_training(const Overrides& overrides = {}, const std::string& name = "escape") {
   Overrides all = {"seed=3",
                    "threads=1",
                    "networks.actor=[16]",
@@ -31,7 +31,7 @@ inline TrainConfig small_training(const Overrides& overrides = {}) {
                    "task.success.keep.from_s=0.36",
                    "task.success.keep.until_s=0.4"};
   all.insert(all.end(), overrides.begin(), overrides.end());
-  return read_train_config(test::source_path("configs/train/escape.toml"), all);
+  return read_train_config(test::source_path("configs/train/" + name + ".toml"), all);
 }
 
 }  // namespace flappy::learn

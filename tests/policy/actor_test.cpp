@@ -110,7 +110,7 @@ void lanes_agree() {
       std::vector<L> in(static_cast<std::size_t>(widths[0]));
       for (L& row : in)
         for (int i = 0; i < N; ++i) row.raw[i] = static_cast<T>(normal(engine));
-      L out[kActions];
+      L out[kMaxActions];
       evaluate(numbers.view, in.data(), out);
       for (int i = 0; i < N; ++i) {
         std::vector<double> alone;
@@ -123,9 +123,9 @@ void lanes_agree() {
       // a lane of NaN is nobody else's affair
       const std::vector<L> good = in;
       for (L& row : in) row.raw[1] = std::numeric_limits<T>::quiet_NaN();
-      L beside[kActions];
+      L beside[kMaxActions];
       evaluate(numbers.view, in.data(), beside);
-      for (int k = 0; k < kActions; ++k)
+      for (int k = 0; k < kMaxActions; ++k)
         for (int i = 0; i < N; ++i)
           if (i != 1) EXPECT_EQ(beside[k].raw[i], out[k].raw[i]);
     }
@@ -178,7 +178,7 @@ TEST(Actor, ActsInAFleetOnWhatItObserves) {
       if (past[i].empty()) past[i].insert(past[i].end(), seen.begin(), seen.begin() + 18);
       past[i].insert(past[i].end(), seen.begin(), seen.begin() + 18);
       const std::vector<double> y = expected(*actor, seen);
-      by_hand.set_action(i, {y[0], y[1], y[2], y[3]});
+      by_hand.set_action(i, std::array{y[0], y[1], y[2], y[3]});
     }
     with.step();
     by_hand.step();
@@ -199,7 +199,7 @@ TEST(Actor, HoldsItsActionAndGathersWhatItEarns) {
     if (tick % 3 == 0) acted = expected(*actor, fleet.observation(0)), gained = 0;
     fleet.step();
     gained += fleet.reward(0);
-    for (std::size_t k = 0; k < kActions; ++k) ASSERT_NEAR(fleet.action(0)[k], acted[k], 1e-12) << tick;
+    for (std::size_t k = 0; k < kMaxActions; ++k) ASSERT_NEAR(fleet.action(0)[k], acted[k], 1e-12) << tick;
     ASSERT_NEAR(fleet.action_reward(0), gained, 1e-12) << tick;
     ASSERT_EQ(fleet.tick(1), tick < 7 ? tick + 1 : tick - 6);
   }
@@ -215,14 +215,14 @@ TEST(Actor, ExploresWithNoiseOfItsDeviationAndMemory) {
   Fleet<float> fleet(n, test::nominal(), o);
   fleet.set_actor(std::make_shared<policy::Actor>(quiet));
   fleet.set_exploration({0.05, 0.15, 0.6});
-  std::vector<std::array<float, kActions>> last(n);
+  std::vector<std::array<float, kMaxActions>> last(n);
   double low = 0, high = 0, with_last = 0, of_two = 0;
   const double burn_in = 15;  // 0.6^15 of the start, which is at rest, is left
   for (int step = 0; step < steps; ++step) {
     fleet.step(), fleet.step();
     for (std::size_t i = 0; i < n; ++i) {
       const auto a = fleet.action(i);
-      for (std::size_t k = 0; k < kActions && step >= burn_in; ++k) {
+      for (std::size_t k = 0; k < kMaxActions && step >= burn_in; ++k) {
         (i < n / 2 ? low : high) += a[k] * a[k];
         const double deviation = 0.05 + 0.1 * static_cast<double>(i) / (n - 1);
         with_last += a[k] * last[i][k] / (deviation * deviation), of_two += 1;
@@ -318,7 +318,8 @@ TEST(ActorFile, RefusesWhatIsNoActor) {
   has(with([](policy::Actor& a) { a.widths = {3, 2049, 4}; }), "2049 wide; accepted: 1 to 2048");
   has(with([](policy::Actor& a) { a.widths = {3, 0, 4}; }), "0 wide");
   has(with([](policy::Actor& a) { a.widths = {3, -5, 4}; }), "-5 wide");
-  has(with([](policy::Actor& a) { a.widths = {3, 5, 3}; }), "widths has 3");
+  has(with([](policy::Actor& a) { a.widths = {3, 5, 3}; }), "action has 4 entries; accepted: 3 of them");
+  has(with([](policy::Actor& a) { a.action.emplace_back("more"), a.widths = {3, 5, 5}; }), "accepted: 1 to 4");
   has(with([](policy::Actor& a) { a.weights[7] = std::numeric_limits<double>::quiet_NaN(); }),
       "weights has null in it; accepted: numbers");
   has(with([](policy::Actor& a) { a.mean[1] = std::numeric_limits<double>::infinity(); }),

@@ -15,7 +15,7 @@ namespace flappy::learn {
 namespace {
 
 using flight::Folder;
-using flight::kActions;
+using flight::kMaxActions;
 using flight::message;
 using rollout::FlyConfig;
 
@@ -39,13 +39,13 @@ FlyConfig stay(const std::vector<std::string>& more = {}) {
 }
 
 /// One layer; of random weights, or the same action always: tanh(+-30) is +-1.
-std::shared_ptr<policy::Actor> actor_for(const flight::Task& task, double size, const double (&bias)[kActions]) {
+std::shared_ptr<policy::Actor> actor_for(const flight::Task& task, double size, const double (&bias)[kMaxActions]) {
   auto a = std::make_shared<policy::Actor>();
   a->task = task.name;
   for (const flight::Signal& s : task.observation()) a->observation.push_back(s.name);
   for (const flight::Signal& s : task.action()) a->action.push_back(s.name);
   const std::size_t inputs = a->observation.size();
-  a->widths = {static_cast<int>(inputs), kActions};
+  a->widths = {static_cast<int>(inputs), kMaxActions};
   a->mean.assign(inputs, 0);
   a->scale.assign(inputs, 1);
   std::mt19937 engine(3);
@@ -61,9 +61,9 @@ std::shared_ptr<policy::Actor> random_actor(const flight::Task& task) { return a
 class Outside : public policy::Policy {
  public:
   Outside(const policy::Actor& actor, const flight::Task& task)
-      : Policy(actor.widths.front(), kActions), task_(task), numbers_(actor.weights.begin(), actor.weights.end()) {
+      : Policy(actor.widths.front(), kMaxActions), task_(task), numbers_(actor.weights.begin(), actor.weights.end()) {
     view_.layers = 1;
-    view_.widths[0] = actor.widths[0], view_.widths[1] = kActions;
+    view_.widths[0] = actor.widths[0], view_.widths[1] = kMaxActions;
     numbers_.insert(numbers_.end(), actor.mean.begin(), actor.mean.end());
     numbers_.insert(numbers_.end(), actor.scale.begin(), actor.scale.end());
     view_.weights = numbers_.data();
@@ -75,10 +75,10 @@ class Outside : public policy::Policy {
     calls.push_back(count);
     using L = model::Lanes<float, 4>;
     for (std::size_t row = 0; row < count; ++row) {
-      L in[flight::kMaxObservation], out[kActions];
+      L in[flight::kMaxObservation], out[kMaxActions];
       for (int i = 0; i < observations(); ++i) in[i] = L(*observation++);
       policy::evaluate(view_, in, out);
-      for (int k = 0; k < kActions; ++k) {
+      for (int k = 0; k < kMaxActions; ++k) {
         const double low = task_.constants.action_low[k], high = task_.constants.action_high[k];
         *action++ = static_cast<float>(low + (high - low) * (static_cast<double>(out[k].raw[0]) + 1) / 2);
       }

@@ -165,6 +165,23 @@ TEST(FlyConfig, ResolvedTextsFlyTheSame) {
   }
 }
 
+TEST(FlyConfig, LeavesVoltagesToThePolicyAlone) {
+  const std::string config = source_path("configs/fly/hover_voltages.toml");
+  const rollout::FlyConfig c = rollout::read_fly_config(config);
+  EXPECT_EQ(c.fleet.task.constants.action_high[0], c.vehicle.left.motor.voltage_limit_V);
+  EXPECT_EQ(c.fleet.task.constants.action_low[1], -c.vehicle.right.motor.voltage_limit_V);
+  const std::string sets = ", but the actions of task \"hover_voltages\" are the motors' voltages; accepted: ";
+  const std::string pid = source_path("configs/controllers/pid.toml");
+  EXPECT_EQ(refusal({"controller=" + pid}, config),
+            "--set controller=" + pid + ": controller: is \"pid\"" + sets + "a file of kind = \"none\"");
+  EXPECT_EQ(refusal({"constant_input={amplitude_V=1}"}, config),
+            "--set constant_input={amplitude_V=1}: constant_input: is added to inputs of the wing beat" + sets + "none");
+  EXPECT_EQ(refusal({"constant_input={amplitude_V=0}"}, config), "accepted");
+  const std::string step =
+      "excitation=[{kind=\"step\", input=\"bias_V\", start_s=0, duration_s=1, height=1}]";
+  EXPECT_NE(refusal({step}, config).find("excitation: is added to inputs of the wing beat" + sets), std::string::npos);
+}
+
 // ---- excitation
 
 Excitation excitation(const std::string& text, const std::string& name = "e.toml") {

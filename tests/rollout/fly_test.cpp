@@ -11,6 +11,7 @@
 #include "io/sha256.hpp"
 #include "rollout/fly_fixture.hpp"
 #include "rollout/recorder.hpp"
+#include "rollout/rollout.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::flight {
@@ -180,6 +181,41 @@ TEST(Recorder, VoltagesEqualThoseOfTheSimulatorToTheBit) {
     expect_voltages_to_the_bit<float>(hz);
     expect_voltages_to_the_bit<double>(hz);
   }
+}
+
+/// Held over a control period, and read back without inputs of a wing beat, which there is not.
+TEST(Recorder, LogsVoltagesThatAPolicySets) {
+  rollout::FlyConfig c = rollout::read_fly_config(
+      source_path("configs/fly/hover_voltages.toml"),
+      {"flight.duration_s=0.1", "log.power={battery_nominal_V=18, rate_hz=500, latency_s=0, voltage_noise_V=0, "
+                                "current_noise_A=0}"});
+  auto a = std::make_shared<policy::Actor>();
+  for (const Signal& s : c.fleet.task.observation()) a->observation.push_back(s.name);
+  for (const Signal& s : c.fleet.task.action()) a->action.push_back(s.name);
+  a->widths = {static_cast<int>(a->observation.size()), 2};
+  a->mean.assign(a->observation.size(), 0), a->scale.assign(a->observation.size(), 1);
+  for (std::size_t k = 0; k < policy::weight_count(a->widths); ++k)
+    a->weights.push_back(static_cast<double>(k * 29 % 61) / 64 - 0.5);
+  c.actor = a;
+  rollout::Rollout<float> flight(c, 1);
+  flight.record();
+  std::vector<double> left_V, right_V;
+  while (!flight.over()) {
+    flight.step();
+    left_V.push_back(flight.fleet().adds(0)[0]);
+    right_V.push_back(flight.fleet().adds(0)[1]);
+  }
+  const Folder folder;
+  ASSERT_TRUE(flight.recorders()[0].write(folder / "log"));
+  flightlog::write_vehicle(folder / "log", c.vehicle_file_name, c.vehicle_text);
+  const flightlog::FlightLog log = flightlog::read_flight_log(folder / "log");
+  EXPECT_FALSE(log.command.inputs || log.command.phase_rad);
+  EXPECT_EQ(log.command.left_voltage_V, left_V);
+  EXPECT_EQ(log.command.right_voltage_V, right_V);
+  EXPECT_NE(left_V.front(), left_V.back());
+  for (std::size_t k = 0; k < left_V.size(); ++k) EXPECT_NEAR(log.command.t_s[k], 0.002 * static_cast<double>(k), 1e-9);
+  // at the start the wings rest: currents are V / R
+  EXPECT_NEAR(log.power->left_current_A.front(), left_V.front() / c.vehicle.left.motor.resistance_ohm, 1e-6);
 }
 
 TEST(Recorder, ImuIsDeclaredAsItIs) {

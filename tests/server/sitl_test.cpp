@@ -110,6 +110,13 @@ TEST(Sitl, SaysWhenNobodyFlies) {
             "no autopilot reads /flappy/tick within 0.05 s; accepted: one in the same domain and within dds.reach");
 }
 
+TEST(Sitl, RefusesATaskOfVoltages) {
+  const FlyConfig config = rollout::read_fly_config(flight::source_path("configs/fly/hover_voltages.toml"));
+  EXPECT_EQ(test::refusal([&] { fly_sitl(config, options()); }),
+            "task \"hover_voltages\" sets the motors' voltages, but an autopilot sends inputs of the wing beat; accepted: "
+            "a task whose action is of kind \"wing_beat\"");
+}
+
 /// An autopilot of the test, that answers every tick as it is told.
 void answer(int domain, const std::function<std::optional<WingInput>(const Tick&)>& say) {
   const Participant p(loopback(domain));

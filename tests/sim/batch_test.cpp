@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
+#include <limits>
 
+#include "model/wing_beat.hpp"
+#include "sim/lanes.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::sim {
@@ -178,6 +182,98 @@ TEST(WingBeat, FollowsItsInputsAndLimits) {
   EXPECT_EQ(b.status(0) | b.status(1), 0u);
   EXPECT_NE(b.state(0).stroke_rad[1], 0);
   EXPECT_EQ(b.state(0).stroke_rad[1], b.state(1).stroke_rad[1]);
+}
+
+// ---- voltages that are set directly
+
+/// What the wing beat gives both motors at its `update`th update after a reset, one flapper at a time.
+template <class T>
+std::pair<double, double> beat_voltages(const model::Vehicle& v, const Input& u, std::uint32_t update) {
+  using L = model::Lanes<T, 1>;
+  const auto per_update = static_cast<std::uint32_t>(std::llround(v.driver.flapping_Hz * v.driver.hold_s * 0x1p32));
+  const L fraction(static_cast<double>(model::beat_fraction<T>(update * per_update)));
+  const model::WingBeat<L> beat{L(u.amplitude_V), L(u.difference_V), L(u.bias_V), L(u.split_cycle)};
+  return {model::wing_beat_voltage<+1>(beat, fraction, L(v.left.motor.voltage_limit_V)).raw[0],
+          model::wing_beat_voltage<-1>(beat, fraction, L(v.right.motor.voltage_limit_V)).raw[0]};
+}
+
+/// Under effects that act on the drive, one with a memory: whoever sets the beat's voltages flies as the beat does, to the bit,
+/// and so he does once the driver has its inputs again.
+template <class T>
+void fly_as_the_beat(const std::string& instruction_set) {
+  model::Vehicle v = test::identified();
+  v.effects["battery_sag"] = {{"source_ohm", 1.0}, {"fade_V_C", 0.05}, {"nominal_V", 18}};
+  v.effects["command_delay"] = {{"delay_s", 0.0005}};
+  BatchOptions o;
+  o.threads = 1;
+  o.instruction_set = instruction_set;
+  o.meters_energy = true;
+  Batch<T> b(5, v, o);
+  const Input u{11, 0.5, -0.4, 0.03};
+  for (std::size_t i = 0; i < 5; ++i) b.reset(i, {});
+  for (const std::size_t i : {0UL, 1UL, 3UL}) b.set_input(i, u);
+  const auto same = [&](std::size_t a, std::size_t other) {
+    const FlapperState x = b.state(a), y = b.state(other);
+    EXPECT_EQ(std::memcmp(&x, &y, sizeof x), 0) << instruction_set;
+    EXPECT_EQ(b.energy_J(a), b.energy_J(other)) << instruction_set;
+  };
+  for (std::uint32_t update = 0; update < 150; ++update) {
+    if (update < 90) {
+      const auto [left_V, right_V] = beat_voltages<T>(v, u, update);
+      EXPECT_LT(std::abs(left_V), 18);
+      b.set_voltages(3, left_V, right_V);
+    } else if (update == 90) {
+      EXPECT_NE(b.hash(3, 4), b.hash(0, 1)) << "who holds its voltages has another future";
+      b.set_input(3, u);
+    }
+    b.step(4);
+    if (update % 30 == 29) same(3, 0);
+  }
+  EXPECT_EQ(b.hash(3, 4), b.hash(0, 1)) << instruction_set;
+  EXPECT_EQ(b.hash(1, 2), b.hash(0, 1)) << instruction_set << ": beside one that is set, and beside none";
+  EXPECT_NE(b.state(0).position_m[2], b.state(4).position_m[2]);
+}
+
+TEST(Voltages, OfTheBeatFlyAsTheBeat) {
+  for (const std::string& set : instruction_sets()) {
+    fly_as_the_beat<float>(set);
+    fly_as_the_beat<double>(set);
+  }
+}
+
+TEST(Voltages, AreClippedAndHeldUntilTheyAreSetAgain) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInfinite = std::numeric_limits<double>::infinity();
+  model::Vehicle weak = test::nominal();
+  weak.left.motor.voltage_limit_V = 6;
+  Batch<double> b(6, test::nominal(), one_thread());
+  for (std::size_t i = 0; i < 6; ++i) b.reset(i, {}, Start::welded);
+  const auto same = [&](std::size_t a, std::size_t other) { EXPECT_EQ(b.hash(a, a + 1), b.hash(other, other + 1)); };
+  b.set_voltages(0, 18, -18);
+  b.set_voltages(1, 30, kNaN);  // as of an input, the least of what is no number
+  b.set_voltages(2, kInfinite, -kInfinite);
+  b.set_voltages(3, 6, -18);
+  b.set_voltages(4, 17, -18);
+  b.set_vehicle(4, weak);
+  b.set_voltages(5, 6.5, -18);
+  for (int period = 0; period < 7; ++period) b.step(5);  // not in step with the driver's hold of 10
+  same(1, 0);
+  same(2, 0);
+  EXPECT_NE(b.hash(3, 4), b.hash(0, 1));
+  EXPECT_NE(b.hash(5, 6), b.hash(3, 4));
+  EXPECT_EQ(b.state(4).stroke_rad[0], b.state(3).stroke_rad[0]) << "a motor that takes less gets less, from the start";
+  EXPECT_GT(b.state(0).stroke_rad[0], 0.01);
+  EXPECT_LT(b.state(0).stroke_rad[1], -0.01);
+  for (const std::size_t i : {0UL, 1UL, 2UL}) b.set_voltages(i, -3, 4);
+  b.step(3);
+  b.set_voltages(0, -3, 4);
+  b.step(20);
+  same(0, 1);
+  EXPECT_THROW(b.set_voltages(6, 0, 0), std::out_of_range);
+
+  Batch<double> fresh(1, test::nominal(), one_thread());
+  fresh.reset(0, {});
+  b.reset(0, {});
+  EXPECT_EQ(b.hash(0, 1), fresh.hash(0, 1)) << "a reset gives the motors back";
 }
 
 // ---- effects

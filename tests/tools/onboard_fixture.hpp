@@ -25,12 +25,12 @@ inline std::shared_ptr<const policy::Actor> upright_actor(const flight::Task& ta
   std::mt19937 random(3);
   for (const auto& s : task.observation()) a.observation.push_back(s.name);
   for (const auto& s : task.action()) a.action.push_back(s.name);
-  a.widths = {static_cast<int>(a.observation.size()), flight::kActions};
+  a.widths = {static_cast<int>(a.observation.size()), flight::kMaxActions};
   a.mean.assign(a.observation.size(), 0);
   a.scale.assign(a.observation.size(), 1);
   a.clip = 100;
   const double none[] = {-0.235, 0, 0, 0};  // what adds nothing, of -5 to 8 V for the amplitude
-  for (int out = 0; out < flight::kActions; ++out) {
+  for (int out = 0; out < flight::kMaxActions; ++out) {
     a.weights.push_back(none[out]);
     for (const std::string& name : a.observation) {
       double w = (name.starts_with("trim") ? 0.0002 : 0.005) * (static_cast<double>(random()) / 0x1p31 - 1);

@@ -127,7 +127,7 @@ class LedFlight {
   LedFlight(const rollout::FlyConfig& config, std::uint32_t flapper, const std::vector<std::string>& program)
       : program_(program), latency_(config.fleet.sensors), fleet_(1, config.vehicle_of(flapper), led(config, flapper)) {
     place(fleet_, config);
-    const double nothing[flight::kActions] = {};
+    const double nothing[flight::kMaxActions] = {};
     fleet_.set_adds(0, nothing);
     fleet_.record(true);
     for (int k = -3; k < 0; ++k) before_.push_back(program_.exchange(frame(k, k + 1, kHover)));

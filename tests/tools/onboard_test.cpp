@@ -52,7 +52,7 @@ TEST(Onboard, FliesAnyPolicyAsTheLanesDo) {
   FlyConfig config = escape({"task.history=3", "sensors.mocap.loss_probability=0.1", "sensors.mocap.loss_length=1.5",
                              "sensors.imu.rate_hz=1000.0", "sensors.mocap.rate_hz=750.0"});
   policy::Actor a = *config.actor;
-  a.widths = {static_cast<int>(a.observation.size()), 16, 16, flight::kActions};
+  a.widths = {static_cast<int>(a.observation.size()), 16, 16, flight::kMaxActions};
   a.hidden = policy::Activation::relu;
   std::mt19937 random(7);
   a.weights.clear();

@@ -16,7 +16,7 @@ std::shared_ptr<const policy::Actor> idle_actor(const flight::Task& task) {
   const int inputs = static_cast<int>(task.observation().size());
   for (const flight::Signal& s : task.observation()) actor->observation.push_back(s.name);
   for (const flight::Signal& s : task.action()) actor->action.push_back(s.name);
-  actor->widths = {inputs, 32, 32, flight::kActions};
+  actor->widths = {inputs, 32, 32, task.actions()};
   actor->weights.assign(policy::weight_count(actor->widths), 0);
   actor->mean.assign(static_cast<std::size_t>(inputs), 0);
   actor->scale.assign(static_cast<std::size_t>(inputs), 1);

@@ -24,25 +24,25 @@ ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& conf
   if (const auto& actor = config.actor) {
     return [actor, task = config.fleet.task.constants](const std::vector<double>& observation) {
       const auto view = policy::view_of(*actor, actor->weights.data(), actor->mean.data(), actor->scale.data());
-      double action[flight::kActions];
+      double action[flight::kMaxActions];
       policy::evaluate(view, observation.data(), action);
-      std::array<double, flight::kActions> adds{};
-      for (int i = 0; i < flight::kActions; ++i)
+      std::array<double, flight::kMaxActions> adds{};
+      for (int i = 0; i < flight::kMaxActions; ++i)
         adds[static_cast<std::size_t>(i)] = flight::scaled_action(task, i, action[i]);
       return adds;
     };
   }
   const std::shared_ptr<const policy::Policy> policy =
-      policy::load_policy(path, static_cast<int>(config.fleet.task.observation().size()), flight::kActions);
+      policy::load_policy(path, static_cast<int>(config.fleet.task.observation().size()), flight::kMaxActions);
   const auto one_at_a_time = std::make_shared<std::mutex>();
   return [policy, one_at_a_time, task = config.fleet.task.constants](const std::vector<double>& observation) {
     const std::vector<float> row(observation.begin(), observation.end());
-    float action[flight::kActions];
+    float action[flight::kMaxActions];
     {
       const std::scoped_lock lock(*one_at_a_time);
       policy->act(1, row.data(), action);
     }
-    std::array<double, flight::kActions> adds{};
+    std::array<double, flight::kMaxActions> adds{};
     for (std::size_t i = 0; i < adds.size(); ++i)
       adds[i] = std::clamp<double>(action[i], task.action_low[i], task.action_high[i]);
     return adds;
@@ -59,11 +59,12 @@ EscapeRules rules_of(const EscapeOptions& o) {
   if (kind == ".json") overrides.push_back("actor=" + io::toml_string(fs::absolute(path).string()));
   const rollout::FlyConfig config = rollout::read_fly_config(o.config, overrides);
   const flight::FleetOptions& fleet = config.fleet;
-  if (fleet.controller.kind != flight::kind_of<flight::PidController>() || fleet.task.path.size() != 1 ||
+  const bool sees_wings = fleet.task.parts >> static_cast<int>(flight::Part::wings) & 1;
+  if (fleet.controller.kind != flight::kind_of<flight::PidController>() || fleet.task.path.size() != 1 || sees_wings ||
       fleet.task.constants.success.by_s <= 0 || std::abs(fleet.control_hz * kControl_s - 1) > 1e-9)
     throw io::InputError(o.config +
                          ": is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal "
-                         "that stands still and a success");
+                         "that stands still and a success, no observation of the wings");
   const flight::FlightConstants k = flight::flight_constants(fleet);
   return {fleet.task, k.task, k.controller.of<flight::PidController>(), policy_of(path, config)};
 }

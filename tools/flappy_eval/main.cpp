@@ -399,13 +399,13 @@ void evaluate(Request request, io::Program& program) {
   const flight::Task& task = config.fleet.task;
   std::unique_ptr<const policy::Policy> policy;
   if (kind == ".pt" || kind == ".h")
-    policy = policy::load_policy(path, static_cast<int>(task.observation().size()), flight::kActions);
+    policy = policy::load_policy(path, static_cast<int>(task.observation().size()), task.actions());
   if (request.effects) {
     io::stop_on_interrupt();
     return evaluate_effects(request, config, {policy ? nullptr : config.actor, policy.get()}, program);
   }
   std::vector<std::pair<const char*, Controller>> alone;
-  if (!request.no_baselines)
+  if (!request.no_baselines && !task.sets_voltages())  // to which no controller can add
     alone = {{"PID alone", controller_named("pid", config)}, {"ARC alone", controller_named("arc", config)}};
 
   Evaluation evaluation(request, config);

@@ -98,7 +98,11 @@ void run(const Request& request, const io::Program& program) {
         "--int8: whole numbers hold no layer norm, linear output, elu or silu; accepted: a policy of relu or tanh without them");
   const auto signals = run.fly.fleet.task.observation();
   Export e;
-  e.files["flappy_controller.h"] = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
+  const std::string why_not = deploy::no_controller(run.fly);
+  const bool with_controller = why_not.empty();
+  if (with_controller)
+    e.files["flappy_controller.h"] = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
+  else std::printf("flappy_controller.h is not written: %s\n", why_not.c_str());
   io::make_folder(request.out);
   e.flown = deploy::roll_out(run.fly, 0, kProofFlights);
   if (!std::ranges::all_of(e.flown.action, [](float x) { return std::isfinite(x); }))
@@ -143,7 +147,7 @@ void run(const Request& request, const io::Program& program) {
     const fs::path folder = work / name.substr(0, name.find('.'));
     fs::create_directory(folder);
     io::write_atomically(folder / "flappy_policy.h", e.files[name]);
-    io::write_atomically(folder / "flappy_controller.h", e.files["flappy_controller.h"]);
+    if (with_controller) io::write_atomically(folder / "flappy_controller.h", e.files["flappy_controller.h"]);
     const std::vector<deploy::Parity> rows =
         deploy::prove(folder, vectors, request.prove ? deploy::Reach::everywhere : deploy::Reach::here);
     std::printf("%s\n%s", name.c_str(), table_of(rows).c_str());
@@ -154,7 +158,7 @@ void run(const Request& request, const io::Program& program) {
       throw std::runtime_error(name + " does not compute what was trained; nothing is written");
     measure(name, folder, "flappy_policy.h");
   }
-  measure("flappy_controller.h", work / "flappy_policy", "flappy_controller.h");
+  if (with_controller) measure("flappy_controller.h", work / "flappy_policy", "flappy_controller.h");
   write_all(request.out, e.files);
   for (const auto& [name, text] : e.files)
     std::printf("%s: %zu bytes\n", (fs::path(request.out) / name).c_str(), text.size());

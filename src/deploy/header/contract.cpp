@@ -37,6 +37,15 @@ void list(std::ostringstream& text, const char* title, const std::vector<Signal>
 }
 
 bool holds_trim(const FlyConfig& config) { return config.fleet.task.constants.holds_trim > 0; }
+bool sets_voltages(const FlyConfig& config) { return config.fleet.task.sets_voltages(); }
+
+std::string meaning_of_action(const FlyConfig& config) {
+  if (sets_voltages(config)) return "It is the voltage of the left and of the right motor.\n";
+  const std::string beats =
+      "The wings beat at " + io::shortest_digits(config.vehicle.driver.flapping_Hz) + " Hz. The action is added to\n";
+  return beats + (holds_trim(config) ? "the trim that the feedback controller has learnt and, while the policy acts, holds.\n"
+                                     : "the output of the feedback controller, which goes on flying.\n");
+}
 
 }  // namespace
 
@@ -54,14 +63,12 @@ std::string contract_text(const FlyConfig& config, const policy::RunInfo& run) {
        << run.config_sha256 << ",\ntrained by commit " << run.commit << (run.dirty ? " and uncommitted changes" : "")
        << ".\n\n"
        << "A control period takes " << p.control_us << " us; the policy acts every " << p.policy_us << " us and its\n"
-       << "action stays until the next. The wings beat at " << io::shortest_digits(config.vehicle.driver.flapping_Hz)
-       << " Hz. The action is added to\n"
-       << (holds_trim(config) ? "the trim that the feedback controller has learnt and, while the policy acts, holds.\n"
-                              : "the output of the feedback controller, which goes on flying.\n")
+       << "action stays until the next. " << meaning_of_action(config)
        << "\nFrames: world W (x, y level, z up), body B (x forward, y left, z up, at the torso's origin). R_xy is row "
           "x,\n"
        << "column y of the rotation matrix from B to W. Errors and velocities are estimate minus set point.\n"
-       << "added_* is what the last action added, trim_* what the controller has learnt to hold.\n"
+       << (sets_voltages(config) ? "previous_* is the last action; strokes and their rates are those of encoders on the wings.\n"
+                                 : "added_* is what the last action added, trim_* what the controller has learnt to hold.\n")
        << "Ranges are those expected; other values are allowed.\n\n";
   list(text, "observation", config.fleet.task.observation());
   text << "\n";

@@ -114,7 +114,7 @@ void add_constants(const rollout::FlyConfig& config, Constants& to) {
   one("hand_back_body_rate_rad_s", h.body_rate_rad_s);
   one("hand_back_at_s", h.at_s);
   std::vector<float> middle;  // as scaled_action() has it
-  for (int i = 0; i < flight::kActions; ++i)
+  for (int i = 0; i < config.fleet.task.actions(); ++i)
     middle.push_back(static_cast<float>(0.5 * static_cast<double>(task.action_low[i] + task.action_high[i])));
   list.push_back({"start_added", middle});
   const flight::StartRange& begin = config.fleet.task.start;
@@ -220,9 +220,18 @@ std::string about(const rollout::FlyConfig& config, const policy::RunInfo& run, 
 
 }  // namespace
 
+std::string no_controller(const rollout::FlyConfig& config) {
+  const flight::Task& task = config.fleet.task;
+  if (task.sets_voltages()) return "the policy sets the motors' voltages by itself";
+  if (task.parts >> static_cast<int>(flight::Part::wings) & 1) return "the policy sees the wings, which it has no sensor for";
+  return "";
+}
+
 std::string controller_header(const rollout::FlyConfig& config, const policy::RunInfo& run,
                               const ControllerTrace& trace) {
   const flight::FleetOptions& o = config.fleet;
+  if (const std::string why_not = no_controller(config); !why_not.empty())
+    throw io::InputError("controller: cannot be exported: " + why_not + "; accepted: a task that leaves it to fly");
   Constants constants;
   std::string source, accepted;
   for (int kind = 0; kind < flight::kControllers; ++kind)

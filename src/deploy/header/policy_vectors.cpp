@@ -7,7 +7,6 @@
 namespace flappy::deploy {
 namespace {
 
-using flight::kActions;
 using Lane = model::Lanes<float, 1>;
 
 template <class To, class From>
@@ -32,7 +31,7 @@ policy::PolicyNetwork network_of(const rollout::FlyConfig& config) {
                           {},
                           {}};
   const auto& k = config.fleet.task.constants;
-  for (int i = 0; i < kActions; ++i) {  // as scaled_action() has them
+  for (int i = 0; i < config.fleet.task.actions(); ++i) {  // as scaled_action() has them
     const auto low = static_cast<float>(k.action_low[i]), high = static_cast<float>(k.action_high[i]);
     n.middle.push_back(static_cast<float>(0.5 * static_cast<double>(low + high)));
     n.half.push_back(static_cast<float>(0.5 * static_cast<double>(high - low)));
@@ -63,7 +62,7 @@ policy::PolicyVectors roll_out(const rollout::FlyConfig& given, std::size_t firs
   rollout::Rollout<float> flights(std::move(config), count);
   const flight::Fleet<float>& fleet = flights.fleet();
   const flight::Task& task = fleet.options().task;
-  const auto inputs = task.observation().size();
+  const auto inputs = task.observation().size(), outputs = static_cast<std::size_t>(task.actions());
   std::vector<policy::PolicyVectors> each(count);
   while (!flights.over()) {
     const bool acts = flights.tick() % task.action_repeat == 0;
@@ -77,10 +76,12 @@ policy::PolicyVectors roll_out(const rollout::FlyConfig& given, std::size_t firs
       fleet.observation(i, &seen[seen.size() - inputs]);
     }
     flights.step();
-    for (const std::size_t i : acting)
-      for (const float x : fleet.adds(i)) each[i].action.push_back(x);
+    for (const std::size_t i : acting) {
+      const auto adds = fleet.adds(i);
+      each[i].action.insert(each[i].action.end(), adds.begin(), adds.begin() + outputs);
+    }
   }
-  policy::PolicyVectors all{static_cast<int>(inputs), kActions, {}, {}};
+  policy::PolicyVectors all{static_cast<int>(inputs), task.actions(), {}, {}};
   for (const policy::PolicyVectors& v : each) append(all, v);
   return all;
 }

@@ -122,9 +122,15 @@ Asked read_asked(const DiagnoseCommand& command) {
     for (std::string& member : model::whole_group(id)) withheld.push_back(std::move(member));
   }
   flightlog::check_each_once(command.flights);
+  rollout::FlyConfig pilot =
+      rollout::read_fly_config(command.manoeuvre.empty() ? io::config_path("fly/hover.toml") : command.manoeuvre);
+  if (pilot.fleet.task.sets_voltages())
+    throw io::InputError(command.manoeuvre +
+                         ": is flown by voltages alone, but what is predicted is flown by a controller; accepted: a task "
+                         "whose action is of kind \"wing_beat\"");
   return {vehicle,
           sim::read_randomisation(vehicle, io::Config::load(command.priors).root()),
-          rollout::read_fly_config(command.manoeuvre.empty() ? io::config_path("fly/hover.toml") : command.manoeuvre),
+          std::move(pilot),
           read_manoeuvres(io::config_path("gap/experiments")),
           {.threads = command.threads,
            .withheld = withheld,

@@ -7,6 +7,7 @@
 
 #include "io/progress.hpp"
 #include "io/statistics.hpp"
+#include "io/toml_writer.hpp"
 #include "rollout/recorder.hpp"
 #include "rollout/rollout.hpp"
 #include "server/telemetry/flapper_topics.hpp"
@@ -41,7 +42,7 @@ class Flight {
         waiting_(participant_) {
     waiting_.add(inputs_.entity());
     place();
-    const double nothing[flight::kActions] = {};
+    const double nothing[flight::kMaxActions] = {};
     fleet_.set_adds(0, nothing);
     fleet_.record(true);
     recorder_.emplace(config_, fleet_, 0, vehicle_);
@@ -260,6 +261,10 @@ class Flight {
 }  // namespace
 
 SitlResult fly_sitl(const rollout::FlyConfig& config, const SitlOptions& options) {
+  if (const flight::Task& task = config.fleet.task; task.sets_voltages())
+    throw io::InputError("task " + io::toml_string(task.name) +
+                         " sets the motors' voltages, but an autopilot sends inputs of the wing beat; accepted: a task "
+                         "whose action is of kind \"wing_beat\"");
   return config.precision == "float" ? Flight<float>(config, options).fly() : Flight<double>(config, options).fly();
 }
 

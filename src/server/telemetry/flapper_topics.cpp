@@ -139,7 +139,11 @@ void FlapperTopics::write(const rollout::FlightSample& s) const {
   write_transform(pose);
   write(imu);
   write(s.t_s, s.state);
-  write(s.t_s, s.tick, s.input);
+  if (!s.sets_voltages) return write(s.t_s, s.tick, s.input);
+  WingInput m = message(s.t_s, s.tick, {kUnknown, kUnknown, kUnknown, kUnknown}, frame_);
+  m.left_voltage_v = s.left_V;
+  m.right_voltage_v = s.right_V;
+  input_.write(m);
 }
 
 }  // namespace flappy::server

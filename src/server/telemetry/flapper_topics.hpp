@@ -3,7 +3,7 @@
 //   pose           PoseStamped   torso origin and attitude in "world"          best effort, as sensor data are
 //   imu            Imu           rates and specific force in the torso's frame, covariances as the sensors declare; no attitude
 //   joint_states   JointState    left_stroke, left_rotation, right_stroke, right_rotation: rad, rad/s
-//   wing_input     WingInput     as controller and actor set it
+//   wing_input     WingInput     as controller and actor set it; of an actor of voltages, those alone are numbers
 //   battery        BatteryState  where it is known, and
 //   motors         JointState    with it: effort is the current in A of left_motor and right_motor
 //   driver         WingInput     what a simulated driver applied, and its voltages

@@ -34,7 +34,7 @@ std::shared_ptr<const policy::Actor> random_actor(const flight::Task& task) {
   a.task = task.name;
   for (const auto& s : task.observation()) a.observation.push_back(s.name);
   for (const auto& s : task.action()) a.action.push_back(s.name);
-  a.widths = {static_cast<int>(a.observation.size()), 16, flight::kActions};
+  a.widths = {static_cast<int>(a.observation.size()), 16, flight::kMaxActions};
   std::mt19937 random(7);
   for (std::size_t i = 0; i < policy::weight_count(a.widths); ++i)
     a.weights.push_back(static_cast<double>(random()) / 4294967296.0 - 0.5);
@@ -390,6 +390,9 @@ TEST(ControllerHeader, RefusesWhatItCannotExport) {
   };
   EXPECT_EQ(refused({"controller=../controllers/arc.toml"}),
             "controller: is none that can be exported; accepted: kind = \"pid\"");
+  EXPECT_EQ(refused({"task.observation=[\"goal_rotation\", \"wings\"]"}),
+            "controller: cannot be exported: the policy sees the wings, which it has no sensor for; accepted: a task that "
+            "leaves it to fly");
   EXPECT_EQ(refused({"flight.control_hz=300.0", "flight.step_s=3.3333333333333335e-5"}),
             "a control period of 0.0033333333333333335 s is no whole number of microseconds, in which headers count; "
             "accepted: one that is");

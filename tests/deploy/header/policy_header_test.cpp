@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "deploy/header/controller_header.hpp"
 #include "deploy/header/policy_vectors.hpp"
 #include "full.hpp"
 #include "io/run_program.hpp"
@@ -14,6 +15,7 @@
 #include "policy/torch_script.hpp"
 #include "rollout/evaluation.hpp"
 #include "rollout/fly_fixture.hpp"
+#include "rollout/rollout.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -22,12 +24,12 @@ using flight::Folder;
 using policy::Activation;
 using Words = std::vector<std::string>;
 
-/// The escape under an actor of random weights.
+/// The escape, or another flight, under an actor of random weights.
 rollout::FlyConfig escape(const std::vector<int>& hidden_widths, Activation hidden, const Words& overrides = {},
-                          bool layer_norm = false) {
+                          bool layer_norm = false, const std::string& name = "escape") {
   Words all = {"flight.duration_s=0.7", "task.success.keep.until_s=0.7", "flight.threads=1"};
   all.insert(all.end(), overrides.begin(), overrides.end());
-  rollout::FlyConfig config = rollout::read_fly_config(test::source_path("configs/fly/escape.toml"), all);
+  rollout::FlyConfig config = rollout::read_fly_config(test::source_path("configs/fly/" + name + ".toml"), all);
   policy::Actor a;
   a.task = config.fleet.task.name;
   for (const flight::Signal& s : config.fleet.task.observation()) {
@@ -38,7 +40,7 @@ rollout::FlyConfig escape(const std::vector<int>& hidden_widths, Activation hidd
   for (const flight::Signal& s : config.fleet.task.action()) a.action.push_back(s.name);
   a.widths = {static_cast<int>(a.observation.size())};
   a.widths.insert(a.widths.end(), hidden_widths.begin(), hidden_widths.end());
-  a.widths.push_back(flight::kActions);
+  a.widths.push_back(static_cast<int>(a.action.size()));
   a.hidden = hidden;
   a.layer_norm = layer_norm;
   a.linear = hidden == Activation::elu;
@@ -285,6 +287,49 @@ TEST(TorchScriptExport, ActsAsTheLanesWithinRounding) {
   }
 }
 #endif
+
+/// Two outputs that are voltages: in 32 bits to the bit, in 8 bits near, in TorchScript within rounding.
+TEST(PolicyHeader, SetsVoltagesAsTheLanesDo) {
+  const Folder folder;
+  const rollout::FlyConfig config = escape({32, 32}, Activation::relu, {}, false, "hover_voltages");
+  const policy::PolicyNetwork network = network_of(config);
+  ASSERT_EQ(network.outputs(), 2);
+  const policy::PolicyVectors flown = roll_out(config, 0, 40);
+  ASSERT_GT(flown.rows(), 400u);
+  EXPECT_EQ(bits(evaluate(network, flown.observation)), bits(flown.action));
+  const std::string header = header_of(config, network, flown);
+  EXPECT_NE(header.find("It is the voltage of the left and of the right motor."), std::string::npos);
+  EXPECT_NE(header.find("right_voltage          V       -18 to 18"), std::string::npos);
+  EXPECT_EQ(header.find("feedback controller"), std::string::npos);
+  folder.write("p.h", header);
+  EXPECT_EQ(bits(acts(*policy::load_policy(folder / "p.h", network.inputs(), 2), flown.observation)),
+            bits(flown.action));
+  EXPECT_NE(flight::message([&] { policy::load_policy(folder / "p.h", network.inputs(), 4); })
+                .find("has 22 inputs and 2 outputs; accepted: 22 and 4"),
+            std::string::npos);
+  const QuantisedNetwork whole = quantise(network, flown.observation);
+  folder.write("q.h", header_of(config, whole, flown));
+  EXPECT_EQ(bits(acts(*policy::load_policy(folder / "q.h", network.inputs(), 2), flown.observation)),
+            bits(evaluate(whole, flown.observation)));
+#ifdef FLAPPY_HAVE_TORCH
+  folder.write("p.pt", torch_script(network, "a contract"));
+  const auto action = acts(*policy::load_policy(folder / "p.pt", network.inputs(), 2), flown.observation);
+  for (std::size_t i = 0; i < action.size(); ++i) ASSERT_NEAR(action[i], flown.action[i], 1e-5 * 36) << i;
+#endif
+  // a policy from elsewhere flies as the actor does
+  const auto flight = [&](bool by_header) {
+    rollout::FlyConfig c = config;
+    c.duration_s = 0.1;
+    const auto policy = policy::load_policy(folder / "p.h", network.inputs(), 2);
+    if (by_header) c.actor.reset();
+    rollout::Rollout<float> all(c, 3, by_header ? policy.get() : nullptr);
+    while (!all.over()) all.step();
+    return all.fleet().batch().hash();
+  };
+  EXPECT_EQ(flight(true), flight(false));
+  EXPECT_EQ(no_controller(config), "the policy sets the motors' voltages by itself");
+  EXPECT_EQ(no_controller(escape({8}, Activation::relu)), "");
+}
 
 TEST(PolicyHeader, SaysWhatItCannotExport) {
   rollout::FlyConfig config = escape({8}, Activation::relu);
