@@ -18,14 +18,15 @@ struct Episode {
   // of actions, the numbers beyond the task's are 0
   T action[kMaxActions];    // of the policy, in [-1, 1]
   T previous[kMaxActions];  // the one before
-  T adds[kMaxActions];      // what its action adds to the controller's output, V, V, V, split cycle; or the motors' voltages
-  T added[kMaxActions];     // besides
-  T handed_back;            // 0 or 1
-  T reward;                 // of the last control period
-  T action_reward;          // sum of rewards since the policy last acted
-  T noise[kMaxActions];     // on its actions, of deviation 1
-  T captured_s;             // when the goal was captured first; 0: not yet
-  T lost_s;                 // when it was not kept first; 0: never
+  T adds
+      [kMaxActions];  // what its action adds to the controller's output, V, V, V, split cycle; or the motors' voltages
+  T added[kMaxActions];  // besides
+  T handed_back;         // 0 or 1
+  T reward;              // of the last control period
+  T action_reward;       // sum of rewards since the policy last acted
+  T noise[kMaxActions];  // on its actions, of deviation 1
+  T captured_s;          // when the goal was captured first; 0: not yet
+  T lost_s;              // when it was not kept first; 0: never
 };
 
 /// What an action of the policy adds to input `i`, or the voltage of motor `i`.

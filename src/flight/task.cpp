@@ -259,14 +259,15 @@ void read_success(const io::Table& table, Success<double>& s) {
 void read_action(const io::Table& table, Task& task) {
   const bool voltages = table.choice_or("action.kind", "wing_beat", {"wing_beat", "voltages"}) == "voltages";
   task.action_kind = voltages ? ActionKind::voltages : ActionKind::wing_beat;
-  const std::vector<std::string> keys = voltages
-                                            ? std::vector<std::string>{"left_V", "right_V"}
-                                            : std::vector<std::string>{"amplitude_V", "difference_V", "bias_V", "split_cycle"};
+  const std::vector<std::string> keys =
+      voltages ? std::vector<std::string>{"left_V", "right_V"}
+               : std::vector<std::string>{"amplitude_V", "difference_V", "bias_V", "split_cycle"};
   for (std::size_t i = 0; i < keys.size(); ++i) {
     const std::string key = "action." + keys[i];
     const std::vector<double> range = table.numbers(key, voltages ? io::Range{-1000, 1000} : io::Range{-18, 18});
     if (range.size() != 2 || range[0] > range[1])
-      table.fail(key, "is no range", voltages ? "[low, high]: the voltages of -1 and 1" : "[low, high]: what -1 and 1 add");
+      table.fail(key, "is no range",
+                 voltages ? "[low, high]: the voltages of -1 and 1" : "[low, high]: what -1 and 1 add");
     task.constants.action_low[i] = range[0];
     task.constants.action_high[i] = range[1];
   }

@@ -99,7 +99,8 @@ struct Success {
 
 template <class T>
 struct TaskConstants {
-  T action_low[kMaxActions], action_high[kMaxActions];  // what -1 and 1 add, or put on the motors; 0 beyond the action's numbers
+  T action_low[kMaxActions],
+      action_high[kMaxActions];  // what -1 and 1 add, or put on the motors; 0 beyond the action's numbers
   Reward<T> reward;
   Limits<T> limits;
   HandBack<T> hand_back;

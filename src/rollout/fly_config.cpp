@@ -175,7 +175,8 @@ class Reader {
 
   /// Where a policy sets the motors' voltages, nobody else has a say in them.
   void refuse_inputs() const {
-    const std::string sets = "but the actions of task " + io::toml_string(c_.fleet.task.name) + " are the motors' voltages";
+    const std::string sets =
+        "but the actions of task " + io::toml_string(c_.fleet.task.name) + " are the motors' voltages";
     if (c_.fleet.controller.kind != flight::kNoController)
       root_.fail("controller", "is " + io::toml_string(flight::controller_name(c_.fleet.controller.kind)) + ", " + sets,
                  "a file of kind = \"none\"");

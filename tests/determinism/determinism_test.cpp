@@ -233,8 +233,8 @@ TEST(Determinism, GroundInDouble) { one_hash_at_ground<double>(kGoldenGroundDoub
 
 // ---- voltages that are set directly, beside wing beats
 
-constexpr std::uint64_t kGoldenVoltagesFloat = 0;
-constexpr std::uint64_t kGoldenVoltagesDouble = 0;
+constexpr std::uint64_t kGoldenVoltagesFloat = 0x97f46ef1b7cf444b;
+constexpr std::uint64_t kGoldenVoltagesDouble = 0x934c04accb61f9e0;
 
 constexpr std::size_t kSet = 34;
 

@@ -201,7 +201,8 @@ TEST(Collector, ATimeOutIsNoTermination) {
 TEST(Collector, KeepsTwoVoltagesOfEachAction) {
   Overrides list = plain(3);
   std::erase(list, "task.reward.until_s=0");
-  for (const char* more : {"collect.noise_low=0", "collect.noise_high=0", "task.end.distance_m=0.03"}) list.push_back(more);
+  for (const char* more : {"collect.noise_low=0", "collect.noise_high=0", "task.end.distance_m=0.03"})
+    list.push_back(more);
   const TrainConfig c = small_training(list, "hover_voltages");
   ASSERT_EQ(c.learner.shape.action, 2);
   const Collected all = collect(c, 90);

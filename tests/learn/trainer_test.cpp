@@ -70,10 +70,13 @@ TEST(Trainer, TrainsVoltages) {
   for (const char* engine : {"lanes", "libtorch"}) {
     if (std::string(engine) == "libtorch" && !has_libtorch()) continue;
     const TrainConfig c =
-        small_training({std::string("learn.engine=") + engine, "collect.flappers=17", "threads=2"}, "hover_voltages");
+        small_training({std::string("learn.engine=") + engine, "collect.flappers=17", "learn.updates=8",
+                        "evaluate.every=8", "evaluate.vehicles=4", "flight.duration_s=0.2",
+                        "task.success.keep.from_s=0.1", "task.success.keep.until_s=0.2"},
+                       "hover_voltages");
     const fs::path whole = fresh("voltages"), stopped = fresh("voltages_stopped");
-    EXPECT_EQ(train_in(whole, c).updates, 24u);
-    train_in(stopped, c, [](const TrainProgress& p) { return p.update < 10; });
+    EXPECT_EQ(train_in(whole, c).updates, 8u);
+    train_in(stopped, c, [](const TrainProgress& p) { return p.update < 4; });
     const auto from = unfinished_run_in(stopped);
     ASSERT_TRUE(from);
     train_in(stopped, c, {}, from);
@@ -81,7 +84,8 @@ TEST(Trainer, TrainsVoltages) {
     const policy::Actor best = policy::read_actor(whole / "best.json");
     EXPECT_EQ(best.action, (std::vector<std::string>{"left_voltage", "right_voltage"}));
     EXPECT_EQ(best.widths, (std::vector<int>{22, 16, 2}));
-    rollout::Rollout<float> flight(rollout::read_fly_config(whole / "config" / "fly.toml", {"flight.duration_s=0.02"}), 1);
+    rollout::Rollout<float> flight(rollout::read_fly_config(whole / "config" / "fly.toml", {"flight.duration_s=0.02"}),
+                                   1);
     while (!flight.over()) flight.step();
     EXPECT_GT(std::abs(flight.fleet().adds(0)[1]), 0);
     EXPECT_GT(std::abs(flight.fleet().batch().state(0).stroke_rate_rad_s[1]), 0);

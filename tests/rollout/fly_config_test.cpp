@@ -174,11 +174,11 @@ TEST(FlyConfig, LeavesVoltagesToThePolicyAlone) {
   const std::string pid = source_path("configs/controllers/pid.toml");
   EXPECT_EQ(refusal({"controller=" + pid}, config),
             "--set controller=" + pid + ": controller: is \"pid\"" + sets + "a file of kind = \"none\"");
-  EXPECT_EQ(refusal({"constant_input={amplitude_V=1}"}, config),
-            "--set constant_input={amplitude_V=1}: constant_input: is added to inputs of the wing beat" + sets + "none");
+  EXPECT_EQ(
+      refusal({"constant_input={amplitude_V=1}"}, config),
+      "--set constant_input={amplitude_V=1}: constant_input: is added to inputs of the wing beat" + sets + "none");
   EXPECT_EQ(refusal({"constant_input={amplitude_V=0}"}, config), "accepted");
-  const std::string step =
-      "excitation=[{kind=\"step\", input=\"bias_V\", start_s=0, duration_s=1, height=1}]";
+  const std::string step = "excitation=[{kind=\"step\", input=\"bias_V\", start_s=0, duration_s=1, height=1}]";
   EXPECT_NE(refusal({step}, config).find("excitation: is added to inputs of the wing beat" + sets), std::string::npos);
 }
 

@@ -185,9 +185,10 @@ TEST(Recorder, VoltagesEqualThoseOfTheSimulatorToTheBit) {
 
 /// Held over a control period, and read back without inputs of a wing beat, which there is not.
 TEST(Recorder, LogsVoltagesThatAPolicySets) {
-  rollout::FlyConfig c = rollout::read_fly_config(
-      source_path("configs/fly/hover_voltages.toml"),
-      {"flight.duration_s=0.1", "log.power={battery_nominal_V=18, rate_hz=500, latency_s=0, voltage_noise_V=0, "
+  rollout::FlyConfig c =
+      rollout::read_fly_config(source_path("configs/fly/hover_voltages.toml"),
+                               {"flight.duration_s=0.1",
+                                "log.power={battery_nominal_V=18, rate_hz=500, latency_s=0, voltage_noise_V=0, "
                                 "current_noise_A=0}"});
   auto a = std::make_shared<policy::Actor>();
   for (const Signal& s : c.fleet.task.observation()) a->observation.push_back(s.name);

@@ -112,9 +112,10 @@ TEST(Sitl, SaysWhenNobodyFlies) {
 
 TEST(Sitl, RefusesATaskOfVoltages) {
   const FlyConfig config = rollout::read_fly_config(flight::source_path("configs/fly/hover_voltages.toml"));
-  EXPECT_EQ(test::refusal([&] { fly_sitl(config, options()); }),
-            "task \"hover_voltages\" sets the motors' voltages, but an autopilot sends inputs of the wing beat; accepted: "
-            "a task whose action is of kind \"wing_beat\"");
+  EXPECT_EQ(
+      test::refusal([&] { fly_sitl(config, options()); }),
+      "task \"hover_voltages\" sets the motors' voltages, but an autopilot sends inputs of the wing beat; accepted: "
+      "a task whose action is of kind \"wing_beat\"");
 }
 
 /// An autopilot of the test, that answers every tick as it is told.

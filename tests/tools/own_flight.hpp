@@ -67,9 +67,9 @@ class OwnFlight {
         flight::rounded<float>(flight::flight_constants(fleet_.options()).controller.of<flight::PidController>());
     L row[flight::kMaxObservation];
     const int rows =
-        flight::observe(task.parts, task.actions(), lanes_of<flight::Estimate>(f.estimate), ref, lanes_of<flight::Episode>(f.episode),
-                        L(model::beat_fraction<float>(fleet_.snapshot(0).phase)), L(0),
-                        flight::PidController::trim(pid, lanes_of<flight::Pid>(f.controller)), {}, row);
+        flight::observe(task.parts, task.actions(), lanes_of<flight::Estimate>(f.estimate), ref,
+                        lanes_of<flight::Episode>(f.episode), L(model::beat_fraction<float>(fleet_.snapshot(0).phase)),
+                        L(0), flight::PidController::trim(pid, lanes_of<flight::Pid>(f.controller)), {}, row);
     for (int i = 0; i < rows; ++i) f.observation[i][0] = row[i].raw[0];
     for (std::uint32_t ago = 1; ago < task.history; ++ago) fleet_.set_action(0, middle);  // remembers it
   }

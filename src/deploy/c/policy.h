@@ -55,8 +55,8 @@ static inline const float *flappy_policy_normalise(const float *gains, float *x,
 }
 #endif
 
-/* Observation in, what is added to the feedback controller's output out, both in the units of the tables above. An
-   observation with a NaN in it is refused: it returns 1 and adds nothing. Otherwise it returns 0. */
+/* Observation in, action out, both in the units of the tables above. An observation with a NaN in it is refused: it returns 1
+   and all actions are 0. Otherwise it returns 0. */
 static inline int flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT]) {
   static const uint32_t widths[FLAPPY_POLICY_LAYERS + 1] = FLAPPY_POLICY_WIDTHS;
   float values[2][FLAPPY_POLICY_WIDEST];

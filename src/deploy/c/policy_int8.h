@@ -28,8 +28,8 @@ static inline const int8_t *flappy_policy_layer(const int8_t *weights, const int
   return weights;
 }
 
-/* Observation in, what is added to the feedback controller's output out, both in the units of the tables above. An
-   observation with a NaN in it is refused: it returns 1 and adds nothing. Otherwise it returns 0. Weights and activations are
+/* Observation in, action out, both in the units of the tables above. An observation with a NaN in it is refused: it returns 1
+   and all actions are 0. Otherwise it returns 0. Weights and activations are
    whole numbers of 8 bits, sums of 32; each sum is scaled by its multiplier. */
 static inline int flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT]) {
   static const uint32_t widths[FLAPPY_POLICY_LAYERS + 1] = FLAPPY_POLICY_WIDTHS;

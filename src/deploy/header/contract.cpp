@@ -43,8 +43,9 @@ std::string meaning_of_action(const FlyConfig& config) {
   if (sets_voltages(config)) return "It is the voltage of the left and of the right motor.\n";
   const std::string beats =
       "The wings beat at " + io::shortest_digits(config.vehicle.driver.flapping_Hz) + " Hz. The action is added to\n";
-  return beats + (holds_trim(config) ? "the trim that the feedback controller has learnt and, while the policy acts, holds.\n"
-                                     : "the output of the feedback controller, which goes on flying.\n");
+  return beats + (holds_trim(config)
+                      ? "the trim that the feedback controller has learnt and, while the policy acts, holds.\n"
+                      : "the output of the feedback controller, which goes on flying.\n");
 }
 
 }  // namespace
@@ -67,8 +68,9 @@ std::string contract_text(const FlyConfig& config, const policy::RunInfo& run) {
        << "\nFrames: world W (x, y level, z up), body B (x forward, y left, z up, at the torso's origin). R_xy is row "
           "x,\n"
        << "column y of the rotation matrix from B to W. Errors and velocities are estimate minus set point.\n"
-       << (sets_voltages(config) ? "previous_* is the last action; strokes and their rates are those of encoders on the wings.\n"
-                                 : "added_* is what the last action added, trim_* what the controller has learnt to hold.\n")
+       << (sets_voltages(config)
+               ? "previous_* is the last action; strokes and their rates are those of encoders on the wings.\n"
+               : "added_* is what the last action added, trim_* what the controller has learnt to hold.\n")
        << "Ranges are those expected; other values are allowed.\n\n";
   list(text, "observation", config.fleet.task.observation());
   text << "\n";

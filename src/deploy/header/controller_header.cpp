@@ -223,7 +223,8 @@ std::string about(const rollout::FlyConfig& config, const policy::RunInfo& run, 
 std::string no_controller(const rollout::FlyConfig& config) {
   const flight::Task& task = config.fleet.task;
   if (task.sets_voltages()) return "the policy sets the motors' voltages by itself";
-  if (task.parts >> static_cast<int>(flight::Part::wings) & 1) return "the policy sees the wings, which it has no sensor for";
+  if (task.parts >> static_cast<int>(flight::Part::wings) & 1)
+    return "the policy sees the wings, which it has no sensor for";
   return "";
 }
 

@@ -125,9 +125,10 @@ Asked read_asked(const DiagnoseCommand& command) {
   rollout::FlyConfig pilot =
       rollout::read_fly_config(command.manoeuvre.empty() ? io::config_path("fly/hover.toml") : command.manoeuvre);
   if (pilot.fleet.task.sets_voltages())
-    throw io::InputError(command.manoeuvre +
-                         ": is flown by voltages alone, but what is predicted is flown by a controller; accepted: a task "
-                         "whose action is of kind \"wing_beat\"");
+    throw io::InputError(
+        command.manoeuvre +
+        ": is flown by voltages alone, but what is predicted is flown by a controller; accepted: a task "
+        "whose action is of kind \"wing_beat\"");
   return {vehicle,
           sim::read_randomisation(vehicle, io::Config::load(command.priors).root()),
           std::move(pilot),

@@ -390,9 +390,10 @@ TEST(ControllerHeader, RefusesWhatItCannotExport) {
   };
   EXPECT_EQ(refused({"controller=../controllers/arc.toml"}),
             "controller: is none that can be exported; accepted: kind = \"pid\"");
-  EXPECT_EQ(refused({"task.observation=[\"goal_rotation\", \"wings\"]"}),
-            "controller: cannot be exported: the policy sees the wings, which it has no sensor for; accepted: a task that "
-            "leaves it to fly");
+  EXPECT_EQ(
+      refused({"task.observation=[\"goal_rotation\", \"wings\"]"}),
+      "controller: cannot be exported: the policy sees the wings, which it has no sensor for; accepted: a task that "
+      "leaves it to fly");
   EXPECT_EQ(refused({"flight.control_hz=300.0", "flight.step_s=3.3333333333333335e-5"}),
             "a control period of 0.0033333333333333335 s is no whole number of microseconds, in which headers count; "
             "accepted: one that is");

@@ -291,7 +291,7 @@ TEST(TorchScriptExport, ActsAsTheLanesWithinRounding) {
 /// Two outputs that are voltages: in 32 bits to the bit, in 8 bits near, in TorchScript within rounding.
 TEST(PolicyHeader, SetsVoltagesAsTheLanesDo) {
   const Folder folder;
-  const rollout::FlyConfig config = escape({32, 32}, Activation::relu, {}, false, "hover_voltages");
+  const rollout::FlyConfig config = escape({12}, Activation::relu, {}, false, "hover_voltages");
   const policy::PolicyNetwork network = network_of(config);
   ASSERT_EQ(network.outputs(), 2);
   const policy::PolicyVectors flown = roll_out(config, 0, 40);
@@ -300,13 +300,10 @@ TEST(PolicyHeader, SetsVoltagesAsTheLanesDo) {
   const std::string header = header_of(config, network, flown);
   EXPECT_NE(header.find("It is the voltage of the left and of the right motor."), std::string::npos);
   EXPECT_NE(header.find("right_voltage          V       -18 to 18"), std::string::npos);
-  EXPECT_EQ(header.find("feedback controller"), std::string::npos);
+  EXPECT_EQ(header.find("The action is added to"), std::string::npos);
   folder.write("p.h", header);
-  EXPECT_EQ(bits(acts(*policy::load_policy(folder / "p.h", network.inputs(), 2), flown.observation)),
-            bits(flown.action));
-  EXPECT_NE(flight::message([&] { policy::load_policy(folder / "p.h", network.inputs(), 4); })
-                .find("has 22 inputs and 2 outputs; accepted: 22 and 4"),
-            std::string::npos);
+  const auto policy = policy::load_policy(folder / "p.h", network.inputs(), 2);
+  EXPECT_EQ(bits(acts(*policy, flown.observation)), bits(flown.action));
   const QuantisedNetwork whole = quantise(network, flown.observation);
   folder.write("q.h", header_of(config, whole, flown));
   EXPECT_EQ(bits(acts(*policy::load_policy(folder / "q.h", network.inputs(), 2), flown.observation)),
@@ -320,7 +317,6 @@ TEST(PolicyHeader, SetsVoltagesAsTheLanesDo) {
   const auto flight = [&](bool by_header) {
     rollout::FlyConfig c = config;
     c.duration_s = 0.1;
-    const auto policy = policy::load_policy(folder / "p.h", network.inputs(), 2);
     if (by_header) c.actor.reset();
     rollout::Rollout<float> all(c, 3, by_header ? policy.get() : nullptr);
     while (!all.over()) all.step();
