@@ -215,13 +215,12 @@ std::uint64_t hash_by_voltages(std::size_t size, int threads, const std::string&
 template <class T>
 void one_hash_by_voltages(std::uint64_t golden) {
   for (const std::string& set : test::instruction_sets())
-    for (const std::size_t size : test::kBatchSizes)
-      for (const int threads : test::kThreads) {
-        if (size == 1 && threads > 1) continue;
-        const std::uint64_t hash = hash_by_voltages<T>(size, threads, set);
-        EXPECT_EQ(hash, golden) << set << ", batches of " << size << ", " << threads << " threads: 0x" << std::hex
-                                << hash;
-      }
+    for (const std::size_t size : test::kBatchSizes) {
+      const int threads = size == 1 ? 1 : 3;
+      const std::uint64_t hash = hash_by_voltages<T>(size, threads, set);
+      EXPECT_EQ(hash, golden) << set << ", batches of " << size << ", " << threads << " threads: 0x" << std::hex
+                              << hash;
+    }
 }
 
 TEST(ClosedLoopDeterminism, VoltagesInFloat) { one_hash_by_voltages<float>(kGoldenVoltagesFloat); }
