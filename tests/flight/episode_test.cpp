@@ -265,7 +265,7 @@ TEST(HandBack, NeedsEveryConditionAndLatches) {
   fleet.start(0, 0, s, sim::Start::flying);
   s.position_m[2] = -0.1;
   fleet.start(1, 0, s, sim::Start::flying);
-  for (std::size_t i = 0; i < 2; ++i) fleet.set_action(i, std::array{1.0, 1.0, 1.0, 1.0});
+  for (std::size_t i = 0; i < 2; ++i) fleet.set_action(i, std::array{1.0F, 1.0F, 1.0F, 1.0F});
   bool was = false;
   for (int period = 0; period < 200; ++period) {
     const bool before = fleet.handed_back(0);
@@ -374,7 +374,7 @@ void fly_by_voltages() {
   for (int period = 0; period < 60; ++period) {
     for (std::size_t i = 0; i < 3; ++i) {
       const double a = 0.9 * std::sin(0.43 * period + static_cast<double>(i)), b = i == 2 ? -1.3 : 0.8 * a;
-      fleet.set_action(i, std::array{a, b});
+      fleet.set_action(i, std::array{static_cast<T>(a), static_cast<T>(b)});
       const auto adds = fleet.adds(i);
       EXPECT_NEAR(adds[0], -1 + 19 * a, 1e-5);
       EXPECT_NEAR(adds[1], 17 * std::max(b, -1.0), 1e-5);
@@ -431,7 +431,7 @@ TEST(Voltages, AreScoredAsTheirActionsAre) {
 TEST(Voltages, HaveNoControllerBesideThem) {
   const auto o = fleet_options(sensors("paper"), {}, task(voltages_task()));
   Fleet<float> fleet(1, test::nominal(), o);
-  EXPECT_THROW(fleet.set_action(0, std::array{0.0, 0.0, 0.0, 0.0}), std::invalid_argument);
+  EXPECT_THROW(fleet.set_action(0, std::array{0.0F, 0.0F, 0.0F, 0.0F}), std::invalid_argument);
   EXPECT_THROW(fleet.set_adds(0, std::array{0.0}), std::invalid_argument);
   EXPECT_THROW(fleet.set_added(0, {1, 0, 0, 0}), std::invalid_argument);
   fleet.set_added(0, {});

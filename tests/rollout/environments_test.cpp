@@ -14,6 +14,7 @@ namespace {
 
 const std::string kHover = test::source_path("configs/fly/hover_direct.toml");
 const std::string kEscape = test::source_path("configs/fly/escape.toml");
+const std::string kVoltages = test::source_path("configs/fly/hover_voltages.toml");
 
 /// Environments with the memory that their steps are written to.
 struct Bench {
@@ -61,6 +62,7 @@ std::uint64_t course(Bench& bench, std::size_t i, std::uint64_t before) {
 TEST(Environments, FlyAsFlappyFlyDoes) {
   for (const auto& [path, overrides] : {std::pair{kHover, std::vector<std::string>{}},
                                         {kEscape, {"precision=\"double\"", "flight.first_flapper=5"}},
+                                        {kVoltages, {}},
                                         {kEscape, {"task.history=2"}}}) {
     const FlyConfig config = read_fly_config(path, overrides);
     Bench bench(path, overrides, {3, Autoreset::disabled});
@@ -80,8 +82,9 @@ TEST(Environments, FlyAsFlappyFlyDoes) {
         }
         const auto action = some_actions(3, bench.actions(), step);
         for (std::size_t i = 0; i < 3; ++i) {
-          std::vector<T> own(action.begin() + static_cast<std::ptrdiff_t>(4 * i),
-                             action.begin() + static_cast<std::ptrdiff_t>(4 * i + 4));
+          const std::size_t n = bench.actions();
+          std::vector<T> own(action.begin() + static_cast<std::ptrdiff_t>(n * i),
+                             action.begin() + static_cast<std::ptrdiff_t>(n * i + n));
           fleet.set_action(i, std::span<const T>(own));
         }
         std::vector<double> reward(3);

@@ -55,7 +55,7 @@ class OwnFlight {
     const flight::Task& task = fleet_.options().task;
     f.tick[0] = f.segment[0] = 0;
     set_handed_back(false);
-    const double middle[flight::kMaxActions] = {};
+    const float middle[flight::kMaxActions] = {};
     fleet_.set_action(0, middle);
     // what the end of the period before would have shown
     flight::Segment<float> goal{0, {}};

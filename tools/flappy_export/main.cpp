@@ -95,7 +95,8 @@ void run(const Request& request, const io::Program& program) {
   const policy::PolicyNetwork network = deploy::network_of(run.fly);
   if (request.int8 && (network.layer_norm || network.linear || network.hidden > policy::Activation::tanh))
     throw io::InputError(
-        "--int8: whole numbers hold no layer norm, linear output, elu or silu; accepted: a policy of relu or tanh without them");
+        "--int8: whole numbers hold no layer norm, linear output, elu or silu; accepted: a policy of relu or tanh "
+        "without them");
   const auto signals = run.fly.fleet.task.observation();
   Export e;
   const std::string why_not = deploy::no_controller(run.fly);
