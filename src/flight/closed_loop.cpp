@@ -116,7 +116,10 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
     store_rows(memory, f.controller, first);
   });
   auto drive = load_rows<sim::Drive<L<T>>>(s.body.drive, first);
-  drive.direct = L<T>(plan.sets_voltages ? 1 : 0);
+  for (int i = 0; i < kWidth<T>; ++i) {
+    std::uint32_t& status = s.body.status[first + i];
+    status = plan.sets_voltages ? status | sim::kDirect : status & ~sim::kDirect;
+  }
   if (plan.sets_voltages) drive.voltages = commanded(s, episode, first);
   else drive.input = add_action(episode, base);
   store_rows(drive, s.body.drive, first);
@@ -280,7 +283,8 @@ FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPla
   for (int i = 0; i < kWidth<T>; ++i) {
     const std::uint32_t status = s.body.status[first + i];
     if (status & sim::kFrozen) f.ended[first + i] |= kNotFinite;
-    if (plan.task.contact_ends > 0 && (status & ~std::uint32_t{sim::kFrozen})) f.ended[first + i] |= kContact;
+    if (plan.task.contact_ends > 0 && (status & ~(std::uint32_t{sim::kFrozen} | sim::kDirect)))
+      f.ended[first + i] |= kContact;
   }
   L<T> row[kMaxObservation];
   const int rows = observe(plan.parts, plan.actions, estimate, ref, episode, beat_phase(s.body, first), now,

@@ -450,7 +450,7 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
   for (std::size_t i = first; i < last; ++i) {
     const auto [f, lane] = storage_->at(i);
     std::uint64_t h = 0;
-    for (int r = 0; r < storage_->hashed_rows(); ++r) h = sim::mixed(h, sim::bits_of(rows_of<T>(f)[r][lane]));
+    for (int r = 0; r < kFlightRows<T>; ++r) h = sim::mixed(h, sim::bits_of(rows_of<T>(f)[r][lane]));
     for (const std::uint32_t word : {f.flapper[lane], f.flight[lane], f.tick[lane], f.segment[lane], f.ended[lane]})
       h = sim::mixed(h, word);
     auto& body = sim::storage_of(storage_->batch);

@@ -151,13 +151,6 @@ struct Fleet<T>::Storage {
                                   std::to_string(plan.actions));
   }
 
-  /// Rows of a flight that its hash takes in. The last of the observation's rows, which nothing follows, are zeros in tasks that
-  /// observe no more than there were when hashes were first put on record.
-  int hashed_rows() const {
-    constexpr int kOnRecord = 40;
-    return kFlightRows<T> - (plan.observed > kOnRecord ? 0 : kMaxObservation - kOnRecord);
-  }
-
   /// What an action adds to input `k`, or sets motor `k` to, as the lanes work it out.
   T scaled(int k, T action) const {
     using L = model::Lanes<T, 1>;

@@ -372,6 +372,11 @@ Task read_task(const io::Table& table, double tick_s) {
   task.history = static_cast<std::uint32_t>(table.integer_or("history", 1, 1, kMaxHistory));
 
   read_action(table, task);
+  std::size_t numbers = 0;
+  for (const auto& part : task.observed_parts()) numbers += part.second.size();
+  if (numbers > kMaxObservation)
+    table.fail("observation", "has " + std::to_string(numbers) + " numbers",
+               "parts of at most " + std::to_string(kMaxObservation));
   TaskConstants<double>& k = task.constants;
   table.renamed("action.hold_s", "action.repeat_s");
   const double repeat_s = table.number_or("action.repeat_s", tick_s, {tick_s, 1});

@@ -10,7 +10,7 @@
 namespace flappy::policy {
 
 inline constexpr int kMaxActions = 4;       // of the wing beat; two voltages
-inline constexpr int kMaxObservation = 44;  // all parts together
+inline constexpr int kMaxObservation = 40;  // what a flapper of 2 kB has room for: all parts but four numbers
 inline constexpr int kMaxHistory = 8;       // observations that an actor sees at once
 
 inline constexpr int kMaxLayers = 32, kMaxWidth = 2048;

@@ -51,7 +51,8 @@ std::vector<DriverUpdate> driver_updates(flight::Fleet<T>& fleet, std::size_t i)
   const auto [block, lane] = body.at(i);
   const auto drive = sim::get<sim::Drive<double>>(block.drive, lane);
   const auto steps = static_cast<std::int64_t>(std::lround(fleet.period_s() / body.step_s));
-  if (drive.direct > 0) return {{body.steps - steps, 0, {}, drive.voltages.left_V, drive.voltages.right_V}};
+  if (block.status[lane] & sim::kDirect)
+    return {{body.steps - steps, 0, {}, drive.voltages.left_V, drive.voltages.right_V}};
   const auto parameters = sim::get<model::Parameters<double>>(block.parameters, lane);
   const auto& in = drive.input;
   const auto& limit = drive.limit;

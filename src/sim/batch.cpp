@@ -259,7 +259,6 @@ void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   auto drive = get<Drive<double>>(block.drive, lane);
   drive.input = {0, 0, 0, 0};
   drive.voltages = {0, 0};
-  drive.direct = 0;
   put(drive, block.drive, lane);
   block.phase[lane] = 0;
   storage_->clear_energy(i);
@@ -271,8 +270,8 @@ void Batch<T>::set_input(std::size_t i, const Input& input) {
   const auto [block, lane] = storage_->at(i);
   auto drive = get<Drive<double>>(block.drive, lane);
   drive.input = {input.amplitude_V, input.difference_V, input.bias_V, input.split_cycle};
-  drive.direct = 0;
   put(drive, block.drive, lane);
+  block.status[lane] &= ~kDirect;
 }
 
 template <class T>
@@ -282,8 +281,8 @@ void Batch<T>::set_voltages(std::size_t i, double left_V, double right_V) {
   const auto clipped = [](double value, double limit) { return model::clamp(value, -limit, limit); };
   auto drive = get<Drive<double>>(block.drive, lane);
   drive.voltages = {clipped(left_V, p.left.voltage_limit_V), clipped(right_V, p.right.voltage_limit_V)};
-  drive.direct = 1;
   put(drive, block.drive, lane);
+  block.status[lane] |= kDirect;
 }
 
 template <class T>
@@ -348,7 +347,7 @@ Start Batch<T>::support(std::size_t i) const {
 template <class T>
 std::uint32_t Batch<T>::status(std::size_t i) const {
   const auto [block, lane] = storage_->at(i);
-  return block.status[lane];
+  return block.status[lane] & ~kDirect;
 }
 
 template <class T>
@@ -365,9 +364,7 @@ std::uint64_t Batch<T>::hash(std::size_t first, std::size_t last) const {
     const auto [block, lane] = storage_->at(i);
     std::uint64_t h = 0;
     for (const auto& row : block.state) h = mixed(h, bits_of(row[lane]));
-    // the last row is no part of hashes where the wing beat drives: those on record are older
-    for (int r = 0; r < kDirectRow + (block.drive[kDirectRow][lane] > 0); ++r)
-      h = mixed(h, bits_of(block.drive[r][lane]));
+    for (const auto& row : block.drive) h = mixed(h, bits_of(row[lane]));
     h = mixed(mixed(h, block.phase[lane]), block.status[lane]);
     storage_->for_states(i, storage_->effects_of_lane(i) & ~model::sensor_effects(),
                          [&](T number) { h = mixed(h, bits_of(number)); });

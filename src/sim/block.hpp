@@ -24,7 +24,6 @@ struct Drive {
   model::WingBeat<T> input;  // as commanded
   model::WingBeat<T> limit;  // |input| is clipped to it
   Voltages<T> voltages;
-  T direct;  // 1: the voltages stay as they were set, 0: the wing beat gives them
 };
 
 }  // namespace FLAPPY_ISA
@@ -36,7 +35,10 @@ inline constexpr int kLanes = 64 / sizeof(T);
 inline constexpr int kParameterRows = model::kRows<model::Parameters>;
 inline constexpr int kStateRows = model::kRows<model::State>;
 inline constexpr int kDriveRows = model::kRows<Drive>;
-inline constexpr int kDirectRow = kDriveRows - 1;  // of Drive: its last
+
+/// Of a flapper whose voltages stay as they were set, where others have those of their wing beat: a bit beside those of Status, for
+/// a row of its own would take every flapper beyond its 2 kB.
+inline constexpr std::uint32_t kDirect = std::uint32_t{1} << 31;
 
 template <class T>
 struct alignas(64) Block {
@@ -45,7 +47,7 @@ struct alignas(64) Block {
   T drive[kDriveRows][kLanes<T>];
   std::uint32_t phase[kLanes<T>];  // of the wing beat: fraction x 2^32
   std::uint32_t phase_per_update[kLanes<T>];
-  std::uint32_t status[kLanes<T>];
+  std::uint32_t status[kLanes<T>];  // bits of Status, and kDirect
 };
 
 }  // namespace flappy::sim

@@ -28,10 +28,12 @@ template <class T, class L>
 FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>& left, const SideParameters<L>& right,
                                         const Voltages<L>& held, int first) {
   T fraction[kWidth<T>];
+  std::uint32_t any_status = 0;
   for (int i = 0; i < kWidth<T>; ++i) {
     std::uint32_t& phase = block.phase[first + i];
     fraction[i] = beat_fraction<T>(phase);
     phase += block.phase_per_update[first + i];
+    any_status |= block.status[first + i];
   }
   const auto d = load_rows<Drive<L>>(block.drive, first);
   const auto clip = [](const L& value, const L& limit) { return clamp(value, L(-limit), limit); };
@@ -40,10 +42,13 @@ FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>
                       clip(d.input.split_cycle, d.limit.split_cycle)};
   Voltages<L> next{wing_beat_voltage<+1>(u, L::load(fraction), left.voltage_limit_V),
                    wing_beat_voltage<-1>(u, L::load(fraction), right.voltage_limit_V)};
-  const auto direct = d.direct > L(0);
-  if (rarely(direct))
-    next = {where(direct, clip(held.left_V, left.voltage_limit_V), next.left_V),
-            where(direct, clip(held.right_V, right.voltage_limit_V), next.right_V)};
+  if (__builtin_expect((any_status & kDirect) != 0, 0)) {
+    T direct[kWidth<T>];
+    for (int i = 0; i < kWidth<T>; ++i) direct[i] = (block.status[first + i] & kDirect) != 0 ? T(1) : T(0);
+    const auto is_set = L::load(direct) > L(0);
+    next = {where(is_set, clip(held.left_V, left.voltage_limit_V), next.left_V),
+            where(is_set, clip(held.right_V, right.voltage_limit_V), next.right_V)};
+  }
   return next;
 }
 

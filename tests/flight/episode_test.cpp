@@ -466,6 +466,14 @@ TEST(Voltages, HaveNoControllerBesideThem) {
       replaced("left_V = [-20.0, 18.0]", "left_V = [1.0, -1.0]").find("action.left_V: is no range; accepted: [low"),
       std::string::npos);
   EXPECT_NE(replaced("left_V = [-20.0, 18.0]", "bias_V = [-1.0, 1.0]").find("action.left_V: "), std::string::npos);
+  EXPECT_EQ(
+      test::refusal([&] {
+        task(along(
+            waypoint(0, 0, 0, 0), "kind = \"flying\"",
+            "\"rotation_matrix\", \"position_error\", \"velocity\", \"body_rate\", \"beat_phase\", \"heading_error\", "
+            "\"previous_action\", \"goal_rotation\", \"time\", \"trim\", \"wings\""));
+      }),
+      "task.toml:3:15: observation: has 44 numbers; accepted: parts of at most 40");
   EXPECT_NE(replaced("right_V = [", "bias_V = [-1.0, 1.0]\nright_V = [").find("action.bias_V: unknown key"),
             std::string::npos);
 }

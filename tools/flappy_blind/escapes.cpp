@@ -64,7 +64,7 @@ EscapeRules rules_of(const EscapeOptions& o) {
       fleet.task.constants.success.by_s <= 0 || std::abs(fleet.control_hz * kControl_s - 1) > 1e-9)
     throw io::InputError(o.config +
                          ": is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal "
-                         "that stands still and a success, no observation of the wings");
+                         "that stands still and a success");
   const flight::FlightConstants k = flight::flight_constants(fleet);
   return {fleet.task, k.task, k.controller.of<flight::PidController>(), policy_of(path, config)};
 }
