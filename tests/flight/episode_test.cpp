@@ -420,12 +420,14 @@ TEST(Voltages, AreScoredAsTheirActionsAre) {
   Task t = task(voltages_task());
   t.constants.reward.action = 1, t.constants.reward.action_change = 10, t.constants.reward.cost = 1;
   t.constants.reward.alive = t.constants.reward.position = 0;
+  t.constants.contact_ends = 1;
   Fleet<double> fleet(1, test::nominal(), fleet_options(sensors("paper"), {}, t));
   fleet.set_action(0, std::array{0.5, -0.25});
   fleet.step();
   EXPECT_NEAR(fleet.reward(0), -11 * (0.25 + 0.0625), 1e-12);
   fleet.step();
   EXPECT_NEAR(fleet.reward(0), -(0.25 + 0.0625), 1e-12);
+  EXPECT_EQ(fleet.ended(0), 0u) << "that its voltages are set is no contact";
 }
 
 TEST(Voltages, HaveNoControllerBesideThem) {

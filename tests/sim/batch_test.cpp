@@ -272,6 +272,7 @@ TEST(Voltages, AreClippedAndHeldUntilTheyAreSetAgain) {
   same(1, 0);
   same(2, 0);
   EXPECT_LT(b.state(0).stroke_rate_rad_s[0], before_rad_s);
+  EXPECT_EQ(b.status(0), 0u);
   EXPECT_THROW(b.set_voltages(6, 0, 0), std::out_of_range);
 
   Batch<double> fresh(1, test::nominal(), one_thread());
