@@ -10,11 +10,12 @@ import time
 import numpy as np
 import torch
 from evaluation import evaluate
-from flappy.sb3 import FlappyVecEnv
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
+
+from flappy.sb3 import FlappyVecEnv
 
 
 class Curve(BaseCallback):

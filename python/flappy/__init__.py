@@ -6,7 +6,9 @@ Below them: `Batch` flies open loop, `Fleet` in closed loop. `read_flight` and `
 `flappy-identify` say. SI units; quaternions w, x, y, z, body to world; left before right.
 """
 
+from collections.abc import Mapping
 from importlib.util import find_spec
+from typing import Any
 
 from ._core import Batch, Fleet, InputError, Vehicle, Wall, World, diagnose, fly, identify, instruction_sets, write_flight
 from .export import export
@@ -27,8 +29,17 @@ __all__ = [
     "identify",
     "instruction_sets",
     "read_flight",
+    "show",
     "write_flight",
 ]
+
+
+def show(flight: Mapping[str, Any], fps: float = 25) -> Any:
+    """A flight of `read_flight` as a film for notebooks, front, side and top; `.save("flight.gif")`. Needs Pillow."""
+    from .render import show as film
+
+    return film(flight, fps)
+
 
 if find_spec("gymnasium") is not None:  # pip installs it; the rest does without
     from .envs import CAUSES, FlappyEnv, FlappyVectorEnv, register

@@ -25,9 +25,10 @@ class Policy:
         path = Path(path)
         self._script: Any = None
         if path.suffix == ".pt":
-            import torch
+            from torch import jit
 
-            self._script = torch.jit.load(str(path))
+            load: Any = jit.load
+            self._script = load(str(path))
             return
         sizes = {"OBS": 0, "ACT": 0}
         if path.suffix == ".h" and path.is_file():
