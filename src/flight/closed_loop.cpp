@@ -116,12 +116,15 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
     store_rows(memory, f.controller, first);
   });
   auto drive = load_rows<sim::Drive<L<T>>>(s.body.drive, first);
-  for (int i = 0; i < kWidth<T>; ++i) {
-    std::uint32_t& status = s.body.status[first + i];
-    status = plan.sets_voltages ? status | sim::kDirect : status & ~sim::kDirect;
-  }
   if (plan.sets_voltages) drive.voltages = commanded(s, episode, first);
   else drive.input = add_action(episode, base);
+  std::uint32_t any_status = 0;
+  for (int i = 0; i < kWidth<T>; ++i) any_status |= s.body.status[first + i];
+  if (__builtin_expect(plan.sets_voltages || (any_status & sim::kDirect) != 0, 0))
+    for (int i = 0; i < kWidth<T>; ++i) {
+      std::uint32_t& status = s.body.status[first + i];
+      status = plan.sets_voltages ? status | sim::kDirect : status & ~sim::kDirect;
+    }
   store_rows(drive, s.body.drive, first);
 }
 

@@ -28,13 +28,13 @@ template <class T, class L>
 FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>& left, const SideParameters<L>& right,
                                         const Voltages<L>& held, int first) {
   T fraction[kWidth<T>];
-  std::uint32_t any_status = 0;
   for (int i = 0; i < kWidth<T>; ++i) {
     std::uint32_t& phase = block.phase[first + i];
     fraction[i] = beat_fraction<T>(phase);
     phase += block.phase_per_update[first + i];
-    any_status |= block.status[first + i];
   }
+  std::uint32_t any_status = 0;
+  for (int i = 0; i < kWidth<T>; ++i) any_status |= block.status[first + i];
   const auto d = load_rows<Drive<L>>(block.drive, first);
   const auto clip = [](const L& value, const L& limit) { return clamp(value, L(-limit), limit); };
   const WingBeat<L> u{clamp(d.input.amplitude_V, L(0), d.limit.amplitude_V),

@@ -68,7 +68,7 @@ if(TORCH)
   flown(of_deep ${WORK}/deep)
   flown(of_deep_header ${WORK}/deep_out/flappy_policy.h --config ${WORK}/deep/config/fly.toml)
   expect_equal("flights of the deep header" "${of_deep_header}" "${of_deep}")
-  expect_refused("--int8: whole numbers hold no layer norm, elu or silu; accepted: a policy of relu or tanh without layer norm"
+  expect_refused("--int8: whole numbers hold no layer norm, linear output, elu or silu; accepted: a policy of relu or tanh without them"
     ${WORK}/deep --out ${WORK}/deep_int8 --int8)
 endif()
 
