@@ -89,16 +89,17 @@ class PyEnvironments {
   }
 
   nb::tuple step(nb::handle action) {
+    std::size_t ended = 0;
     const Turn turn(busy_, "the environment");
     const Floats floats(action, "action", {all().count(), all().actions().size()}, 1);
     Buffer& buffer = fresh();
     {
       const nb::gil_scoped_release free;
-      all().step(floats.data(),
-                 {buffer.observation.data(), buffer.reward.data(), buffer.terminated.get(), buffer.truncated.get()});
+      ended = all().step(floats.data(), {buffer.observation.data(), buffer.reward.data(), buffer.terminated.get(),
+                                         buffer.truncated.get()});
     }
     keep(buffer);
-    return nb::make_tuple(shown_[0], shown_[1], shown_[2], shown_[3], std::ranges::count(all().ended(), true));
+    return nb::make_tuple(shown_[0], shown_[1], shown_[2], shown_[3], ended);
   }
 
   /// What ended in the last step.

@@ -167,6 +167,18 @@ void bind_batch(nb::module_& m) {
           "Inputs of the wing beat, float64 (count, 4) or (4,): amplitude, difference and bias in V, split cycle in "
           "beats.")
       .def(
+          "set_voltages",
+          [](const PyBatch& b, nb::handle voltages) {
+            const Turn turn(b.busy(), "the batch");
+            for_rows(voltages, "voltages", b.size(), 2, [&](std::size_t k, const double* v) {
+              b.with([&](auto& batch) { batch.set_voltages(k, v[0], v[1]); });
+            });
+          },
+          "voltages"_a,
+          "Voltages of the left and the right motor in place of the wing beat's, float64 (count, 2) or (2,), each "
+          "clipped to what its motor "
+          "takes, until set_inputs or reset.")
+      .def(
           "set_vehicle",
           [](const PyBatch& b, std::int64_t i, const Vehicle& v) {
             b.with([&](auto& batch) { batch.set_vehicle(b.at(i), v); });

@@ -36,6 +36,16 @@ def test_a_batch_does_not_depend_on_its_size():
     assert np.abs(positions[0]).max() > 1e-4
 
 
+def test_a_batch_takes_voltages():
+    batch = flappy.Batch(2, flappy.Vehicle("vehicles/hummingbird_nominal.toml"))
+    batch.set_voltages([[3, 3], [3, -3]])
+    batch.step(20)
+    rate = batch.states()["stroke_rate_rad_s"]
+    assert rate[0, 0] > 1
+    assert rate[0] == pytest.approx(rate[0, ::-1], rel=1e-3)  # mirrored axes: the same way on both sides
+    assert rate[1, 0] > 0 > rate[1, 1]
+
+
 def test_a_batch_takes_states_and_vehicles():
     vehicle = flappy.Vehicle("vehicles/hummingbird_nominal.toml")
     heavy = vehicle.copy()

@@ -133,6 +133,35 @@ void Fleet<T>::set_action(std::size_t i, std::span<const T> action) {
 }
 
 template <class T>
+void Fleet<T>::set_actions(std::size_t block, const T* actions) {
+  const auto [first, last] = flappers(block);
+  const auto count = static_cast<std::size_t>(storage_->plan.actions);
+  auto& rows = storage_->blocks[block].episode;
+  for (std::size_t k = 0; k < count; ++k) {
+    T* const action = rows[offsetof(Episode<T>, action) / sizeof(T) + k];
+    T* const adds = rows[offsetof(Episode<T>, adds) / sizeof(T) + k];
+    for (std::size_t lane = 0; lane < last - first; ++lane) {
+      action[lane] = actions[lane * count + k];
+      adds[lane] = storage_->scaled(static_cast<int>(k), action[lane]);
+    }
+  }
+  std::fill_n(rows[offsetof(Episode<T>, action_reward) / sizeof(T)], last - first, T(0));
+  if (storage_->plan.past > 0)
+    for (std::size_t i = first; i < last; ++i) storage_->remember(i);
+}
+
+template <class T>
+Shown<T> Fleet<T>::shown(std::size_t block) const {
+  const FlightBlock<T>& f = storage_->blocks[block];
+  return {static_cast<std::size_t>(kLanes<T>),
+          f.observation[0],
+          f.episode[offsetof(Episode<T>, action_reward) / sizeof(T)],
+          f.episode[offsetof(Episode<T>, handed_back) / sizeof(T)],
+          f.ended,
+          f.tick};
+}
+
+template <class T>
 void Fleet<T>::set_adds(std::size_t i, std::span<const double> adds) {
   const auto [f, lane] = storage_->at(i);
   auto e = get<Episode<double>>(f.episode, lane);

@@ -43,6 +43,15 @@ struct Target {
   double heading_cos, heading_sin, heading_rate_rad_s;
 };
 
+/// What the flappers of a block show after a period, each list one number for each; a number of the observation is `lanes` after the
+/// one before it. Of observations with a history, the present.
+template <class T>
+struct Shown {
+  std::size_t lanes;
+  const T *observation, *action_reward, *handed_back;
+  const std::uint32_t *ended, *tick;
+};
+
 /// A flapper in mid-flight: its vehicle with its effects, state, sensors' biases, and what estimator and controller have learnt.
 template <class T>
 struct Snapshot {
@@ -82,6 +91,8 @@ class Fleet {
   /// Action of flapper `i` for the next period, each in [-1, 1], for what it observes now; an actor would overwrite it.
   /// std::invalid_argument unless it has as many numbers as the task's actions.
   void set_action(std::size_t i, std::span<const T> action);
+  /// Of all flappers of a block, row after row.
+  void set_actions(std::size_t block, const T* actions);
   /// The same by what the action adds to the controller's output, or the voltages that it sets, each within the task's range.
   void set_adds(std::size_t i, std::span<const double> adds);
   /// Adds to the controller's output from now on: open-loop flight, excitation. std::invalid_argument for anything but nothing
@@ -101,6 +112,7 @@ class Fleet {
   std::size_t blocks() const;
   /// Flappers of a block: the first, and the one after the last.
   std::pair<std::size_t, std::size_t> flappers(std::size_t block) const;
+  Shown<T> shown(std::size_t block) const;
 
   Motion truth(std::size_t i) const;
   Motion estimate(std::size_t i) const;

@@ -1,6 +1,7 @@
 #include "rollout/environments.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "io/parallel.hpp"
@@ -14,6 +15,8 @@ namespace {
 constexpr std::uint32_t kSettledVehicles = 256;
 /// Beyond the range in which a vehicle flies, by which observations are bounded: only what is lost is ever clamped.
 constexpr double kObservationRoom = 10;
+/// Flappers of a block, at most.
+constexpr std::size_t kMostLanes = 64;
 
 FlyConfig checked(FlyConfig config) {
   if (config.excitation.changes())
@@ -79,22 +82,25 @@ class EnvironmentsOf final : public Environments {
     }
   }
 
-  void step(const float* action, const Transitions& to) override {
+  std::size_t step(const float* action, const Transitions& to) override {
     const std::size_t actions = actions_.size();
+    std::atomic<std::size_t> ended = 0;
     fleet_->begin(static_cast<int>(config_.fleet.task.action_repeat));
     io::parallel_for(fleet_->blocks(), fleet_->options().batch.threads, [&](std::size_t block) {
       const auto [first, last] = fleet_->flappers(block);
-      for (std::size_t i = first; i < last; ++i) {
-        T clamped[flight::kMaxActions];
-        for (std::size_t k = 0; k < actions; ++k)
-          clamped[k] = static_cast<T>(std::min(std::max(action[i * actions + k], -1.0F), 1.0F));
-        fleet_->set_action(i, std::span<const T>(clamped, actions));
-      }
+      T clamped[kMostLanes * flight::kMaxActions];
+      for (std::size_t k = 0; k < (last - first) * actions; ++k)
+        clamped[k] = static_cast<T>(std::min(std::max(action[first * actions + k], -1.0F), 1.0F));
+      fleet_->set_actions(block, clamped);
       fleet_->fly_block(block);
-      for (std::size_t i = first; i < last; ++i) gather(i, to);
+      const flight::Shown<T> shown = fleet_->shown(block);
+      std::size_t over = 0;
+      for (std::size_t i = first; i < last; ++i) over += gather(i, i - first, shown, to);
+      if (over > 0) ended += over;
     });
     fleet_->end();
     if (config_.watch) show(*config_.watch, *fleet_);
+    return ended;
   }
 
   flight::Motion truth(std::size_t i) const override { return fleet_->truth(i); }
@@ -133,7 +139,6 @@ class EnvironmentsOf final : public Environments {
     for (std::size_t i = 0; i < count(); ++i) {
       lives_[i].episode = 0;
       start(i);
-      fleet_->set_added(i, config_.excitation.at(0));
     }
   }
 
@@ -149,19 +154,22 @@ class EnvironmentsOf final : public Environments {
       hover = life.episode == 0 ? &own_[i] : &others_[place];
     }
     Rollout<T>::start(*fleet_, config_, i, life.episode, hover);
+    if (config_.excitation.acts()) fleet_->set_added(i, config_.excitation.at(0));
     life = {life.episode};
   }
+
+  float bounded(std::size_t k, T x) const { return static_cast<float>(std::min(std::max(x, -bounds_[k]), bounds_[k])); }
 
   void observe(std::size_t i, float* row) const {
     T seen[flight::kMaxHistory * flight::kMaxObservation];
     fleet_->observation(i, seen);
-    for (std::size_t k = 0; k < bounds_.size(); ++k)
-      row[k] = static_cast<float>(std::min(std::max(seen[k], -bounds_[k]), bounds_[k]));
+    for (std::size_t k = 0; k < bounds_.size(); ++k) row[k] = bounded(k, seen[k]);
   }
 
-  void gather(std::size_t i, const Transitions& to) {
+  /// What the last step made of an environment; whether its episode ended in it.
+  bool gather(std::size_t i, std::size_t lane, const flight::Shown<T>& shown, const Transitions& to) {
     Life& life = lives_[i];
-    float* row = to.observation + i * observed_.size();
+    float* const row = to.observation + i * observed_.size();
     ended_[i] = false;
     if (life.over && options_.autoreset == Autoreset::next_step) {
       ++life.episode;
@@ -169,30 +177,33 @@ class EnvironmentsOf final : public Environments {
       observe(i, row);
       to.reward[i] = 0;
       to.terminated[i] = to.truncated[i] = false;
-      return;
+      return false;
     }
-    observe(i, row);
-    const float reward = static_cast<float>(fleet_->action_reward(i));
-    const std::uint32_t causes = fleet_->ended(i);
-    const bool paid = fleet_->handed_back(i) && fleet_->tick(i) >= paid_ticks_;
+    if (config_.fleet.task.history > 1) observe(i, row);
+    else
+      for (std::size_t k = 0; k < bounds_.size(); ++k) row[k] = bounded(k, shown.observation[k * shown.lanes + lane]);
+    const auto reward = static_cast<float>(shown.action_reward[lane]);
+    const std::uint32_t causes = shown.ended[lane];
+    const bool crashed = (causes & ~std::uint32_t{flight::kTimeOut}) != 0;
+    const bool paid = shown.handed_back[lane] > 0 && shown.tick[lane] >= paid_ticks_;
     to.reward[i] = reward;
-    to.terminated[i] = paid || (causes & ~std::uint32_t{flight::kTimeOut}) != 0;
+    to.terminated[i] = paid || crashed;
     to.truncated[i] = !to.terminated[i] && causes != 0;
-    if (life.over) return;
+    if (life.over) return false;
     ++life.steps;
     life.episode_return += reward;
-    if (!to.terminated[i] && !to.truncated[i]) return;
+    if (!to.terminated[i] && !to.truncated[i]) return false;
     life.over = ended_[i] = true;
-    const bool crashed = (causes & ~std::uint32_t{flight::kTimeOut}) != 0;
     const bool has_success = config_.fleet.task.constants.success.by_s > 0;
     const bool kept = fleet_->captured_s(i) > 0 && fleet_->lost_s(i) == 0;
     episodes_[i] = {static_cast<float>(life.episode_return), static_cast<float>(life.steps),
                     !crashed && (!has_success || kept), causes};
     std::copy_n(row, observed_.size(), &final_observation_[i * observed_.size()]);
-    if (options_.autoreset != Autoreset::same_step) return;
+    if (options_.autoreset != Autoreset::same_step) return true;
     ++life.episode;
     start(i);
     observe(i, row);
+    return true;
   }
 
   FlyConfig config_;

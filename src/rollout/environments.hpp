@@ -53,8 +53,8 @@ class Environments {
   virtual void reset(std::optional<std::uint64_t> seed, float* observation) = 0;
   /// Starts the next episode of those that are named; writes their rows alone.
   virtual void reset(std::span<const bool> which, float* observation) = 0;
-  /// One action of each, [count][actions()]. Numbers outside [-1, 1] are clamped.
-  virtual void step(const float* action, const Transitions& to) = 0;
+  /// One action of each, [count][actions()]. Numbers outside [-1, 1] are clamped. How many ended.
+  virtual std::size_t step(const float* action, const Transitions& to) = 0;
 
   /// Of those that ended in the last step: bits for each environment, how it went, and its last observation.
   std::span<const bool> ended() const { return {ended_.get(), count()}; }
