@@ -229,6 +229,30 @@ void bind_batch(nb::module_& m) {
           },
           "What both motors drew since the reset, float64 (count,). ValueError unless `meters_energy`.")
       .def(
+          "held_impulse",
+          [](const PyBatch& b) {
+            auto array = make_array<double>({b.size(), 6});
+            for (std::size_t i = 0; i < b.size(); ++i) {
+              const sim::HeldImpulse h = b.with([&](auto& batch) { return batch.held_impulse(i); });
+              std::copy_n(h.force_N_s, 3, array.data() + 6 * i);
+              std::copy_n(h.moment_Nm_s, 3, array.data() + 6 * i + 3);
+            }
+            return array;
+          },
+          "What the air did to the wings of standing or welded ones since their reset, float64 (count, 6): N s and N m "
+          "s, in B about the "
+          "torso origin.")
+      .def(
+          "support",
+          [](const PyBatch& b) {
+            static constexpr const char* kNames[] = {"flying", "standing", "welded"};
+            std::vector<std::string> names;
+            for (std::size_t i = 0; i < b.size(); ++i)
+              names.emplace_back(kNames[static_cast<int>(b.with([&](auto& batch) { return batch.support(i); }))]);
+            return names;
+          },
+          "What holds each: \"flying\", \"standing\" or \"welded\".")
+      .def(
           "hash", [](const PyBatch& b) { return b.with([](auto& batch) { return batch.hash(); }); },
           "Of every number that moves.");
   m.def("instruction_sets", &sim::instruction_sets, "Those that this processor can run, the best last.");

@@ -46,6 +46,15 @@ def test_a_batch_takes_voltages():
     assert rate[1, 0] > 0 > rate[1, 1]
 
 
+def test_a_welded_flapper_pulls_at_its_stand():
+    batch = flappy.Batch(2, flappy.Vehicle("vehicles/hummingbird_nominal.toml"))
+    batch.reset(1, start="welded")
+    batch.set_inputs([10, 0, 0, 0])
+    batch.step(4000)  # 1 s
+    assert batch.support() == ["flying", "welded"]
+    assert batch.held_impulse()[1, 2] == pytest.approx(0.012 * 9.81, rel=0.2)  # about what carries 12 g
+
+
 def test_a_batch_takes_states_and_vehicles():
     vehicle = flappy.Vehicle("vehicles/hummingbird_nominal.toml")
     heavy = vehicle.copy()
@@ -103,6 +112,14 @@ def test_a_fleet_flies_as_flappy_fly(tmp_path):
     assert np.abs(truth["position_m"] - fleet.estimate()["position_m"]).max() < 0.01
     assert fleet.observations().dtype == np.float32
     assert fleet.rewards().shape == fleet.ended().shape == (2,)
+
+
+def test_environments_that_add_nothing_fly_as_flappy_fly():
+    env = _core.Environments(Path("fly/waypoints.toml"), [], 3, "same_step", True)
+    env.reset(env.seed)
+    for _ in range(500):
+        env.step(np.zeros((3, 4), np.float32))
+    assert env.hash(0, 3) == flappy.fly("fly/waypoints.toml", ["flight.duration_s=1"], count=3)["hash"]
 
 
 def test_flights_come_back_as_they_were_written(tmp_path):

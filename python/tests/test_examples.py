@@ -4,6 +4,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+pytest.importorskip("gymnasium")
+
 EXAMPLES = Path(__file__).parents[2] / "examples" / "python"
 
 

@@ -1,4 +1,4 @@
-"""Memory stays where it is: 400,000 random steps, or as many as FLAPPY_STEPS says (10000000 under the address sanitizer)."""
+"""Memory stays where it is: 200,000 random steps, or as many as FLAPPY_STEPS says (10000000 under the address sanitizer)."""
 
 import os
 import resource
@@ -31,7 +31,7 @@ def fly(steps: int, copy: bool, random: np.random.Generator) -> None:
 
 def test_memory_stays():
     random = np.random.default_rng(0)
-    steps = int(os.environ.get("FLAPPY_STEPS", "400000"))
+    steps = int(os.environ.get("FLAPPY_STEPS", "200000"))
     fly(steps // 20, True, random)
     fly(steps // 20, False, random)
     before = resident_mb()

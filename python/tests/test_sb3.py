@@ -1,9 +1,9 @@
 """What Stable-Baselines3 sees."""
 
-import gymnasium
 import numpy as np
 import pytest
 
+gymnasium = pytest.importorskip("gymnasium")
 pytest.importorskip("stable_baselines3")
 
 from stable_baselines3 import PPO
