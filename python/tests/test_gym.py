@@ -9,11 +9,11 @@ import pytest
 
 gymnasium = pytest.importorskip("gymnasium")
 
-from gymnasium.utils.env_checker import check_env, data_equivalence  # noqa: E402
-from gymnasium.vector import AutoresetMode  # noqa: E402
-from gymnasium.wrappers.vector import RecordEpisodeStatistics  # noqa: E402
+from gymnasium.utils.env_checker import check_env, data_equivalence
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
-import flappy  # noqa: E402
+import flappy
 
 IDS = ["flappy/Hover-v0", "flappy/Hover-v1", "flappy/Escape-v0", "flappy/Waypoints-v0"]
 BRIEF = ["task.end.time_s=0.05"]
