@@ -35,7 +35,7 @@ Polar::Polar(double lift, double drag) {
   for (int i = 0; i <= kCells; ++i) {
     const double share = static_cast<double>(i) / kCells;
     const double alpha = std::atan2(share, 1 - share);
-    const double cl = kScale * lift * lift_coefficient(alpha), cd = kScale * drag * drag_coefficient(alpha);
+    const double cl = kScale * lift * lift_coefficient(alpha), cd = drag * drag_coefficient(alpha);
     const double sine = std::sin(alpha), cosine = std::cos(alpha);
     row[static_cast<std::size_t>(i)] = {cl * cosine + cd * sine, cl * sine - cd * cosine, cl, 0.82 * alpha / kPi + 0.05};
   }
@@ -53,7 +53,7 @@ WingAir::WingAir(const Figures& figures, const Ailments& ailments, std::size_t s
   reference_r_ = kGyration * length_;
   reference_chord_ = s.mean_chord_m * beta_chord(kGyration);
   turning_force_ = turning_torque_ = 0;
-  const double turning = 0.5 * density_ * kScale * s.turning_drag * drag_coefficient(kPi / 2);
+  const double turning = 0.5 * density_ * s.turning_drag * drag_coefficient(kPi / 2);
   double area = 0;
   for (std::size_t i = 0; i < kStrips; ++i) {
     Strip& strip = strips_[i];

@@ -13,8 +13,8 @@
 // Chords are those of Ellington's beta distribution [6], c = c_mean x^(p-1) (1-x)^(q-1) / B(p, q), with centroid and radius of gyration
 // of this family: p and q are the moments' of a beta density with mean 0.46 and mean square 0.53^2.
 //
-// The coefficients were measured at a Reynolds number of 10^2; at 10^4 lift is lower at its peak and higher elsewhere, and this robot's
-// battens leak. One factor on all of them, kScale, makes the nominal robot carry its weight at about 10 V.
+// The coefficients were measured at a Reynolds number of 10^2. At 10^4 wings have more lift for their drag (Altshuler, Dudley, Ellington,
+// J. Zool. 264 (2004), on hummingbirds' wings): one factor on lift, kScale, makes the nominal robot carry its weight at about 10 V.
 //
 // Rotational circulation [2], added mass [7], wake [8], twist and what is near are effects: nothing of them is here unless they are on.
 //
@@ -39,7 +39,7 @@
 namespace flappy::blind::b {
 
 inline constexpr std::size_t kStrips = 8;
-inline constexpr double kScale = 1.0;  ///< on the coefficients, see above
+inline constexpr double kScale = 1.5;  ///< on lift, see above
 
 /// Coefficients over |u_x| / (|u_x| + |u_z|), which needs no angle.
 struct Polar {
