@@ -21,7 +21,7 @@ std::vector<FamilyEffect> table() {
   return {
       {"ground_effect", "14 % more force of the wings at the ground, falling by e each 75 mm", kLift, {"height"}},
       {"ceiling_effect", "12 % more force of the wings at the ceiling, falling by e each 60 mm", kLift, {"ceiling"}},
-      {"wall_effect", "4 % of the weight towards the wall and 5 % less lift of a wing whose tip touches it, falling by e each 60 mm",
+      {"wall_effect", "4 % of the weight towards the wall and 5 % less lift of a wing whose tip touches it, falling by e each 80 mm",
        {"force_y", "force_z", "torque_x"}, {"wall"}},
       {"body_drag", "drag areas of 1.6, 1.3 and 1.0e-3 m^2 along the axes of B, each with its own component of velocity", kForces,
        {"velocity"}},

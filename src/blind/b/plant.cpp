@@ -10,7 +10,7 @@ namespace {
 constexpr double kFrictionOver_rad_s = 6;     // of stroke, within which dry friction sets in
 constexpr double kGearLossOver_rad_s = 10;
 constexpr double kRotationStop = 2.0, kStrokeStop = 8.0;  // Nm/rad^1.5
-constexpr double kStopLoss = 3e-3;            // s/rad: e = 1 - c d'
+constexpr double kStopLoss = 1e-2;            // s/rad; with a third of it wings bounce off their stops another way each beat
 constexpr double kScrewMass_kg = 0.15e-3, kScrewGap_m = 0.6e-3;
 
 double smooth_sign(double x, double over) { return std::tanh(x / over); }
@@ -172,7 +172,7 @@ double Plant::near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const
   // ceiling (Free University of Bozen-Bolzano); finite at contact, other than Cheeseman and Bennett's.
   if (a_.any(kGroundEffect)) gain += 0.14 * a_[kGroundEffect] * decay(height - room.ground_z_m, 0.075);
   if (a_.any(kCeilingEffect)) gain += 0.12 * a_[kCeilingEffect] * decay(room.ceiling_z_m - height, 0.06);
-  if (a_.any(kWallEffect)) gain -= 0.05 * a_[kWallEffect] * decay(room.wall_y_m - tip_W.y(), 0.06);
+  if (a_.any(kWallEffect)) gain -= 0.05 * a_[kWallEffect] * decay(room.wall_y_m - tip_W.y(), 0.08);
   return gain;
 }
 
@@ -188,7 +188,7 @@ Wrench Plant::on_torso(const State& x, const Matrix3d& R, const Slow& slow, cons
   }
   if (a_.any(kWallEffect) && has_air) {
     // The image of the wings' downwash draws the robot to the wall, at the stroke plane.
-    const double near = decay(room.wall_y_m - position.y() - f_.around_m, 0.06);
+    const double near = decay(room.wall_y_m - position.y() - f_.around_m, 0.08);
     const Vector3d pull(0, 0.04 * a_[kWallEffect] * f_.mass_kg() * kGravity_m_s2 * near, 0);
     sum = sum + at_point(Vector3d(0, 0, f_.above_m), R.transpose() * pull);
   }
