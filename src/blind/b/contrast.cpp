@@ -21,13 +21,14 @@ Vector3d at_imu(const Robot& robot, const Felt& felt, const Vector3d& place) {
 }
 
 /// Coefficients of the beats of a robot that is led along the path with these voltages.
-Contrast led(const Assignment& a, const Case& c, std::size_t flight, const Path& path, const std::vector<std::array<double, 2>>& voltages) {
+Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim_s, const Path& path,
+             const std::vector<std::array<double, 2>>& voltages) {
   Robot robot(c.figures, c.ailments, c.room, a.seed, flight);
   std::copy(path.pose.front().begin(), path.pose.front().end(), robot.state().begin());
   Contrast out;
   const double beat_s = 1 / c.figures.flapping_Hz;
   // Beats of the log that are whole, by the driver's phase.
-  long beat = std::lround(std::ceil(kTrim_s / beat_s - 1e-9));
+  long beat = std::lround(std::ceil(trim_s / beat_s - 1e-9));
   std::array<double, 30> sum{};
   int count = 0;
   const std::size_t ticks = std::min(voltages.size(), path.pose.size() / kStepsPerTick);
@@ -40,7 +41,7 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, const Path&
       while (time >= static_cast<double>(beat + 1) * beat_s - 1e-9) {
         if (count > 0) {
           for (std::size_t n = 0; n < sum.size(); ++n) sum[n] /= count;
-          out.beat_s.push_back(static_cast<double>(beat) * beat_s - kTrim_s);
+          out.beat_s.push_back(static_cast<double>(beat) * beat_s - trim_s);
           out.change.push_back(sum);
         }
         sum.fill(0);
@@ -48,8 +49,8 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, const Path&
         ++beat;
       }
       robot.led_step(path, at);
-      // Each fourth step is enough for two harmonics.
-      if (time < static_cast<double>(beat) * beat_s - 1e-9 || step % 4 != 3) continue;
+      // Impacts at the stops last for a few steps, so each step counts.
+      if (time < static_cast<double>(beat) * beat_s - 1e-9) continue;
       const Felt felt = robot.felt_now();
       const Vector3d force = at_imu(robot, felt, c.sensors.imu_place_m);
       const double phase = 2 * std::numbers::pi * (time + kStep_s) / beat_s;
@@ -67,16 +68,16 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, const Path&
 
 }  // namespace
 
-FamilyFlight fly_programme(const Assignment& a, std::size_t number, double lasts_s, Path* path,
+FamilyFlight fly_programme(const Assignment& a, std::size_t number, const Times& times, Path* path,
                            std::vector<std::array<double, 2>>* voltages) {
   const Case c = make_case(a);
   const Programme programme(a, number, c.figures, c.room);
-  Flight flight(a, c, number, programme.start_m(), programme.start_heading_rad(), kTrim_s);
+  Flight flight(a, c, number, programme.start_m(), programme.start_heading_rad(), times.trim_s);
   flight.record(path);
   Beat beat;
   FamilyFlight out;
-  double end = lasts_s;
-  while (flight.time_s() < lasts_s - 1e-9) {
+  double end = times.log_s;
+  while (flight.time_s() < times.log_s - 1e-9) {
     if (flight.steers_now()) {
       const double now = flight.time_s();
       beat = flight.pilot().steer(flight.view(), programme.target(now));
@@ -98,7 +99,7 @@ FamilyFlight fly_programme(const Assignment& a, std::size_t number, double lasts
   return out;
 }
 
-Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double size, double lasts_s) {
+Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double size, const Times& times) {
   for (const auto& [id, present] : a.effects)
     if (id == effect && present != 0) throw io::InputError("effect " + effect + ": the flight was flown with it; accepted: a flight without it");
   Assignment with = a;
@@ -107,9 +108,9 @@ Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string&
   const Case before = make_case(a), after = make_case(with);
   Path path;
   std::vector<std::array<double, 2>> voltages;
-  fly_programme(a, flight, lasts_s, &path, &voltages);
-  const Contrast without = led(a, before, flight, path, voltages);
-  Contrast out = led(with, after, flight, path, voltages);
+  fly_programme(a, flight, times, &path, &voltages);
+  const Contrast without = led(a, before, flight, times.trim_s, path, voltages);
+  Contrast out = led(with, after, flight, times.trim_s, path, voltages);
   for (std::size_t i = 0; i < out.change.size(); ++i)
     for (std::size_t n = 0; n < 30; ++n) out.change[i][n] -= without.change[i][n];
   return out;

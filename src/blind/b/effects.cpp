@@ -27,7 +27,7 @@ std::vector<FamilyEffect> table() {
        {"velocity"}},
       {"added_mass", "Sedov's inertia of the air about each strip, as Kirchhoff's equations have it", kStroke, {"always", "stroke"}},
       {"rotational_lift", "Sane and Dickinson's coefficient, falling as the wing turns faster", kStroke, {"always", "stroke"}},
-      {"wake_capture", "air that goes on with 4 % of the wing's speed for 4 ms", kStroke, {"always", "stroke"}},
+      {"wake_capture", "air that goes on with 1.5 % of the wing's speed for 4 ms", kStroke, {"always", "stroke"}},
       {"clap_and_fling", "17 % more force where less than 12 deg part the wings", kLift, {"amplitude", "stroke"}},
       {"wing_flexibility", "twist of 8 deg at the tip in hover, linear along the span", kStroke, {"always", "amplitude"}},
       {"wing_damage", "5 % of the area lost at the trailing edge of one tip",

@@ -69,8 +69,8 @@ bool within(const Standing& s, const EscapeAssignment::Bounds& b) {
 
 }  // namespace
 
-FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) {
-  Case c = make_case(a);
+FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules, double trim_s) {
+  const Case c = make_case(a);
   const std::uint64_t flight = 1000 + number;
   Random random(a.seed, flight, Stream::kStart);
   Vector3d start;
@@ -79,7 +79,7 @@ FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAss
   start.x() = std::clamp(start.x(), rules.x_low_m, rules.x_high_m);
   start += kGoal_m;
   const double heading = wrapped(rules.heading_rad + rules.heading_half_rad * random.uniform(-1, 1));
-  Flight flown(a, c, flight, start, heading, kTrim_s);
+  Flight flown(a, c, flight, start, heading, trim_s);
   observed(rules.observation, flown.view(), 0, 0, flown.pilot().trim(), {});  // a name that is unknown is refused before the work
 
   FamilyEscape out;
@@ -103,7 +103,7 @@ FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAss
         } else {
           const Beat trim = flown.pilot().trim();
           if (now >= next_action - 1e-9) {
-            const double phase = 2 * kPi * (now + kTrim_s) * c.figures.flapping_Hz;
+            const double phase = 2 * kPi * (now + trim_s) * c.figures.flapping_Hz;
             added = rules.policy(observed(rules.observation, view, phase, now, trim, added));
             for (double& u : added)
               if (!std::isfinite(u)) u = 0;

@@ -22,7 +22,7 @@ class FamilyB final : public Family {
   const std::vector<FamilyEffect>& effects() const override { return family_effects(); }
   FamilyFlight fly(const Assignment& a, std::size_t flight) const override {
     check_flight(flight);
-    return fly_programme(a, flight, kFlight_s, nullptr, nullptr);
+    return fly_programme(a, flight);
   }
   Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const override {
     check_flight(flight);

@@ -280,7 +280,7 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
       if (a_.any(kWakeCapture)) {
         constexpr double kStays_s = 4e-3;
         rate[kWake + j] = (psi_rate - x[kWake + j]) / kStays_s;
-        flow.wake_rad_s = 0.04 * a_[kWakeCapture] * x[kWake + j];
+        flow.wake_rad_s = 0.015 * a_[kWakeCapture] * x[kWake + j];
       }
       if (a_.any(kWingFlexibility)) flow.twist_rad = x[kTwist + j];
       if (a_.any(kGroundEffect) || a_.any(kCeilingEffect) || a_.any(kWallEffect)) {
