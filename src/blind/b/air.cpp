@@ -37,7 +37,8 @@ Polar::Polar(double lift, double drag) {
     const double alpha = std::atan2(share, 1 - share);
     const double cl = kScale * lift * lift_coefficient(alpha), cd = drag * drag_coefficient(alpha);
     const double sine = std::sin(alpha), cosine = std::cos(alpha);
-    row[static_cast<std::size_t>(i)] = {cl * cosine + cd * sine, cl * sine - cd * cosine, cl, 0.82 * alpha / kPi + 0.05};
+    row[static_cast<std::size_t>(i)] = {cl * cosine + cd * sine, cl * sine - cd * cosine, cl,
+                                        0.82 * alpha / kPi + 0.05};
   }
 }
 

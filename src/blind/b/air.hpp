@@ -56,8 +56,8 @@ struct Polar {
     const int i = x < kCells ? static_cast<int>(x) : kCells - 1;
     const double k = x - i;
     const Row &a = row[static_cast<std::size_t>(i)], &b = row[static_cast<std::size_t>(i) + 1];
-    return {a.normal + k * (b.normal - a.normal), a.chordwise + k * (b.chordwise - a.chordwise), a.lift + k * (b.lift - a.lift),
-            a.centre + k * (b.centre - a.centre)};
+    return {a.normal + k * (b.normal - a.normal), a.chordwise + k * (b.chordwise - a.chordwise),
+            a.lift + k * (b.lift - a.lift), a.centre + k * (b.centre - a.centre)};
   }
 };
 
@@ -73,11 +73,11 @@ class WingAir {
   /// What is instantaneous: velocities through the air in the wing's frame.
   struct Flow {
     Vector3d shoulder_m_s, rate_rad_s;
-    double rotation_rate_rad_s = 0;          ///< of the hinge
-    double wake_rad_s = 0;                   ///< of the air about the stroke axis, where it goes on
+    double rotation_rate_rad_s = 0;                ///< of the hinge
+    double wake_rad_s = 0;                         ///< of the air about the stroke axis, where it goes on
     double twist_rad = 0, bending_rate_rad_s = 0;  ///< at the tip
     double sin_rotation = 0, cos_rotation = 1;
-    double gain = 1;                         ///< by what is near
+    double gain = 1;  ///< by what is near
     std::array<double, 2> lag{};
   };
   struct Load {

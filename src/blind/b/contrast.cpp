@@ -22,18 +22,21 @@ Vector3d at_imu(const Robot& robot, const Felt& felt, const Vector3d& place) {
 
 /// Coefficients of the beats of a robot that is led along the path with these voltages.
 Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim_s, const Path& path,
-             const std::vector<std::array<double, 2>>& voltages) {
+             const std::vector<Beat>& sent) {
   Robot robot(c.figures, c.ailments, c.room, a.seed, flight);
   std::copy(path.pose.front().begin(), path.pose.front().end(), robot.state().begin());
+  Radio radio(a.seed, flight, c.ailments[kCommandDropout], -trim_s);
+  SoftMount mount(c.ailments[kSoftImuMount]);
   Contrast out;
   const double beat_s = 1 / c.figures.flapping_Hz;
   // Beats of the log that are whole, by the driver's phase.
   long beat = std::lround(std::ceil(trim_s / beat_s - 1e-9));
   std::array<double, 30> sum{};
   int count = 0;
-  const std::size_t ticks = std::min(voltages.size(), path.pose.size() / kStepsPerTick);
+  const std::size_t ticks = std::min(sent.size(), path.pose.size() / kStepsPerTick);
   for (std::size_t k = 0; k < ticks; ++k) {
-    robot.drive(voltages[k]);
+    const double begins = static_cast<double>(k) * kTick_s;
+    robot.drive(waveform(c.figures, radio.arrived(sent[k], begins - trim_s), begins));
     for (int step = 0; step < kStepsPerTick; ++step) {
       const std::size_t at = k * kStepsPerTick + static_cast<std::size_t>(step);
       if (at + 1 >= path.acceleration.size()) return out;
@@ -49,12 +52,15 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim
         ++beat;
       }
       robot.led_step(path, at);
-      // Impacts at the stops last for a few steps, so each step counts.
-      if (time < static_cast<double>(beat) * beat_s - 1e-9) continue;
+      // Impacts at the stops last for a few steps, so each step counts. A soft mount takes a tenth of a second to be shaken as it is.
+      const double left = static_cast<double>(beat) * beat_s - 1e-9 - time;
+      if (left > 0.1) continue;
       const Felt felt = robot.felt_now();
-      const Vector3d force = at_imu(robot, felt, c.sensors.imu_place_m);
+      const Vector3d force = mount.shaken(at_imu(robot, felt, c.sensors.imu_place_m));
+      if (left > 0) continue;
       const double phase = 2 * std::numbers::pi * (time + kStep_s) / beat_s;
-      const std::array<double, 5> waves = {1, 2 * std::cos(phase), 2 * std::sin(phase), 2 * std::cos(2 * phase), 2 * std::sin(2 * phase)};
+      const std::array<double, 5> waves = {1, 2 * std::cos(phase), 2 * std::sin(phase), 2 * std::cos(2 * phase),
+                                           2 * std::sin(2 * phase)};
       for (std::size_t channel = 0; channel < 6; ++channel) {
         const auto axis = static_cast<Eigen::Index>(channel % 3);
         const double value = channel < 3 ? force[axis] : felt.acceleration.w[axis];
@@ -69,7 +75,7 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim
 }  // namespace
 
 FamilyFlight fly_programme(const Assignment& a, std::size_t number, const Times& times, Path* path,
-                           std::vector<std::array<double, 2>>* voltages) {
+                           std::vector<Beat>* sent) {
   const Case c = make_case(a);
   const Programme programme(a, number, c.figures, c.room);
   Flight flight(a, c, number, programme.start_m(), programme.start_heading_rad(), times.trim_s);
@@ -87,6 +93,7 @@ FamilyFlight fly_programme(const Assignment& a, std::size_t number, const Times&
                 beat.split_cycle + more.split_cycle};
       }
     }
+    if (sent) sent->push_back(beat);
     out.how = flight.tick(beat);
     if (!out.how.empty()) {
       out.crashed = true;
@@ -95,22 +102,23 @@ FamilyFlight fly_programme(const Assignment& a, std::size_t number, const Times&
     }
   }
   out.log = flight.log(end);
-  if (voltages) *voltages = flight.voltages();
   return out;
 }
 
-Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double size, const Times& times) {
+Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double size,
+                     const Times& times) {
   for (const auto& [id, present] : a.effects)
-    if (id == effect && present != 0) throw io::InputError("effect " + effect + ": the flight was flown with it; accepted: a flight without it");
+    if (id == effect && present != 0)
+      throw io::InputError("effect " + effect + ": the flight was flown with it; accepted: a flight without it");
   Assignment with = a;
   std::erase_if(with.effects, [&](const auto& e) { return e.first == effect; });
   with.effects.emplace_back(effect, size);
   const Case before = make_case(a), after = make_case(with);
   Path path;
-  std::vector<std::array<double, 2>> voltages;
-  fly_programme(a, flight, times, &path, &voltages);
-  const Contrast without = led(a, before, flight, times.trim_s, path, voltages);
-  Contrast out = led(with, after, flight, times.trim_s, path, voltages);
+  std::vector<Beat> sent;
+  fly_programme(a, flight, times, &path, &sent);
+  const Contrast without = led(a, before, flight, times.trim_s, path, sent);
+  Contrast out = led(with, after, flight, times.trim_s, path, sent);
   for (std::size_t i = 0; i < out.change.size(); ++i)
     for (std::size_t n = 0; n < 30; ++n) out.change[i][n] -= without.change[i][n];
   return out;

@@ -70,11 +70,11 @@ struct Ailments {
 
   int damaged_side = 0;
   double wind_direction_rad = 0;
-  Eigen::Vector3d com_m = Eigen::Vector3d::Zero();        ///< of length 1 mm
-  Eigen::Vector3d marker_m = Eigen::Vector3d::Zero();     ///< of length 2 mm
-  Eigen::Vector3d products = Eigen::Vector3d::Zero();     ///< xy, xz, yz: share of the mean moment
-  Eigen::Vector3d misalignment = Eigen::Vector3d::Zero(); ///< rotation vector of length 0.02 rad
-  Eigen::Vector3d gyro_drift = Eigen::Vector3d::Zero();   ///< warm-up, rad/s
+  Eigen::Vector3d com_m = Eigen::Vector3d::Zero();         ///< of length 1 mm
+  Eigen::Vector3d marker_m = Eigen::Vector3d::Zero();      ///< of length 2 mm
+  Eigen::Vector3d products = Eigen::Vector3d::Zero();      ///< xy, xz, yz: share of the mean moment
+  Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< rotation vector of length 0.02 rad
+  Eigen::Vector3d gyro_drift = Eigen::Vector3d::Zero();    ///< warm-up, rad/s
   double mocap_tilt_direction_rad = 0;
   std::array<double, 2> wing_inertia{1, 1};  ///< signs of the change of each side
   double wing_product = 1;

@@ -16,8 +16,8 @@ constexpr double kPi = std::numbers::pi;
 const Vector3d kGoal_m(0, 0, 1);
 
 /// What the policy may ask for: the parts' names in task files, with their numbers. Errors are from the goal, whose heading is 0.
-std::vector<double> observed(const std::vector<std::string>& names, const View& view, double beat_phase, double time, const Beat& trim,
-                             const std::array<double, 4>& added) {
+std::vector<double> observed(const std::vector<std::string>& names, const View& view, double beat_phase, double time,
+                             const Beat& trim, const std::array<double, 4>& added) {
   std::vector<double> out;
   const Matrix3d R = view.attitude.toRotationMatrix();
   const auto vector = [&](const Vector3d& v) { out.insert(out.end(), {v.x(), v.y(), v.z()}); };
@@ -42,8 +42,9 @@ std::vector<double> observed(const std::vector<std::string>& names, const View& 
     } else if (name == "trim") {
       out.insert(out.end(), {trim.amplitude_V, trim.difference_V, trim.bias_V, trim.split_cycle});
     } else {
-      const std::vector<std::string> known = {"rotation_matrix", "goal_rotation", "position_error", "velocity", "body_rate",
-                                              "beat_phase", "heading_error", "previous_action", "time", "trim"};
+      const std::vector<std::string> known = {
+          "rotation_matrix", "goal_rotation", "position_error",  "velocity", "body_rate",
+          "beat_phase",      "heading_error", "previous_action", "time",     "trim"};
       throw io::InputError("observation " + name + ": nothing of this name is seen; accepted: " + io::joined(known) +
                            io::did_you_mean(name, known));
     }
@@ -55,16 +56,19 @@ struct Standing {
   double distance_m, speed_m_s, body_rate_rad_s, tilt_rad, heading_rad;
 };
 
-Standing standing(const Vector3d& position, const Vector3d& velocity, const Vector3d& rate, const Eigen::Quaterniond& attitude) {
+Standing standing(const Vector3d& position, const Vector3d& velocity, const Vector3d& rate,
+                  const Eigen::Quaterniond& attitude) {
   const double up = (attitude * Vector3d::UnitZ()).z();
-  return {(position - kGoal_m).norm(), velocity.norm(), rate.norm(), std::acos(std::clamp(up, -1.0, 1.0)), std::abs(heading_of(attitude))};
+  return {(position - kGoal_m).norm(), velocity.norm(), rate.norm(), std::acos(std::clamp(up, -1.0, 1.0)),
+          std::abs(heading_of(attitude))};
 }
 
 bool within(const Standing& s, const EscapeAssignment::Bounds& b) {
   // A bound that is not set binds nothing.
   const auto held = [](double value, double bound) { return bound <= 0 || value <= bound; };
-  return held(s.distance_m, b.distance_m) && held(s.speed_m_s, b.speed_m_s) && held(s.body_rate_rad_s, b.body_rate_rad_s) &&
-         held(s.tilt_rad, b.tilt_rad) && held(s.heading_rad, b.heading_rad);
+  return held(s.distance_m, b.distance_m) && held(s.speed_m_s, b.speed_m_s) &&
+         held(s.body_rate_rad_s, b.body_rate_rad_s) && held(s.tilt_rad, b.tilt_rad) &&
+         held(s.heading_rad, b.heading_rad);
 }
 
 }  // namespace
@@ -80,7 +84,8 @@ FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAss
   start += kGoal_m;
   const double heading = wrapped(rules.heading_rad + rules.heading_half_rad * random.uniform(-1, 1));
   Flight flown(a, c, flight, start, heading, trim_s);
-  observed(rules.observation, flown.view(), 0, 0, flown.pilot().trim(), {});  // a name that is unknown is refused before the work
+  observed(rules.observation, flown.view(), 0, 0, flown.pilot().trim(),
+           {});  // a name that is unknown is refused before the work
 
   FamilyEscape out;
   Beat beat;
@@ -95,8 +100,9 @@ FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAss
       if (now < -1e-9) {
         beat = flown.pilot().steer(view, {start, Vector3d::Zero(), heading});
       } else {
-        const bool there = rules.hand_back.distance_m > 0 &&
-                           within(standing(view.position_m, view.velocity_m_s, view.rate_rad_s, view.attitude), rules.hand_back);
+        const bool there =
+            rules.hand_back.distance_m > 0 &&
+            within(standing(view.position_m, view.velocity_m_s, view.rate_rad_s, view.attitude), rules.hand_back);
         handed_back = handed_back || there || now >= rules.hand_back_at_s - 1e-9;
         if (handed_back) {
           beat = flown.pilot().steer(view, {kGoal_m, Vector3d::Zero(), 0});
@@ -109,7 +115,8 @@ FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAss
               if (!std::isfinite(u)) u = 0;
             next_action += rules.action_period_s;
           }
-          beat = {trim.amplitude_V + added[0], trim.difference_V + added[1], trim.bias_V + added[2], trim.split_cycle + added[3]};
+          beat = {trim.amplitude_V + added[0], trim.difference_V + added[1], trim.bias_V + added[2],
+                  trim.split_cycle + added[3]};
         }
       }
     }

@@ -20,8 +20,8 @@ Link read_link(const io::Table& t, const std::string& key) {
   link.com_m = read_vector(t, key + ".com_m");
   const std::string inertia = key + ".inertia_kg_m2.";
   const double xy = t.number(inertia + "xy"), yz = t.number(inertia + "yz"), xz = t.number(inertia + "xz");
-  link.inertia_kg_m2 << t.number(inertia + "xx", io::positive(1)), xy, xz, xy, t.number(inertia + "yy", io::positive(1)),
-      yz, xz, yz, t.number(inertia + "zz", io::positive(1));
+  link.inertia_kg_m2 << t.number(inertia + "xx", io::positive(1)), xy, xz, xy,
+      t.number(inertia + "yy", io::positive(1)), yz, xz, yz, t.number(inertia + "zz", io::positive(1));
   return link;
 }
 
@@ -110,9 +110,11 @@ Figures read_figures(const std::filesystem::path& file) {
   f.around_m = t.number("extent.around_m", io::non_negative(10));
   f.torso = read_link(t, "torso");
   f.side = {read_side(t, "left"), read_side(t, "right")};
-  for (const auto& [link, key] :
-       {std::pair{&f.torso, "torso"}, {&f.side[0].edge, "left.leading_edge"}, {&f.side[0].wing, "left.wing"},
-        {&f.side[1].edge, "right.leading_edge"}, {&f.side[1].wing, "right.wing"}})
+  for (const auto& [link, key] : {std::pair{&f.torso, "torso"},
+                                  {&f.side[0].edge, "left.leading_edge"},
+                                  {&f.side[0].wing, "left.wing"},
+                                  {&f.side[1].edge, "right.leading_edge"},
+                                  {&f.side[1].wing, "right.wing"}})
     if (!is_inertia(link->inertia_kg_m2))
       t.table(key).fail("inertia_kg_m2", "no body has this inertia",
                         "positive principal moments, none above the sum of the others");

@@ -20,38 +20,39 @@ Case make_case(const Assignment& a) {
   return c;
 }
 
-Flight::Flight(const Assignment& a, const Case& c, std::uint64_t flight, const Vector3d& start, double heading, double trim_s)
+Flight::Flight(const Assignment& a, const Case& c, std::uint64_t flight, const Vector3d& start, double heading,
+               double trim_s)
     : robot_(c.figures, c.ailments, c.room, a.seed, flight),
       sensors_(a, c.sensors, robot_, flight, trim_s, a.power, a.wings),
       observer_(c.header, start, heading),
       pilot_(c.figures),
-      radio_(a.seed, flight, Stream::kEffect, kCommandDropout),
+      radio_(a.seed, flight, c.ailments[kCommandDropout], -trim_s),
       trim_s_(trim_s) {
   robot_.put(start, heading);
-  radio_fails_s_ = -trim_s + radio_.uniform(0.3, 1);
   log_.header = c.header;
   log_.command.inputs.emplace();
   log_.command.phase_rad.emplace();
 }
 
-/// Packets that are lost leave the wings with the inputs of the last.
-Beat Flight::arrived(const Beat& sent) {
-  const double size = robot_.plant().ailments()[kCommandDropout];
-  if (size == 0) return sent;
-  const double now = time_s();
-  if (now >= radio_fails_s_) {
-    radio_returns_s_ = now + size * radio_.uniform(0.03, 0.09);
-    radio_fails_s_ = radio_returns_s_ + radio_.uniform(0.2, 0.7);
+Radio::Radio(std::uint64_t seed, std::uint64_t flight, double size, double begins_s)
+    : random_(seed, flight, Stream::kEffect, kCommandDropout),
+      size_(size),
+      fails_s_(begins_s + random_.uniform(0.3, 1)) {}
+
+Beat Radio::arrived(const Beat& sent, double now) {
+  if (size_ == 0) return sent;
+  if (now >= fails_s_) {
+    returns_s_ = now + size_ * random_.uniform(0.03, 0.09);
+    fails_s_ = returns_s_ + random_.uniform(0.2, 0.7);
   }
-  if (now >= radio_returns_s_) last_arrived_ = sent;
-  return last_arrived_;
+  if (now >= returns_s_) last_ = sent;
+  return last_;
 }
 
 std::string Flight::tick(const Beat& sent) {
   const double now = time_s();
   const Figures& f = robot_.plant().figures();
   const std::array<double, 2> logged = waveform(f, sent, now + trim_s_);
-  const std::array<double, 2> volts = robot_.plant().ailments().any(kCommandDropout) ? waveform(f, arrived(sent), now + trim_s_) : logged;
   if (now >= -1e-9) {
     flightlog::CommandStream& c = log_.command;
     c.t_s.push_back(std::max(0.0, now));
@@ -64,9 +65,8 @@ std::string Flight::tick(const Beat& sent) {
     const double beats = (now + trim_s_) * f.flapping_Hz;
     c.phase_rad->push_back(2 * std::numbers::pi * (beats - std::floor(beats)));
   }
-  voltages_.push_back(volts);
   sensors_.before_tick(robot_, now);
-  robot_.drive(volts);
+  robot_.drive(waveform(f, radio_.arrived(sent, now), now + trim_s_));
   for (int step = 1; step <= kStepsPerTick; ++step) {
     if (path_) {
       std::array<double, 13> pose;

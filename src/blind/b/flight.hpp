@@ -20,14 +20,26 @@ struct Case {
 };
 Case make_case(const Assignment& a);
 
+/// What the wings get of the inputs that are sent: packets that are lost leave those of the last.
+class Radio {
+ public:
+  Radio(std::uint64_t seed, std::uint64_t flight, double size, double begins_s);
+  Beat arrived(const Beat& sent, double now_s);
+
+ private:
+  Random random_;
+  double size_, returns_s_ = -1e9, fails_s_;
+  Beat last_;
+};
+
 /// A robot with who flies it, tick by tick from -kTrim_s on.
 class Flight {
  public:
-  Flight(const Assignment& a, const Case& c, std::uint64_t flight, const Vector3d& start_m, double heading_rad, double trim_s);
+  Flight(const Assignment& a, const Case& c, std::uint64_t flight, const Vector3d& start_m, double heading_rad,
+         double trim_s);
 
   /// Flies one tick with these inputs of the pilot, held between its periods. Empty, or how it crashed.
   std::string tick(const Beat& beat);
-  /// What the wings get: those just steered, or the last that arrived.
   double time_s() const { return static_cast<double>(ticks_) * kTick_s - trim_s_; }
   long ticks() const { return ticks_; }
   bool steers_now() const { return ticks_ % 2 == 0; }
@@ -37,23 +49,17 @@ class Flight {
   /// Records the torso's path.
   void record(Path* path) { path_ = path; }
   flightlog::FlightLog log(double end_s) const;
-  /// Voltages of all ticks.
-  const std::vector<std::array<double, 2>>& voltages() const { return voltages_; }
 
  private:
-  Beat arrived(const Beat& sent);
-
   Robot robot_;
   Sensors sensors_;
   Observer observer_;
   Pilot pilot_;
-  Random radio_;
-  double trim_s_, radio_returns_s_ = -1e9, radio_fails_s_;
-  Beat last_arrived_;
+  Radio radio_;
+  double trim_s_;
   long ticks_ = 0;
   Path* path_ = nullptr;
   flightlog::FlightLog log_;
-  std::vector<std::array<double, 2>> voltages_;
 };
 
 }  // namespace flappy::blind::b

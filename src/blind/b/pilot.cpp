@@ -140,7 +140,9 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const Figures& f
     return;
   }
   const double ceiling = room.ceiling_z_m - f.above_m, wall = room.wall_y_m - f.around_m;
-  at = flight == 0 ? about(0, 0, 0.35, 0.1) : flight == 1 ? about(0, -0.2, ceiling - 0.4, 0.1) : about(-0.4, wall - 0.4, 0.9, 0.1);
+  at = flight == 0   ? about(0, 0, 0.35, 0.1)
+       : flight == 1 ? about(0, -0.2, ceiling - 0.4, 0.1)
+                     : about(-0.4, wall - 0.4, 0.9, 0.1);
   legs_.push_back({-1e3, 1, at, heading});
   now = 0.3;
   const double turn = random.sign() * random.uniform(0.8, 1.6);
@@ -165,7 +167,8 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const Figures& f
     go(about(at.x() + 0.9, at.y() - 0.4, 1.2, 0.1), speed, -turn, 0.2);
   }
   while (now < 10.5) {
-    const Vector3d next = about(-0.4 * at.x(), flight == 2 ? -0.3 : 0.0, std::clamp(at.z() + random.uniform(-0.3, 0.3), 0.4, 1.5), 0.3);
+    const Vector3d next =
+        about(-0.4 * at.x(), flight == 2 ? -0.3 : 0.0, std::clamp(at.z() + random.uniform(-0.3, 0.3), 0.4, 1.5), 0.3);
     go(next, speed, random.uniform(-1, 1), 0.2);
   }
   const std::array<double, 4> share = {0.35, 0.16, 0.2, 0.012};
@@ -199,7 +202,8 @@ Beat Programme::excitation(double time) const {
   std::array<double, 4> u{};
   const double fade = std::clamp(time, 0.0, 1.0);
   for (std::size_t i = 0; i < 4; ++i)
-    for (const Tone& t : tones_[i]) u[i] += fade * t.amplitude * std::sin(2 * kPi * t.frequency_hz * time + t.phase_rad);
+    for (const Tone& t : tones_[i])
+      u[i] += fade * t.amplitude * std::sin(2 * kPi * t.frequency_hz * time + t.phase_rad);
   for (const Pulse& p : pulses_)
     if (time >= p.at_s && time < p.at_s + p.lasts_s) u[p.input] += p.size;
   return {u[0], u[1], u[2], u[3]};

@@ -7,21 +7,15 @@
 namespace flappy::blind::b {
 namespace {
 
-constexpr double kFrictionOver_rad_s = 6;     // of stroke, within which dry friction sets in
-constexpr double kGearLossOver_rad_s = 10;
-constexpr double kRotationStop = 2.0, kStrokeStop = 8.0;  // Nm/rad^1.5
-constexpr double kStopLoss = 1e-2;            // s/rad; with a third of it wings bounce off their stops another way each beat
-constexpr double kScrewMass_kg = 0.15e-3, kScrewGap_m = 0.6e-3;
-
-double smooth_sign(double x, double over) { return std::tanh(x / over); }
+constexpr double kScrewMass_kg = 0.3e-3, kScrewGap_m = 0.6e-3;
 
 double decay(double distance, double length) { return std::exp(-std::max(distance, 0.0) / length); }
 
 }  // namespace
 
 struct Plant::SideNow {
-  Matrix3d edge, wing;   // frames in B
-  double sine, cosine;   // of the rotation
+  Matrix3d edge, wing;  // frames in B
+  double sine, cosine;  // of the rotation
   Twist s1, s2;
   Inertia edge_inertia, wing_inertia;
   Eigen::Matrix<double, 6, 3> added_twist;  // (w_y, w_z, v_x of the shoulder) of the wing, from its twist
@@ -49,8 +43,8 @@ Plant::Plant(Figures figures, const Ailments& ailments)
     Link& wing = f_.side[j].wing;
     const double change = 0.1 * a_[kWingInertia] * a_.wing_inertia[j];
     wing.com_m.z() *= 1 + change;
-    const double product = change * a_.wing_product * std::sqrt(wing.inertia_kg_m2(1, 1) * wing.inertia_kg_m2(2, 2)) *
-                           (j == 0 ? 1 : -1);
+    const double product =
+        change * a_.wing_product * std::sqrt(wing.inertia_kg_m2(1, 1) * wing.inertia_kg_m2(2, 2)) * (j == 0 ? 1 : -1);
     wing.inertia_kg_m2(1, 2) += product;
     wing.inertia_kg_m2(2, 1) += product;
     spread_rad_[j] = a_.any(kSpringHardening) ? 1 / std::sqrt(0.6 * a_[kSpringHardening]) : 0;
@@ -64,12 +58,6 @@ Slow Plant::fresh() const {
     slow.torque_constant_Nm_A[j] = f_.side[j].motor.torque_constant_Nm_A;
   }
   return slow;
-}
-
-double Plant::ratio(const State& x, std::size_t side) const {
-  const double n = f_.side[side].motor.gear_ratio;
-  if (!a_.any(kGearEccentricity)) return n;
-  return n * (1 + 0.04 * a_[kGearEccentricity] * std::sin(1.5 * x[kStroke + side] + a_.gear_phase_rad[side]));
 }
 
 void Plant::place(const State& x, std::size_t j, SideNow& now) const {
@@ -96,75 +84,6 @@ void Plant::place(const State& x, std::size_t j, SideNow& now) const {
   }
 }
 
-double Plant::hinge_torque(const Hinge& h, double angle, double rate, double stiffness, double loss, double shift) const {
-  double torque = 0;
-  const double above = angle - h.upper_rad - shift, below = h.lower_rad + shift - angle;
-  if (above > 0) torque -= stiffness * above * std::sqrt(above) * std::max(0.0, 1 + 1.5 * loss * rate);
-  if (below > 0) torque += stiffness * below * std::sqrt(below) * std::max(0.0, 1 - 1.5 * loss * rate);
-  if (has_friction) torque -= h.damping_Nm_s * rate + h.friction_Nm * smooth_sign(rate, kFrictionOver_rad_s);
-  return torque;
-}
-
-double Plant::spring_torque(std::size_t j, double stroke, double stiffness) const {
-  const Side& s = f_.side[j];
-  const double d = stroke - s.rest_angle_rad;
-  const double k = stiffness * (d > 0 ? s.stiffness_positive_Nm_rad : s.stiffness_negative_Nm_rad);
-  // Stiffening as the hyperbolic sine: d + d^3 / (6 spread^2) + ...
-  if (spread_rad_[j] != 0) return -k * spread_rad_[j] * std::sinh(d / spread_rad_[j]);
-  return -k * d;
-}
-
-double Plant::spring_energy(std::size_t j, double stroke) const {
-  const Side& s = f_.side[j];
-  const double d = stroke - s.rest_angle_rad, w = spread_rad_[j];
-  const double k = d > 0 ? s.stiffness_positive_Nm_rad : s.stiffness_negative_Nm_rad;
-  return w != 0 ? k * w * w * (std::cosh(d / w) - 1) : k * d * d / 2;
-}
-
-double Plant::stroke_torque(const State& x, std::size_t j, double i, const Slow& slow, State& rate) const {
-  const Side& s = f_.side[j];
-  const double n = ratio(x, j), stroke = x[kStroke + j], stroke_rate = x[kStrokeRate + j];
-  const bool play = a_.any(kGearBacklash);
-  const double turning = play ? x[kRotorRate + j] : stroke_rate;  // of the rotor, over the ratio
-  double torque_constant = slow.torque_constant_Nm_A[j];
-  if (a_.any(kMagnetSaturation)) torque_constant /= 1 + 0.05 * a_[kMagnetSaturation] * (i / 0.5) * (i / 0.5);
-  double motor = n * torque_constant * i;
-  if (has_friction) {
-    motor -= (1 - s.motor.efficiency) * std::abs(motor) * smooth_sign(turning, kGearLossOver_rad_s);
-    motor -= n * s.motor.friction_Nm * smooth_sign(turning, kFrictionOver_rad_s) + s.motor.damping_Nm_s * n * n * turning;
-  }
-  if (a_.any(kCoulombFriction)) {
-    // Bristles of Canudas de Wit, Olsson, Astrom, Lischinsky (1995), that bend far enough for the step; their strength falls from
-    // 1.4 to 1 of the motor's friction as the speed passes that of Stribeck.
-    constexpr double kReach_rad = 1.5 * std::numbers::pi / 180, kStribeck_rad_s = 30;
-    const double v = turning / kStribeck_rad_s;
-    const double strength = 1 + 0.4 * std::exp(-v * v);
-    const double z = x[kBristle + j];
-    rate[kBristle + j] = turning / kReach_rad - std::abs(turning) / kReach_rad * z / strength;
-    motor -= a_[kCoulombFriction] * n * s.motor.friction_Nm * z;
-  }
-  if (a_.any(kMotorCogging))
-    motor -= 0.5 * a_[kMotorCogging] * n * s.motor.friction_Nm *
-             std::sin(6 * n * (play ? x[kRotor + j] : stroke) + a_.cogging_phase_rad[j]);
-  double torque = motor;
-  if (play) {
-    // Nordin, Galic, Gutman (1997): an elastic shaft with damping behind a gap transmits no pull.
-    constexpr double kShaft_Nm_rad = 0.5, kShaftDamping_Nm_s = 6e-5;
-    const double gap = 0.5 * std::numbers::pi / 180 * a_[kGearBacklash];
-    const double apart = x[kRotor + j] - stroke, closing = turning - stroke_rate;
-    double contact = 0;
-    if (apart > gap) contact = std::max(0.0, kShaft_Nm_rad * (apart - gap) + kShaftDamping_Nm_s * closing);
-    if (apart < -gap) contact = std::min(0.0, kShaft_Nm_rad * (apart + gap) + kShaftDamping_Nm_s * closing);
-    rate[kRotor + j] = turning;
-    rate[kRotorRate + j] = (motor - contact) / (n * n * s.motor.rotor_inertia_kg_m2);
-    torque = contact;
-  }
-  torque += spring_torque(j, stroke, slow.stiffness[j]);
-  if (slow.extra_damping != 0) torque -= slow.extra_damping * 2 * std::sqrt(s.stiffness_positive_Nm_rad * 2.7e-7) * stroke_rate;
-  torque += hinge_torque(s.stroke, stroke, stroke_rate, kStrokeStop, kStopLoss, 0);
-  return torque;
-}
-
 double Plant::near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const Surroundings& room) const {
   double gain = 1;
   const double height = 0.5 * (shoulder_W.z() + tip_W.z());
@@ -183,8 +102,10 @@ Wrench Plant::on_torso(const State& x, const Matrix3d& R, const Slow& slow, cons
   if (a_.any(kBodyDrag) && has_air) {
     // Cross-flow: each axis has its own area and its own component of velocity.
     const Vector3d centre(0, 0, -3e-3), area(1.6e-3, 1.3e-3, 1.0e-3);
-    const Vector3d v = Vector3d(x[kVelocity], x[kVelocity + 1], x[kVelocity + 2]) + w.cross(centre) - R.transpose() * slow.wind_m_s;
-    sum = sum + at_point(centre, -0.5 * f_.density_kg_m3 * a_[kBodyDrag] * area.cwiseProduct(v.cwiseAbs().cwiseProduct(v)));
+    const Vector3d v =
+        Vector3d(x[kVelocity], x[kVelocity + 1], x[kVelocity + 2]) + w.cross(centre) - R.transpose() * slow.wind_m_s;
+    sum = sum +
+          at_point(centre, -0.5 * f_.density_kg_m3 * a_[kBodyDrag] * area.cwiseProduct(v.cwiseAbs().cwiseProduct(v)));
   }
   if (a_.any(kWallEffect) && has_air) {
     // The image of the wings' downwash draws the robot to the wall, at the stroke plane.
@@ -198,7 +119,8 @@ Wrench Plant::on_torso(const State& x, const Matrix3d& R, const Slow& slow, cons
     const double weight = 0.2e-3 * a_[kTether] * room.gravity_m_s2;
     const double height = std::max(position.z() - room.ground_z_m, 0.0);
     const Vector3d to_foot(a_.tether_foot_m.x() - position.x(), a_.tether_foot_m.y() - position.y(), 0);
-    const Vector3d pull = weight * (to_foot.norm() * 3 / 8 / (height + 0.3) * to_foot - (height + 0.15) * Vector3d::UnitZ());
+    const Vector3d pull =
+        weight * (to_foot.norm() * 3 / 8 / (height + 0.3) * to_foot - (height + 0.15) * Vector3d::UnitZ());
     sum = sum + at_point(Vector3d(0, 0, -0.02), R.transpose() * pull);
   }
   return sum;
@@ -310,8 +232,10 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
       if (a_.any(kWingFlexibility)) {
         // Twist along the span that is linear (Guan, Yu, Appl. Math. Mech. 35 (2014)), as much as the torque on the hinge.
         constexpr double kFollows_s = 0.8e-3, kHover_Nm = 4e-4;
-        rate[kTwist + j] = (8 * std::numbers::pi / 180 * a_[kWingFlexibility] *
-                                std::clamp(on.torque_Nm.y() / kHover_Nm, -3.0, 3.0) - x[kTwist + j]) / kFollows_s;
+        rate[kTwist + j] =
+            (8 * std::numbers::pi / 180 * a_[kWingFlexibility] * std::clamp(on.torque_Nm.y() / kHover_Nm, -3.0, 3.0) -
+             x[kTwist + j]) /
+            kFollows_s;
       }
       const Vector3d force = now.wing * on.force_N;
       const Wrench air_load{now.wing * on.torque_Nm + s.shoulder_m.cross(force), force};
@@ -324,7 +248,8 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
     const double n = ratio(x, j), sign = j == 0 ? 1 : -1;
     stroke_load += stroke_torque(x, j, current[j], slow, rate);
     const double softer = 1 / (1 + 4 * a_[kStopCompliance]);
-    rotation_load += hinge_torque(s.rotation, x[kRotation + j], theta_rate, kRotationStop * softer, kStopLoss, slow.stop_shift_rad[j]);
+    rotation_load += hinge_torque(s.rotation, x[kRotation + j], theta_rate, kRotationStop * softer, kStopLoss,
+                                  slow.stop_shift_rad[j]);
 
     // The rotor's momentum along the stroke axis, against the wing's.
     const double turning = play ? x[kRotorRate + j] : psi_rate;
@@ -401,7 +326,8 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
 }
 
 double Plant::energy_J(const State& x, const Surroundings& room) const {
-  const Twist torso{Vector3d(x[kRate], x[kRate + 1], x[kRate + 2]), Vector3d(x[kVelocity], x[kVelocity + 1], x[kVelocity + 2])};
+  const Twist torso{Vector3d(x[kRate], x[kRate + 1], x[kRate + 2]),
+                    Vector3d(x[kVelocity], x[kVelocity + 1], x[kVelocity + 2])};
   double energy = 0.5 * dot(torso, torso_ * torso);
   Inertia whole = torso_;
   for (std::size_t j = 0; j < 2; ++j) {
@@ -420,7 +346,8 @@ double Plant::energy_J(const State& x, const Surroundings& room) const {
 }
 
 Wrench Plant::momentum_W(const State& x) const {
-  const Twist torso{Vector3d(x[kRate], x[kRate + 1], x[kRate + 2]), Vector3d(x[kVelocity], x[kVelocity + 1], x[kVelocity + 2])};
+  const Twist torso{Vector3d(x[kRate], x[kRate + 1], x[kRate + 2]),
+                    Vector3d(x[kVelocity], x[kVelocity + 1], x[kVelocity + 2])};
   Wrench sum = torso_ * torso;
   for (std::size_t j = 0; j < 2; ++j) {
     SideNow now;

@@ -24,6 +24,7 @@
 
 #include <Eigen/Dense>
 #include <array>
+#include <cmath>
 
 #include "blind/b/air.hpp"
 #include "blind/b/effects.hpp"
@@ -33,20 +34,26 @@
 namespace flappy::blind::b {
 
 inline constexpr double kInductance_H = 0.2e-3;
+inline constexpr double kFrictionOver_rad_s = 6;                 ///< of a hinge, within which dry friction sets in
+inline constexpr double kRotationStop = 2.0, kStrokeStop = 8.0;  ///< Nm/rad^1.5
+/// s/rad: e = 1 - c d'. With a third of it wings bounce off their stops another way each beat.
+inline constexpr double kStopLoss = 1e-2;
+
+inline double smooth_sign(double x, double over) { return std::tanh(x / over); }
 
 /// Where the quantities stand in a state.
 enum Place : std::size_t {
-  kPosition = 0,       // of the torso's origin in W
-  kQuaternion = 3,     // w, x, y, z
-  kRate = 7,           // of the torso in B
-  kVelocity = 10,      // of its origin in B
-  kStroke = 13,        // left, right; as all that follow
+  kPosition = 0,    // of the torso's origin in W
+  kQuaternion = 3,  // w, x, y, z
+  kRate = 7,        // of the torso in B
+  kVelocity = 10,   // of its origin in B
+  kStroke = 13,     // left, right; as all that follow
   kRotation = 15,
   kStrokeRate = 17,
   kRotationRate = 19,
-  kRotor = 21,         // rotor over gear ratio, where it has play
+  kRotor = 21,  // rotor over gear ratio, where it has play
   kRotorRate = 23,
-  kLag = 25,           // two of each side
+  kLag = 25,  // two of each side
   kWake = 29,
   kTwist = 31,
   kBending = 33,
@@ -77,9 +84,10 @@ struct Prescribed {
 
 /// What comes with the rates.
 struct Felt {
-  Twist acceleration;     ///< of the torso, against free fall: w is the turning acceleration, v that of the origin less w x v
-  Wrench support;         ///< that a prescribed motion takes, about the torso's origin in B
-  double kinetic_J = 0;   ///< filled by energy() alone
+  Twist
+      acceleration;  ///< of the torso, against free fall: w is the turning acceleration, v that of the origin less w x v
+  Wrench support;    ///< that a prescribed motion takes, about the torso's origin in B
+  double kinetic_J = 0;  ///< filled by energy() alone
 };
 
 class Plant {
@@ -107,7 +115,8 @@ class Plant {
  private:
   struct SideNow;
   void place(const State& x, std::size_t side, SideNow& now) const;
-  double hinge_torque(const Hinge& hinge, double angle, double rate, double stiffness, double restitution, double shift) const;
+  double hinge_torque(const Hinge& hinge, double angle, double rate, double stiffness, double restitution,
+                      double shift) const;
   double stroke_torque(const State& x, std::size_t side, double current_A, const Slow& slow, State& rate) const;
   double spring_torque(std::size_t side, double stroke_rad, double stiffness) const;
   double spring_energy(std::size_t side, double stroke_rad) const;

@@ -23,8 +23,12 @@ std::array<double, 2> waveform(const Figures& f, const Beat& b, double time_s) {
   return volts;
 }
 
-Robot::Robot(Figures figures, const Ailments& ailments, const Surroundings& room, std::uint64_t seed, std::uint64_t flight)
-    : plant_(std::move(figures), ailments), room_(room), gusts_(seed, flight, Stream::kEffect, kWind), slow_(plant_.fresh()) {
+Robot::Robot(Figures figures, const Ailments& ailments, const Surroundings& room, std::uint64_t seed,
+             std::uint64_t flight)
+    : plant_(std::move(figures), ailments),
+      room_(room),
+      gusts_(seed, flight, Stream::kEffect, kWind),
+      slow_(plant_.fresh()) {
   felt_.acceleration = {Vector3d::Zero(), Vector3d::Zero()};
   felt_.support = {Vector3d::Zero(), Vector3d::Zero()};
 }
@@ -56,7 +60,8 @@ void Robot::advance_slow() {
       winding_K_[j] += (heat_J_[j] - inside * kTick_s) / kWinding_J_K;
       housing_K_[j] += (inside - housing_K_[j] / kOutside_K_W) * kTick_s / kHousing_J_K;
       slow_.resistance_ohm[j] = f.side[j].motor.resistance_ohm * (1 + 0.00393 * a[kWindingHeating] * winding_K_[j]);
-      slow_.torque_constant_Nm_A[j] = f.side[j].motor.torque_constant_Nm_A * (1 - 0.002 * a[kWindingHeating] * housing_K_[j]);
+      slow_.torque_constant_Nm_A[j] =
+          f.side[j].motor.torque_constant_Nm_A * (1 - 0.002 * a[kWindingHeating] * housing_K_[j]);
       heat_J_[j] = 0;
     }
   }
@@ -74,7 +79,8 @@ void Robot::advance_slow() {
     constexpr double kGust_m_s = 0.06, kStays_s = 0.8;
     const double keep = std::exp(-kTick_s / kStays_s);
     for (double& g : gust_) g = keep * g + kGust_m_s * std::sqrt(1 - keep * keep) * gusts_.normal();
-    slow_.wind_m_s = a[kWind] * (0.3 * Vector3d(std::cos(a.wind_direction_rad), std::sin(a.wind_direction_rad), 0) + gust_);
+    slow_.wind_m_s =
+        a[kWind] * (0.3 * Vector3d(std::cos(a.wind_direction_rad), std::sin(a.wind_direction_rad), 0) + gust_);
   }
   for (std::size_t j = 0; j < 2; ++j) {
     if (a.any(kHingeCreep))
@@ -90,8 +96,10 @@ void Robot::set_voltages(double h) {
   if (a.any(kCommandDelay)) {
     // It arrives late by a time that is another by up to a quarter of a millisecond from beat to beat.
     const double beat = std::floor(static_cast<double>(tick_) * kTick_s * plant_.figures().flapping_Hz);
-    const double late = a[kCommandDelay] * (0.3 / plant_.figures().flapping_Hz + 0.25e-3 * (std::fmod(beat, 2) < 1 ? 1 : -1));
-    const double now = static_cast<double>(history_.size() - 1) + static_cast<double>(steps_) / kStepsPerTick - late / kTick_s;
+    const double late =
+        a[kCommandDelay] * (0.3 / plant_.figures().flapping_Hz + 0.25e-3 * (std::fmod(beat, 2) < 1 ? 1 : -1));
+    const double now =
+        static_cast<double>(history_.size() - 1) + static_cast<double>(steps_) / kStepsPerTick - late / kTick_s;
     volts = now < 0 ? std::array<double, 2>{} : history_[static_cast<std::size_t>(now)];
   }
   for (std::size_t j = 0; j < 2; ++j) {
@@ -120,7 +128,8 @@ std::array<double, 2> Robot::back(const State& x) const {
   return {plant_.ratio(x, 0) * x[at], plant_.ratio(x, 1) * x[at + 1]};
 }
 
-std::array<double, 2> Robot::currents(double h, const std::array<double, 2>& from, const std::array<double, 2>& to) const {
+std::array<double, 2> Robot::currents(double h, const std::array<double, 2>& from,
+                                      const std::array<double, 2>& to) const {
   std::array<double, 2> out{};
   for (std::size_t j = 0; j < 2; ++j) {
     const double r = slow_.resistance_ohm[j], tau = kInductance_H / r;

@@ -61,7 +61,9 @@ class Robot {
   const Felt& felt() const { return felt_; }
   Vector3d position() const { return {x_[0], x_[1], x_[2]}; }
   Vector3d rate() const { return {x_[kRate], x_[kRate + 1], x_[kRate + 2]}; }
-  Vector3d velocity_W() const { return rotation_matrix(x_) * Vector3d(x_[kVelocity], x_[kVelocity + 1], x_[kVelocity + 2]); }
+  Vector3d velocity_W() const {
+    return rotation_matrix(x_) * Vector3d(x_[kVelocity], x_[kVelocity + 1], x_[kVelocity + 2]);
+  }
   /// Of the source, over nominal.
   double supply() const { return supply_; }
   /// Voltage at a motor during the last step.

@@ -24,6 +24,19 @@ Matrix3d turned(const Vector3d& rotation) {
 
 }  // namespace
 
+SoftMount::SoftMount(double size)
+    : frequency_rad_s_(size > 0 ? std::min(kTurn * 90 / std::sqrt(size), 0.8 / kStep_s) : 0) {}
+
+Vector3d SoftMount::shaken(const Vector3d& by) {
+  if (frequency_rad_s_ == 0) return by;
+  if (!begun_) now_ = by;
+  begun_ = true;
+  // a fifth of critical damping
+  rate_ += kStep_s * frequency_rad_s_ * (frequency_rad_s_ * (by - now_) - 0.4 * rate_);
+  now_ += kStep_s * rate_;
+  return now_;
+}
+
 SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlog::FlightHeader& header) {
   SensorTruth t;
   Random random(a.seed, 0, Stream::kSensors);
@@ -43,11 +56,14 @@ SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlo
   t.wings_noise_rad = random.uniform(0.5e-3, 2e-3);
 
   const double wings_noise = std::hypot(t.wings_noise_rad, kWingStep_rad / std::sqrt(12.0));
-  header.imu = {t.imu_rate_hz, t.imu_late_s, t.bandwidth_hz,
-                {t.imu_place_m.x(), t.imu_place_m.y(), t.imu_place_m.z()},
-                t.gyro_noise_rad_s, {0.02, 0.03, 0.015}, t.accel_noise_m_s2};
+  header.imu = {t.imu_rate_hz,      t.imu_late_s,
+                t.bandwidth_hz,     {t.imu_place_m.x(), t.imu_place_m.y(), t.imu_place_m.z()},
+                t.gyro_noise_rad_s, {0.02, 0.03, 0.015},
+                t.accel_noise_m_s2};
   header.mocap = {t.mocap_rate_hz, t.mocap_late_s, t.position_noise_m, t.attitude_noise_rad};
-  if (a.power) header.power = flightlog::PowerHeader{battery_nominal_V, t.power_rate_hz, t.power_late_s, t.voltage_noise_V, t.current_noise_A};
+  if (a.power)
+    header.power = flightlog::PowerHeader{battery_nominal_V, t.power_rate_hz, t.power_late_s, t.voltage_noise_V,
+                                          t.current_noise_A};
   if (a.wings) header.wings = flightlog::WingsHeader{t.wings_rate_hz, wings_noise};
 
   // Each draw is made in any case, so that one convention does not change the others.
@@ -90,8 +106,8 @@ SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlo
   return t;
 }
 
-Sensors::Sensors(const Assignment& a, const SensorTruth& truth, const Robot& robot, std::uint64_t flight, double trim_s, bool power,
-                 bool wings)
+Sensors::Sensors(const Assignment& a, const SensorTruth& truth, const Robot& robot, std::uint64_t flight, double trim_s,
+                 bool power, bool wings)
     : truth_(truth),
       ailments_(robot.plant().ailments()),
       trim_s_(trim_s),
@@ -102,6 +118,8 @@ Sensors::Sensors(const Assignment& a, const SensorTruth& truth, const Robot& rob
       power_random_(a.seed, flight, Stream::kPower),
       wings_random_(a.seed, flight, Stream::kWings),
       drift_random_(a.seed, flight, Stream::kEffect, kGyroBias),
+      gyro_mount_(ailments_[kSoftImuMount]),
+      accel_mount_(ailments_[kSoftImuMount]),
       nominal_V_(robot.plant().figures().side[0].motor.voltage_limit_V) {
   gyro_bias_ = normals(imu_random_).cwiseProduct(Vector3d(0.02, 0.03, 0.015));
   accel_bias_ = 0.02 * normals(imu_random_);
@@ -125,19 +143,12 @@ void Sensors::imu_step(const Robot& robot, double time) {
   Vector3d gyro = truth_.imu_turn * w, accel = truth_.imu_turn * force;
   if (ailments_.any(kAccelerometerMisalignment)) accel = accel_turn_ * accel;
   if (!settled_) {
-    gyro_ = mount_gyro_ = gyro;
-    accel_ = mount_accel_ = accel;
+    gyro_ = gyro;
+    accel_ = accel;
     settled_ = true;
   }
-  if (ailments_.any(kSoftImuMount)) {
-    const double w0 = std::min(kTurn * 90 / std::sqrt(ailments_[kSoftImuMount]), 0.8 / kStep_s);
-    mount_gyro_rate_ += kStep_s * (w0 * w0 * (gyro - mount_gyro_) - 0.4 * w0 * mount_gyro_rate_);
-    mount_accel_rate_ += kStep_s * (w0 * w0 * (accel - mount_accel_) - 0.4 * w0 * mount_accel_rate_);
-    mount_gyro_ += kStep_s * mount_gyro_rate_;
-    mount_accel_ += kStep_s * mount_accel_rate_;
-    gyro = mount_gyro_;
-    accel = mount_accel_;
-  }
+  gyro = gyro_mount_.shaken(gyro);
+  accel = accel_mount_.shaken(accel);
   // A proof mass that is not quite even rectifies what shakes it, before any filter (Ang, Khosla, Riviere, IEEE Sensors J. 7 (2007)).
   if (ailments_.any(kVibrationRectification))
     accel += 1e-3 * ailments_[kVibrationRectification] * accel.cwiseProduct(accel);
@@ -164,7 +175,8 @@ void Sensors::imu_step(const Robot& robot, double time) {
       imu_sample(next_imu_s_ + imu_jitter_s_, held_[0], held_[1]);
     } else {
       const double k = std::clamp((time - next_imu_s_ - imu_jitter_s_) / kStep_s, 0.0, 1.0);
-      imu_sample(next_imu_s_ + imu_jitter_s_, gyro_ + k * (gyro_before_ - gyro_), accel_ + k * (accel_before_ - accel_));
+      imu_sample(next_imu_s_ + imu_jitter_s_, gyro_ + k * (gyro_before_ - gyro_),
+                 accel_ + k * (accel_before_ - accel_));
     }
     next_imu_s_ += 1 / truth_.imu_rate_hz;
     imu_jitter_s_ = 20e-6 * imu_random_.normal_within_three();
@@ -231,7 +243,8 @@ void Sensors::power_sample(const Robot& robot, double time) {
     return in_steps(robot.current_A()[j] + truth_.current_noise_A * power_random_.normal(), kCurrentStep_A);
   };
   power_samples_.t_s.push_back(time + truth_.power_late_s);
-  power_samples_.battery_V.push_back(in_steps(nominal_V_ * robot.supply() + truth_.voltage_noise_V * power_random_.normal(), kVoltageStep_V));
+  power_samples_.battery_V.push_back(
+      in_steps(nominal_V_ * robot.supply() + truth_.voltage_noise_V * power_random_.normal(), kVoltageStep_V));
   power_samples_.left_current_A.push_back(current(0));
   power_samples_.right_current_A.push_back(current(1));
 }
@@ -253,7 +266,9 @@ void Sensors::after_step(const Robot& robot, double time, int step) {
   if (wings_ && time >= next_wings_s_) {
     next_wings_s_ += 1 / truth_.wings_rate_hz;
     const State& x = robot.state();
-    const auto angle = [&](double a) { return in_steps(a + truth_.wings_noise_rad * wings_random_.normal(), kWingStep_rad); };
+    const auto angle = [&](double a) {
+      return in_steps(a + truth_.wings_noise_rad * wings_random_.normal(), kWingStep_rad);
+    };
     wings_samples_.t_s.push_back(time);
     wings_samples_.left_stroke_rad.push_back(angle(x[kStroke]));
     wings_samples_.left_rotation_rad.push_back(angle(x[kRotation]));
@@ -306,13 +321,14 @@ void Sensors::write(double end, flightlog::FlightLog& log) const {
   if (power_) {
     const flightlog::PowerStream& p = power_samples_;
     const double clock = truth_.power_clock;
-    log.power = flightlog::PowerStream{kept(p.t_s, clock, p.t_s), kept(p.t_s, clock, p.battery_V), kept(p.t_s, clock, p.left_current_A),
-                                       kept(p.t_s, clock, p.right_current_A)};
+    log.power = flightlog::PowerStream{kept(p.t_s, clock, p.t_s), kept(p.t_s, clock, p.battery_V),
+                                       kept(p.t_s, clock, p.left_current_A), kept(p.t_s, clock, p.right_current_A)};
   }
   if (wings_) {
     const flightlog::WingsStream& w = wings_samples_;
-    log.wings = flightlog::WingsStream{kept(w.t_s, 1, w.t_s), kept(w.t_s, 1, w.left_stroke_rad), kept(w.t_s, 1, w.left_rotation_rad),
-                                       kept(w.t_s, 1, w.right_stroke_rad), kept(w.t_s, 1, w.right_rotation_rad)};
+    log.wings = flightlog::WingsStream{kept(w.t_s, 1, w.t_s), kept(w.t_s, 1, w.left_stroke_rad),
+                                       kept(w.t_s, 1, w.left_rotation_rad), kept(w.t_s, 1, w.right_stroke_rad),
+                                       kept(w.t_s, 1, w.right_rotation_rad)};
   }
 }
 

@@ -19,6 +19,18 @@ namespace flappy::blind::b {
 
 enum class Sample { kInstant, kMean, kHeld };
 
+/// A mount that gives way: what sits on it follows as an oscillator of 90 Hz, softer the larger its size; stiff at size 0.
+class SoftMount {
+ public:
+  explicit SoftMount(double size);
+  Vector3d shaken(const Vector3d& by);
+
+ private:
+  double frequency_rad_s_;
+  bool begun_ = false;
+  Vector3d now_ = Vector3d::Zero(), rate_ = Vector3d::Zero();
+};
+
 /// How it is in truth.
 struct SensorTruth {
   Sample sample = Sample::kInstant;
@@ -49,7 +61,8 @@ struct MocapSample {
 /// Of one flight, which has been going on for `trim_s` where the log begins.
 class Sensors {
  public:
-  Sensors(const Assignment& a, const SensorTruth& truth, const Robot& robot, std::uint64_t flight, double trim_s, bool power, bool wings);
+  Sensors(const Assignment& a, const SensorTruth& truth, const Robot& robot, std::uint64_t flight, double trim_s,
+          bool power, bool wings);
 
   /// After each step of the robot. `time_s` is that of the step's end, `step` its number within the tick, from 1 on.
   void after_step(const Robot& robot, double time_s, int step);
@@ -77,9 +90,9 @@ class Sensors {
   // IMU
   Vector3d gyro_bias_, accel_bias_, warming_, wandering_ = Vector3d::Zero();
   Matrix3d accel_turn_;
-  Vector3d gyro_ = Vector3d::Zero(), accel_ = Vector3d::Zero(), gyro_before_ = Vector3d::Zero(), accel_before_ = Vector3d::Zero();
-  Vector3d mount_gyro_ = Vector3d::Zero(), mount_accel_ = Vector3d::Zero(), mount_gyro_rate_ = Vector3d::Zero(),
-           mount_accel_rate_ = Vector3d::Zero();
+  Vector3d gyro_ = Vector3d::Zero(), accel_ = Vector3d::Zero(), gyro_before_ = Vector3d::Zero(),
+           accel_before_ = Vector3d::Zero();
+  SoftMount gyro_mount_, accel_mount_;
   bool settled_ = false;
   std::deque<std::array<Vector3d, 2>> window_;
   std::array<Vector3d, 2> held_{Vector3d::Zero(), Vector3d::Zero()};

@@ -42,7 +42,8 @@ struct Inertia {
 };
 
 /// Of a body whose frame stands at `place`, turned by `turn`.
-inline Inertia inertia_at(double mass, const Vector3d& com, const Matrix3d& about_com, const Matrix3d& turn, const Vector3d& place) {
+inline Inertia inertia_at(double mass, const Vector3d& com, const Matrix3d& about_com, const Matrix3d& turn,
+                          const Vector3d& place) {
   const Vector3d r = place + turn * com;
   Matrix3d j = turn * about_com * turn.transpose();
   j.diagonal().array() += mass * r.squaredNorm();
