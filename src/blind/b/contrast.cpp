@@ -11,10 +11,8 @@ namespace {
 
 /// What an accelerometer of this robot would be shaken by: the effects on the accelerometer itself count.
 Vector3d at_imu(const Robot& robot, const Felt& felt, const Vector3d& place) {
-  const State& x = robot.state();
   const Ailments& a = robot.plant().ailments();
-  const Vector3d w(x[kRate], x[kRate + 1], x[kRate + 2]), v(x[kVelocity], x[kVelocity + 1], x[kVelocity + 2]);
-  Vector3d force = felt.acceleration.v + w.cross(v) + felt.acceleration.w.cross(place) + w.cross(w.cross(place));
+  Vector3d force = felt.at(place);
   if (a.any(kAccelerometerMisalignment)) force += (a[kAccelerometerMisalignment] * a.misalignment).cross(force);
   if (a.any(kVibrationRectification)) force += 1e-3 * a[kVibrationRectification] * force.cwiseProduct(force);
   return force;

@@ -103,7 +103,7 @@ FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAss
         const bool there =
             rules.hand_back.distance_m > 0 &&
             within(standing(view.position_m, view.velocity_m_s, view.rate_rad_s, view.attitude), rules.hand_back);
-        handed_back = handed_back || there || now >= rules.hand_back_at_s - 1e-9;
+        handed_back = handed_back || there || (rules.hand_back_at_s > 0 && now >= rules.hand_back_at_s - 1e-9);
         if (handed_back) {
           beat = flown.pilot().steer(view, {kGoal_m, Vector3d::Zero(), 0});
         } else {

@@ -308,6 +308,7 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
     a = free.llt().solve(right);
   }
   felt.acceleration = {a.head<3>(), a.tail<3>()};
+  felt.motion = torso;
   Vector6d takes = M * a - load;
   for (std::size_t j = 0; j < 2; ++j) {
     const Eigen::Vector2d hinges = inverse[j] * (hinge_load[j] - coupling[j].transpose() * a);

@@ -87,7 +87,13 @@ struct Felt {
   Twist
       acceleration;  ///< of the torso, against free fall: w is the turning acceleration, v that of the origin less w x v
   Wrench support;    ///< that a prescribed motion takes, about the torso's origin in B
-  double kinetic_J = 0;  ///< filled by energy() alone
+  Twist motion;      ///< of the torso, at which this was felt
+
+  /// Specific force at a place of the torso, in B.
+  Vector3d at(const Vector3d& place) const {
+    const Vector3d& w = motion.w;
+    return acceleration.v + w.cross(motion.v) + acceleration.w.cross(place) + w.cross(w.cross(place));
+  }
 };
 
 class Plant {

@@ -31,6 +31,7 @@ Robot::Robot(Figures figures, const Ailments& ailments, const Surroundings& room
       slow_(plant_.fresh()) {
   felt_.acceleration = {Vector3d::Zero(), Vector3d::Zero()};
   felt_.support = {Vector3d::Zero(), Vector3d::Zero()};
+  felt_.motion = {Vector3d::Zero(), Vector3d::Zero()};
 }
 
 void Robot::put(const Vector3d& position, double heading) {

@@ -135,18 +135,18 @@ Sensors::Sensors(const Assignment& a, const SensorTruth& truth, const Robot& rob
 }
 
 void Sensors::imu_step(const Robot& robot, double time) {
+  // What was felt at the beginning of the step, at `time`; the filters take the mean since the step before.
   const Felt& felt = robot.felt();
-  const State& x = robot.state();
-  const Vector3d w(x[kRate], x[kRate + 1], x[kRate + 2]), v(x[kVelocity], x[kVelocity + 1], x[kVelocity + 2]);
-  const Vector3d& r = truth_.imu_place_m;
-  const Vector3d force = felt.acceleration.v + w.cross(v) + felt.acceleration.w.cross(r) + w.cross(w.cross(r));
-  Vector3d gyro = truth_.imu_turn * w, accel = truth_.imu_turn * force;
-  if (ailments_.any(kAccelerometerMisalignment)) accel = accel_turn_ * accel;
+  const Vector3d gyro_now = truth_.imu_turn * felt.motion.w, accel_now = truth_.imu_turn * felt.at(truth_.imu_place_m);
   if (!settled_) {
-    gyro_ = gyro;
-    accel_ = accel;
+    gyro_ = gyro_felt_ = gyro_now;
+    accel_ = accel_felt_ = accel_now;
     settled_ = true;
   }
+  Vector3d gyro = 0.5 * (gyro_felt_ + gyro_now), accel = 0.5 * (accel_felt_ + accel_now);
+  gyro_felt_ = gyro_now;
+  accel_felt_ = accel_now;
+  if (ailments_.any(kAccelerometerMisalignment)) accel = accel_turn_ * accel;
   gyro = gyro_mount_.shaken(gyro);
   accel = accel_mount_.shaken(accel);
   // A proof mass that is not quite even rectifies what shakes it, before any filter (Ang, Khosla, Riviere, IEEE Sensors J. 7 (2007)).
@@ -256,7 +256,7 @@ void Sensors::before_tick(const Robot& robot, double time) {
 }
 
 void Sensors::after_step(const Robot& robot, double time, int step) {
-  imu_step(robot, time);
+  imu_step(robot, time - kStep_s);
   mocap_step(robot, time);
   if (power_ && step == truth_.power_step && time >= next_power_s_ - 1e-7) {
     next_power_s_ += 1 / truth_.power_rate_hz;

@@ -90,6 +90,7 @@ class Sensors {
   // IMU
   Vector3d gyro_bias_, accel_bias_, warming_, wandering_ = Vector3d::Zero();
   Matrix3d accel_turn_;
+  Vector3d gyro_felt_ = Vector3d::Zero(), accel_felt_ = Vector3d::Zero();
   Vector3d gyro_ = Vector3d::Zero(), accel_ = Vector3d::Zero(), gyro_before_ = Vector3d::Zero(),
            accel_before_ = Vector3d::Zero();
   SoftMount gyro_mount_, accel_mount_;
