@@ -116,10 +116,11 @@ TEST(FamilyBStep, IsFineEnough) {
   const State fine = flown(160, 118, true);
   const State chosen = flown(kStepsPerTick, 118, true), half = flown(2 * kStepsPerTick, 118, true);
   const double off = apart(chosen, fine, kPosition, 3), off_half = apart(half, fine, kPosition, 3);
-  EXPECT_LT(off, 2e-5) << "of the position after four beats, m";
-  EXPECT_LT(off_half, off);
+  EXPECT_LT(off, 5e-6) << "of the position after four beats, m";
+  EXPECT_GT(off / off_half, 2.5) << "the windings are of second order";
   EXPECT_LT(apart(chosen, fine, kRate, 3), 0.05);
-  RecordProperty("position_off_um", std::to_string(1e6 * off));
+  RecordProperty("position_off_nm", std::to_string(1e9 * off));
+  RecordProperty("position_off_of_half_the_step_nm", std::to_string(1e9 * off_half));
 }
 
 TEST(FamilyBThrust, CarriesTheWeightAtTenVolts) {

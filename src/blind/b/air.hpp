@@ -10,24 +10,27 @@
 //                d = (A1 + A2) g - z1 - z2,   dz_i/dt = (2 U / c) b_i (A_i g - z_i),   is taken from each strip as r goes  [4, 5]
 //   turning about the hinge with w_y:  1/2 rho C_D(90 deg) w_y |w_y| (c^3 / 3 on the normal force, c^4 / 4 on the hinge) dr
 //
-// Chords are those of Ellington's beta distribution [6], c = c_mean x^(p-1) (1-x)^(q-1) / B(p, q), with centroid and radius of gyration
-// of this family: p and q are the moments' of a beta density with mean 0.46 and mean square 0.53^2.
+// Chords are those of a beta density over the span, the form that Ellington gave insects' wings [6],
+// c = c_mean x^(p-1) (1-x)^(q-1) / B(p, q); p and q are this family's own: mean 0.46, mean square 0.53^2.
 //
-// The coefficients were measured at a Reynolds number of 10^2. At 10^4 wings have more lift for their drag (Altshuler, Dudley, Ellington,
-// J. Zool. 264 (2004), on hummingbirds' wings): one factor on lift, kScale, makes the nominal robot carry its weight at about 10 V.
+// The coefficients were measured at a Reynolds number of 10^2. At 10^4 wings have more lift for their drag [8]: one factor on lift,
+// kScale, makes the nominal robot carry its weight at about 10 V.
 //
-// Rotational circulation [2], added mass [7], wake [8], twist and what is near are effects: nothing of them is here unless they are on.
+// Rotational circulation [2], added mass [7], wake, twist and what is near are effects: nothing of them is here unless they are on.
+// Assumed: strips do not act on each other, spanwise flow does nothing, one lag stands for a wing. Valid while wings beat; a robot that
+// glides has no downwash here.
 //
-// 1 Dickinson, Lehmann, Sane: Wing rotation and the aerodynamic basis of insect flight, Science 284 (1999): both fits
-// 2 Sane, Dickinson: The aerodynamic effects of wing rotation and a revised quasi-steady model of flapping flight, J. Exp. Biol. 205
-//   (2002): fits used in blade strips; rotational coefficient pi (0.75 - x0), which falls with angular velocity
-// 3 Ke, Zhang, Shi, Chen: The numerical solution for flapping wing hovering wingbeat dynamics, Aerosp. Sci. Technol. 110 (2021), code
-// 4 Taha, Hajj, Beran: State-space representation of the unsteady aerodynamics of flapping flight, Aerosp. Sci. Technol. 34 (2014):
-//   Duhamel's principle on lift curves with a leading-edge vortex
+// 1 Dickinson, Lehmann, Sane, Wing rotation and the aerodynamic basis of insect flight, Science 284 (1999): both fits
+// 2 Sane, Dickinson, The aerodynamic effects of wing rotation and a revised quasi-steady model of flapping flight, J. Exp. Biol. 205
+//   (2002): the fits in blade strips; the rotational coefficient, pi (0.75 - x0) in theory, falls with angular velocity
+// 3 Ke, Zhang, Shi, Chen, The numerical solution for flapping wing hovering wingbeat dynamics, Aerosp. Sci. Technol. 110 (2021), its code
+// 4 A state-space formulation for the aerodynamics of flapping flight, Aerosp. Sci. Technol. 34 (2014), by Taha and others: Duhamel's
+//   principle on lift curves with a leading-edge vortex
 // 5 R. T. Jones's two exponentials of Wagner's function: A = 0.165, 0.335; b = 0.0455, 0.3
-// 6 Ellington: The aerodynamics of hovering insect flight, Phil. Trans. R. Soc. B 305 (1984): wing shapes as beta distributions
-// 7 Sedov: Planar problems of hydrodynamics and aerodynamics (1966): plate, pi/4 rho c^2 per length at mid-chord, pi/128 rho c^4 about it
-// 8 Lehmann: When wings touch wakes; here as Lehmann, Sane, Dickinson, J. Exp. Biol. 208 (2005) describe wing-wake interaction
+// 6 Ellington, The aerodynamics of hovering insect flight (1984), as Usherwood and Ellington, J. Exp. Biol. 205 (2002), II, use it
+// 7 Sedov, Planar problems of hydrodynamics and aerodynamics (1966): a plate has pi/4 rho c^2 per length at mid-chord, and
+//   pi/128 rho c^4 about it
+// 8 Altshuler, Dudley, Ellington, Aerodynamic forces of revolving hummingbird wings and wing models, J. Zool. (2004)
 #pragma once
 
 #include <Eigen/Dense>

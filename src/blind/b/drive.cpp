@@ -58,8 +58,8 @@ double Plant::stroke_torque(const State& x, std::size_t j, double i, const Slow&
         n * s.motor.friction_Nm * smooth_sign(turning, kFrictionOver_rad_s) + s.motor.damping_Nm_s * n * n * turning;
   }
   if (a_.any(kCoulombFriction)) {
-    // Bristles of Canudas de Wit, Olsson, Astrom, Lischinsky (1995), that bend far enough for the step; their strength falls from
-    // 1.4 to 1 of the motor's friction as the speed passes that of Stribeck.
+    // The bristles of the LuGre model (1995), that bend far enough for the step; their strength falls from 1.4 to 1 of the motor's
+    // friction, Fc + (Fs - Fc) exp(-(v / vs)^2), as the speed passes that of Stribeck.
     constexpr double kReach_rad = 1.5 * std::numbers::pi / 180, kStribeck_rad_s = 30;
     const double v = turning / kStribeck_rad_s;
     const double strength = 1 + 0.4 * std::exp(-v * v);

@@ -160,7 +160,7 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const Figures& f
     go(about(at.x() + 0.8, at.y(), 1.1, 0.1), speed, 0, 0.2);
     go(about(at.x() - 0.5, at.y() - 0.4, 0.6, 0.1), speed, -turn, 0.2);
   } else {
-    go(Vector3d(at.x(), wall - random.uniform(0.11, 0.14), 0.9), 0.35, 0, 0.7);
+    go(Vector3d(at.x(), wall - random.uniform(0.13, 0.16), 0.9), 0.35, 0, 0.7);
     go(Vector3d(at.x() + 0.5, at.y(), 1.0), 0.5, turn, 0.4);
     go(about(at.x(), wall - 0.3, 0.8, 0.03), 0.4, 0, 0.1);
     go(about(at.x() - 0.9, at.y() - 0.6, 1.2, 0.1), speed, 0, 0.2);

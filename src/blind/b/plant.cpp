@@ -87,8 +87,8 @@ void Plant::place(const State& x, std::size_t j, SideNow& now) const {
 double Plant::near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const Surroundings& room) const {
   double gain = 1;
   const double height = 0.5 * (shoulder_W.z() + tip_W.z());
-  // Exponential laws, as measured for quadrotors near ground (He, Leang and others, J. Dyn. Syst. Meas. Control 141 (2019)) and
-  // ceiling (Free University of Bozen-Bolzano); finite at contact, other than Cheeseman and Bennett's.
+  // Exponential laws, finite at contact, other than that of Cheeseman and Bennett: of ground as in In-Ground-Effect Modeling ...,
+  // J. Dyn. Syst. Meas. Control 141, 071013; of ground and ceiling as in Modelling of Ground and Ceiling Effects (University of Bolzano).
   if (a_.any(kGroundEffect)) gain += 0.14 * a_[kGroundEffect] * decay(height - room.ground_z_m, 0.075);
   if (a_.any(kCeilingEffect)) gain += 0.12 * a_[kCeilingEffect] * decay(room.ceiling_z_m - height, 0.06);
   if (a_.any(kWallEffect)) gain -= 0.05 * a_[kWallEffect] * decay(room.wall_y_m - tip_W.y(), 0.08);

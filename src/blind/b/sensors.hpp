@@ -98,7 +98,6 @@ class Sensors {
   std::deque<std::array<Vector3d, 2>> window_;
   std::array<Vector3d, 2> held_{Vector3d::Zero(), Vector3d::Zero()};
   double next_imu_s_, imu_jitter_s_ = 0, next_own_s_, next_mocap_s_, next_wings_s_, next_power_s_;
-  long imu_count_ = 0, mocap_count_ = 0;
   int lost_ = 0;
   Eigen::Quaterniond tilt_, last_attitude_ = Eigen::Quaterniond::Identity();
   std::vector<ImuSample> imu_samples_;
