@@ -1,0 +1,109 @@
+// What the air does to a wing: blade strips with measured lift and drag, and circulation that lags behind.
+//
+// A strip at r from the shoulder, chord c, whose point on the hinge moves with (u_x, u_z) through the air (wing frame: x its normal,
+// z from trailing to leading edge), U^2 = u_x^2 + u_z^2, alpha = atan(|u_x| / |u_z|):
+//
+//   lift   across (u_x, u_z), drag against it:  1/2 rho U^2 c dr C       C_L = 0.225 + 1.58 sin(2.13 alpha - 7.2 deg)
+//                                                                         C_D = 1.92 - 1.55 cos(2.04 alpha - 9.82 deg)     [1, 2]
+//   centre of pressure behind the edge that leads:  c (0.82 alpha / pi + 0.05)                                             [3]
+//   circulation  g = U C_L at the radius of the second moment; what lags of it,
+//                d = (A1 + A2) g - z1 - z2,   dz_i/dt = (2 U / c) b_i (A_i g - z_i),   is taken from each strip as r goes  [4, 5]
+//   turning about the hinge with w_y:  1/2 rho C_D(90 deg) w_y |w_y| (c^3 / 3 on the normal force, c^4 / 4 on the hinge) dr
+//
+// Chords are those of a beta density over the span, the form that Ellington gave insects' wings [6],
+// c = c_mean x^(p-1) (1-x)^(q-1) / B(p, q); p and q are this family's own: mean 0.46, mean square 0.53^2.
+//
+// The coefficients were measured at a Reynolds number of 10^2. At 10^4 wings have more lift for their drag [8]: one factor on lift,
+// kScale, makes the nominal robot carry its weight at about 10 V.
+//
+// Rotational circulation [2], added mass [7], wake, twist and what is near are effects: nothing of them is here unless they are on.
+// Assumed: strips do not act on each other, spanwise flow does nothing, one lag stands for a wing. Valid while wings beat; a robot that
+// glides has no downwash here.
+//
+// 1 Dickinson, Lehmann, Sane, Wing rotation and the aerodynamic basis of insect flight, Science 284 (1999): both fits
+// 2 Sane, Dickinson, The aerodynamic effects of wing rotation and a revised quasi-steady model of flapping flight, J. Exp. Biol. 205
+//   (2002): the fits in blade strips; the rotational coefficient, pi (0.75 - x0) in theory, falls with angular velocity
+// 3 Ke, Zhang, Shi, Chen, The numerical solution for flapping wing hovering wingbeat dynamics, Aerosp. Sci. Technol. 110 (2021), its code
+// 4 A state-space formulation for the aerodynamics of flapping flight, Aerosp. Sci. Technol. 34 (2014), by Taha and others: Duhamel's
+//   principle on lift curves with a leading-edge vortex
+// 5 R. T. Jones's two exponentials of Wagner's function: A = 0.165, 0.335; b = 0.0455, 0.3
+// 6 Ellington, The aerodynamics of hovering insect flight (1984), as Usherwood and Ellington, J. Exp. Biol. 205 (2002), II, use it
+// 7 Sedov, Planar problems of hydrodynamics and aerodynamics (1966): a plate has pi/4 rho c^2 per length at mid-chord, and
+//   pi/128 rho c^4 about it
+// 8 Altshuler, Dudley, Ellington, Aerodynamic forces of revolving hummingbird wings and wing models, J. Zool. (2004)
+#pragma once
+
+#include <Eigen/Dense>
+#include <array>
+
+#include "blind/b/effects.hpp"
+#include "blind/b/figures.hpp"
+
+namespace flappy::blind::b {
+
+inline constexpr std::size_t kStrips = 8;
+inline constexpr double kScale = 1.5;  ///< on lift, see above
+
+/// Coefficients over |u_x| / (|u_x| + |u_z|), which needs no angle.
+struct Polar {
+  static constexpr int kCells = 512;
+  struct Row {
+    double normal, chordwise, lift, centre;
+  };
+  std::array<Row, kCells + 1> row;
+
+  /// Factors are those on lift and drag.
+  Polar(double lift, double drag);
+  Row at(double share) const {
+    const double x = share * kCells;
+    const int i = x < kCells ? static_cast<int>(x) : kCells - 1;
+    const double k = x - i;
+    const Row &a = row[static_cast<std::size_t>(i)], &b = row[static_cast<std::size_t>(i) + 1];
+    return {a.normal + k * (b.normal - a.normal), a.chordwise + k * (b.chordwise - a.chordwise),
+            a.lift + k * (b.lift - a.lift), a.centre + k * (b.centre - a.centre)};
+  }
+};
+
+/// The coefficients themselves, angle from 0 to pi/2.
+double lift_coefficient(double alpha_rad);
+double drag_coefficient(double alpha_rad);
+
+/// A wing as the air meets it. sign is 1 on the left, -1 on the right: the span runs along sign y of the wing.
+class WingAir {
+ public:
+  WingAir(const Figures& figures, const Ailments& ailments, std::size_t side);
+
+  /// What is instantaneous: velocities through the air in the wing's frame.
+  struct Flow {
+    Vector3d shoulder_m_s, rate_rad_s;
+    double rotation_rate_rad_s = 0;                ///< of the hinge
+    double wake_rad_s = 0;                         ///< of the air about the stroke axis, where it goes on
+    double twist_rad = 0, bending_rate_rad_s = 0;  ///< at the tip
+    double sin_rotation = 0, cos_rotation = 1;
+    double gain = 1;  ///< by what is near
+    std::array<double, 2> lag{};
+  };
+  struct Load {
+    Vector3d force_N, torque_Nm;  ///< about the shoulder, in the wing's frame
+    std::array<double, 2> lag_rate{};
+  };
+  Load load(const Flow& flow) const;
+
+  /// Sedov's inertia of the air: of (w_y, w_z, v_x at the shoulder); zero without the effect.
+  const Eigen::Matrix3d& added() const { return added_; }
+  double area_m2() const;
+  double length_m() const { return length_; }
+
+ private:
+  struct Strip {
+    double r, pressure, chord, share;  ///< pressure: 1/2 rho c dr; share of the lag
+  };
+  Polar polar_;
+  std::array<Strip, kStrips> strips_;
+  double sign_, length_, density_;
+  double reference_r_, reference_chord_, turning_force_, turning_torque_, rotational_lift_;
+  bool twists_, bends_;
+  Eigen::Matrix3d added_;
+};
+
+}  // namespace flappy::blind::b

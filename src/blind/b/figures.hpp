@@ -1,0 +1,65 @@
+// The figures of one robot: those of the declared vehicle file, or each drawn apart.
+#pragma once
+
+#include <Eigen/Dense>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace flappy::blind::b {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// A rigid link; centre of mass and inertia about it in the link's frame.
+struct Link {
+  double mass_kg = 0;
+  Vector3d com_m = Vector3d::Zero();
+  Matrix3d inertia_kg_m2 = Matrix3d::Zero();
+};
+
+struct Hinge {
+  double lower_rad = 0, upper_rad = 0, damping_Nm_s = 0, friction_Nm = 0;
+};
+
+/// Friction, damping and inertia on the motor's side of the gear.
+struct Motor {
+  double resistance_ohm = 0, torque_constant_Nm_A = 0, gear_ratio = 0, efficiency = 0;
+  double friction_Nm = 0, damping_Nm_s = 0, rotor_inertia_kg_m2 = 0, voltage_limit_V = 0;
+};
+
+struct Side {
+  Link edge, wing;
+  Vector3d shoulder_m = Vector3d::Zero();
+  Hinge stroke, rotation;
+  Motor motor;
+  double stiffness_positive_Nm_rad = 0, stiffness_negative_Nm_rad = 0, rest_angle_rad = 0;
+  double wing_length_m = 0, mean_chord_m = 0;
+  double lift = 1, drag = 1, turning_drag = 1;  ///< factors on the coefficients of air
+};
+
+struct Figures {
+  std::string file, sha256;  ///< as the log declares them
+  double density_kg_m3 = 0, flapping_Hz = 0, hold_s = 0;
+  double amplitude_limit_V = 0, difference_limit_V = 0, bias_limit_V = 0, split_cycle_limit = 0;
+  double below_m = 0, above_m = 0, around_m = 0;
+  Link torso;
+  std::array<Side, 2> side;  ///< left, right
+
+  double mass_kg() const;
+};
+
+inline constexpr double kGravity_m_s2 = 9.81;
+
+/// Reads a vehicle file. InputError where a figure is missing or out of range.
+Figures read_figures(const std::filesystem::path& file);
+
+/// Draws each figure of each body apart, left and right too: sd of masses 3 %, inertias 7 %, centres and hinges 0.3 mm, springs 5 %,
+/// rest angles 1 deg, stops 2 deg, resistance 7 %, torque constant 3 %, friction 30 %, air 5 %; cut at 3 sd.
+void draw_figures(std::uint64_t seed, Figures& figures);
+
+/// Whether masses can be laid out so: it is positive and no principal moment is above the sum of the others, to one in 1e3.
+bool is_inertia(const Matrix3d& inertia);
+
+}  // namespace flappy::blind::b

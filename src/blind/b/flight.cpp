@@ -1,0 +1,91 @@
+#include "blind/b/flight.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace flappy::blind::b {
+
+Case make_case(const Assignment& a) {
+  Case c;
+  c.ailments = ailments_of(a.effects, a.seed);
+  c.figures = read_figures(a.vehicle_file);
+  c.header.vehicle = c.figures.file;
+  c.header.vehicle_sha256 = c.figures.sha256;
+  c.header.flapping_Hz = c.figures.flapping_Hz;
+  c.header.gravity_m_s2 = kGravity_m_s2;
+  c.header.ambient = {c.figures.density_kg_m3, c.room.ground_z_m, c.room.ceiling_z_m, {{0, c.room.wall_y_m, 0, -1}}};
+  c.sensors = draw_sensors(a, c.figures.side[0].motor.voltage_limit_V, c.header);
+  if (a.own_figures) draw_figures(a.seed, c.figures);
+  return c;
+}
+
+Flight::Flight(const Assignment& a, const Case& c, std::uint64_t flight, const Vector3d& start, double heading,
+               double trim_s)
+    : robot_(c.figures, c.ailments, c.room, a.seed, flight),
+      sensors_(a, c.sensors, robot_, flight, trim_s, a.power, a.wings),
+      observer_(c.header, start, heading),
+      pilot_(c.figures),
+      radio_(a.seed, flight, c.ailments[kCommandDropout], -trim_s),
+      trim_s_(trim_s) {
+  robot_.put(start, heading);
+  log_.header = c.header;
+  log_.command.inputs.emplace();
+  log_.command.phase_rad.emplace();
+}
+
+Radio::Radio(std::uint64_t seed, std::uint64_t flight, double size, double begins_s)
+    : random_(seed, flight, Stream::kEffect, kCommandDropout),
+      size_(size),
+      fails_s_(begins_s + random_.uniform(0.3, 1)) {}
+
+Beat Radio::arrived(const Beat& sent, double now) {
+  if (size_ == 0) return sent;
+  if (now >= fails_s_) {
+    returns_s_ = now + size_ * random_.uniform(0.03, 0.09);
+    fails_s_ = returns_s_ + random_.uniform(0.2, 0.7);
+  }
+  if (now >= returns_s_) last_ = sent;
+  return last_;
+}
+
+std::string Flight::tick(const Beat& sent) {
+  const double now = time_s();
+  const Figures& f = robot_.plant().figures();
+  const std::array<double, 2> logged = waveform(f, sent, now + trim_s_);
+  if (now >= -1e-9) {
+    flightlog::CommandStream& c = log_.command;
+    c.t_s.push_back(std::max(0.0, now));
+    c.left_voltage_V.push_back(logged[0]);
+    c.right_voltage_V.push_back(logged[1]);
+    c.inputs->amplitude_V.push_back(std::clamp(sent.amplitude_V, 0.0, f.amplitude_limit_V));
+    c.inputs->difference_V.push_back(std::clamp(sent.difference_V, -f.difference_limit_V, f.difference_limit_V));
+    c.inputs->bias_V.push_back(std::clamp(sent.bias_V, -f.bias_limit_V, f.bias_limit_V));
+    c.inputs->split_cycle.push_back(std::clamp(sent.split_cycle, -f.split_cycle_limit, f.split_cycle_limit));
+    const double beats = (now + trim_s_) * f.flapping_Hz;
+    c.phase_rad->push_back(2 * std::numbers::pi * (beats - std::floor(beats)));
+  }
+  sensors_.before_tick(robot_, now);
+  robot_.drive(waveform(f, radio_.arrived(sent, now), now + trim_s_));
+  for (int step = 1; step <= kStepsPerTick; ++step) {
+    if (path_) {
+      std::array<double, 13> pose;
+      std::copy_n(robot_.state().begin(), pose.size(), pose.begin());
+      path_->pose.push_back(pose);
+    }
+    robot_.step();
+    if (path_) path_->acceleration.push_back(robot_.felt().acceleration);
+    sensors_.after_step(robot_, now + step * kStep_s, step);
+  }
+  ++ticks_;
+  observer_.tick(sensors_, time_s());
+  return robot_.crash();
+}
+
+flightlog::FlightLog Flight::log(double end_s) const {
+  flightlog::FlightLog log = log_;
+  sensors_.write(end_s, log);
+  return log;
+}
+
+}  // namespace flappy::blind::b

@@ -1,0 +1,111 @@
+// What is measured of a robot, and what is declared of that.
+//
+// IMU: specific force and rate where it sits and as it is turned; what is wrong with it; a first-order low-pass; samples with jitter that
+// are instants, means over an averaging time or held from a clock of its own; bias that drifts with temperature, noise, range, steps.
+// Motion capture: noise, bursts of lost frames, frames with markers swapped, arrival that jitters. Currents: instants of a converter that
+// is triggered within a tick of the driver, or at its switch, then just before or just after. Wings: an encoder of 4096 steps a turn.
+//
+// Declarations are exact, or drawn within what laboratories do. Times are those of the log: 0 where it begins.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "blind/b/robot.hpp"
+#include "blind/family.hpp"
+
+namespace flappy::blind::b {
+
+enum class Sample { kInstant, kMean, kHeld };
+
+/// A mount that gives way: what sits on it follows as an oscillator of 90 Hz, softer the larger its size; stiff at size 0.
+class SoftMount {
+ public:
+  explicit SoftMount(double size);
+  Vector3d shaken(const Vector3d& by);
+
+ private:
+  double frequency_rad_s_;
+  bool begun_ = false;
+  Vector3d now_ = Vector3d::Zero(), rate_ = Vector3d::Zero();
+};
+
+/// How it is in truth.
+struct SensorTruth {
+  Sample sample = Sample::kInstant;
+  double imu_rate_hz = 1000, imu_late_s = 2e-3, bandwidth_hz = 250, averaging_s = 0, own_clock_hz = 1125;
+  Vector3d imu_place_m = Vector3d::Zero();
+  Matrix3d imu_turn = Matrix3d::Identity();  ///< from B to the IMU
+  double gyro_noise_rad_s = 0.05, accel_noise_m_s2 = 0.5;
+  double mocap_rate_hz = 200, mocap_late_s = 0.015, position_noise_m = 1e-4, attitude_noise_rad = 5e-3;
+  double power_rate_hz = 500, power_late_s = 2e-4, voltage_noise_V = 0.02, current_noise_A = 5e-3;
+  int power_step = kStepsPerTick / 2;  ///< of the tick at which currents are taken; 0: before the switch
+  double wings_rate_hz = 500, wings_noise_rad = 1e-3;
+  double imu_clock = 1, mocap_clock = 1, power_clock = 1;  ///< how fast each stream's clock runs
+};
+
+/// Draws the robot's sensors, and what is declared of them, all of the header but the vehicle and the surroundings.
+SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlog::FlightHeader& header);
+
+struct ImuSample {
+  double arrival_s = 0;
+  Vector3d gyro_rad_s = Vector3d::Zero(), accel_m_s2 = Vector3d::Zero();
+};
+struct MocapSample {
+  double arrival_s = 0;
+  Vector3d position_m = Vector3d::Zero();
+  Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();
+};
+
+/// Of one flight, which has been going on for `trim_s` where the log begins.
+class Sensors {
+ public:
+  Sensors(const Assignment& a, const SensorTruth& truth, const Robot& robot, std::uint64_t flight, double trim_s,
+          bool power, bool wings);
+
+  /// After each step of the robot. `time_s` is that of the step's end, `step` its number within the tick, from 1 on.
+  void after_step(const Robot& robot, double time_s, int step);
+  /// Before the driver switches.
+  void before_tick(const Robot& robot, double time_s);
+
+  /// What has arrived by now and was not asked for before.
+  std::optional<ImuSample> imu(double now_s);
+  std::optional<MocapSample> mocap(double now_s);
+
+  /// Streams into the log, from 0 to `end_s`.
+  void write(double end_s, flightlog::FlightLog& log) const;
+
+ private:
+  void imu_step(const Robot& robot, double time_s);
+  void imu_sample(double time_s, const Vector3d& gyro, const Vector3d& accel);
+  void mocap_step(const Robot& robot, double time_s);
+  void power_sample(const Robot& robot, double time_s);
+
+  SensorTruth truth_;
+  Ailments ailments_;
+  double trim_s_;
+  bool power_, wings_;
+  Random imu_random_, mocap_random_, power_random_, wings_random_, drift_random_;
+  // IMU
+  Vector3d gyro_bias_, accel_bias_, warming_, wandering_ = Vector3d::Zero();
+  Matrix3d accel_turn_;
+  Vector3d gyro_felt_ = Vector3d::Zero(), accel_felt_ = Vector3d::Zero();
+  Vector3d gyro_ = Vector3d::Zero(), accel_ = Vector3d::Zero(), gyro_before_ = Vector3d::Zero(),
+           accel_before_ = Vector3d::Zero();
+  SoftMount gyro_mount_, accel_mount_;
+  bool settled_ = false;
+  std::deque<std::array<Vector3d, 2>> window_;
+  std::array<Vector3d, 2> held_{Vector3d::Zero(), Vector3d::Zero()};
+  double next_imu_s_, imu_jitter_s_ = 0, next_own_s_, next_mocap_s_, next_wings_s_, next_power_s_;
+  int lost_ = 0;
+  Eigen::Quaterniond tilt_, last_attitude_ = Eigen::Quaterniond::Identity();
+  std::vector<ImuSample> imu_samples_;
+  std::vector<MocapSample> mocap_samples_;
+  std::size_t imu_taken_ = 0, mocap_taken_ = 0;
+  flightlog::PowerStream power_samples_;
+  flightlog::WingsStream wings_samples_;
+  double nominal_V_;
+};
+
+}  // namespace flappy::blind::b

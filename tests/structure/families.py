@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+"""Checks that families of blind robots share nothing: families.py ROOT, or --self-test.
+
+A file of src/blind/b or src/blind/c may include its own family, blind/family.hpp, flightlog/flight_log.hpp, io, Eigen and the
+standard library.
+"""
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+FAMILIES = ("b", "c")
+SHARED = {"blind/family.hpp", "flightlog/flight_log.hpp"}
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTILINE)
+ANY_INCLUDE = re.compile(r"^[ \t]*(?:#|%:|\?\?=)[ \t]*(?:include\w*|import)\b.*$|^[ \t]*(?:export[ \t]+)?import[ \t].*$|\b__has_include\b.*$", re.MULTILINE)
+STANDARD = re.compile(r"[a-z][a-z0-9_]*")
+
+
+def may_include(family, bracket, name):
+    """Whether a file of `family` may include `name`."""
+    if ".." in name.split("/"):
+        return False
+    if bracket == "<":
+        return bool(STANDARD.fullmatch(name)) or name.startswith("Eigen/")
+    return name in SHARED or name.startswith(f"blind/{family}/") or name.startswith("io/")
+
+
+def faults(root):
+    """One line for each include that is not allowed, and one where there is no family at all."""
+    found = []
+    count = 0
+    for family in FAMILIES:
+        for path in sorted((root / "src" / "blind" / family).rglob("*")):
+            if not path.is_file():
+                continue
+            count += 1
+            where = path.relative_to(root)
+            if path.suffix not in (".hpp", ".cpp"):
+                found.append(f"{where}: a family is made of .hpp and .cpp")
+                continue
+            text = path.read_text(encoding="utf-8")
+            for match in ANY_INCLUDE.finditer(text):
+                plain = INCLUDE.match(match[0])
+                if plain and may_include(family, plain[1], plain[2]):
+                    continue
+                line = text.count("\n", 0, match.start()) + 1
+                found.append(f"{where}:{line}: {plain[2] if plain else match[0].strip()}: family {family} may include blind/{family}/*, "
+                             f"{', '.join(sorted(SHARED))}, io/*, Eigen and the standard library")
+    return found if count else ["no file of a family below src/blind"]
+
+
+def self_test():
+    """Each tree has one file that is wrong, or none."""
+    good = {"src/blind/b/robot.hpp": "#pragma once\n#include <Eigen/Dense>\n#include <vector>\n#include \"blind/family.hpp\"\n",
+            "src/blind/b/robot.cpp": "#include \"blind/b/robot.hpp\"\n#include \"io/config.hpp\"\n#include \"flightlog/flight_log.hpp\"\n",
+            "src/blind/air.cpp": "#include \"model/air.hpp\"\n"}
+    cases = [
+        ({}, None),
+        ({"src/blind/c/robot.cpp": "#include \"blind/c/robot.hpp\"\n"}, None),
+        ({"src/blind/b/x.cpp": "\n#include \"model/wing_beat.hpp\"\n"}, "src/blind/b/x.cpp:2: model/wing_beat.hpp: family b"),
+        ({"src/blind/b/x.cpp": "#include \"blind/robot.hpp\"\n"}, "blind/robot.hpp"),
+        ({"src/blind/b/x.cpp": "#include <flappy/vehicle.hpp>\n"}, "flappy/vehicle.hpp"),
+        ({"src/blind/b/x.cpp": "#include \"blind/c/robot.hpp\"\n"}, "blind/c/robot.hpp"),
+        ({"src/blind/c/x.cpp": "#include \"blind/b/robot.hpp\"\n"}, "family c may include blind/c/*"),
+        ({"src/blind/b/x.cpp": "#include \"blind/b/../air.hpp\"\n"}, "blind/b/../air.hpp"),
+        ({"src/blind/b/x.cpp": "#  include\t\"flight/pid.hpp\"\n"}, "flight/pid.hpp"),
+        ({"src/blind/b/x.cpp": "#include \"flightlog/motion.hpp\"\n"}, "flightlog/motion.hpp"),
+        ({"src/blind/b/x.cpp": "#include FLAPPY_HEADER\n"}, "#include FLAPPY_HEADER"),
+        ({"src/blind/b/x.cpp": "import model;\n"}, "import model;"),
+        ({"src/blind/b/x.inc": ""}, "made of .hpp and .cpp"),
+        ({"src/blind/b/deep/x.hpp": "#include <Random123/philox.h>\n"}, "Random123/philox.h"),
+    ]
+    for extra, expected in cases:
+        with tempfile.TemporaryDirectory() as folder:
+            for name, text in {**good, **extra}.items():
+                path = Path(folder, name)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8")
+            found = faults(Path(folder))
+        right = found == [] if expected is None else len(found) == 1 and expected in found[0]
+        if not right:
+            return [f"self-test: {extra} gave {found}, not {expected}"]
+    with tempfile.TemporaryDirectory() as folder:
+        if len(faults(Path(folder))) != 1:
+            return ["self-test: a tree without families has no fault"]
+    return []
+
+
+if __name__ == "__main__":
+    problems = self_test() if sys.argv[1:] == ["--self-test"] else faults(Path(sys.argv[1]))
+    print("\n".join(problems) or "no fault")
+    sys.exit(1 if problems else 0)
