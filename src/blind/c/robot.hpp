@@ -1,6 +1,7 @@
 // One robot: its figures, what is wrong with it, and its motion from tick to tick of the driver.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 
