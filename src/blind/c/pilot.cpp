@@ -7,7 +7,7 @@ namespace {
 
 // Tried out on the nominal robot and on 40 drawn ones.
 constexpr double kHover_V = 10.0, kClimb_V_s2_m = 0.75;  // V per m/s^2: the slope of thrust over voltage, per mass
-constexpr double kPlace_1_s = 2.2, kSpeed_1_s = 3.5, kSpeedHold_1_s2 = 1.2, kHeight_1_s = 3.5, kClimb_1_s = 5, kClimbHold_1_s2 = 3;
+constexpr double kPlace_1_s = 3.2, kSpeed_1_s = 6, kSpeedHold_1_s2 = 4, kHeight_1_s = 5, kClimb_1_s = 8, kClimbHold_1_s2 = 6;
 constexpr double kMaxAcceleration = 4.5;
 // V or split cycle per rad, per rad/s, and per rad s: roll, pitch, yaw
 const Eigen::Vector3d kTurn(1.9, 2.6, 0.12), kTurnRate(0.15, 0.2, 0.012), kTurnHold(2.2, 3.0, 0.12);
@@ -84,7 +84,7 @@ Inputs Pilot::fly(const Target& target, double tick_s) {
   if (level > 1.2) speed.head<2>() *= 1.2 / level;
   speed.z() = std::clamp(speed.z(), -0.5, 0.7);
   const Eigen::Vector3d error = speed - view_.velocity_W;
-  Eigen::Vector3d wanted = kSpeed_1_s * error + hold_acceleration_;
+  Eigen::Vector3d wanted = kSpeed_1_s * error + hold_acceleration_ + target.acceleration_W;
   wanted.z() = 0;
   if (wanted.norm() < kMaxAcceleration) {
     hold_acceleration_ += kSpeedHold_1_s2 * tick_s * error;
@@ -110,7 +110,7 @@ Inputs Pilot::fly(const Target& target, double tick_s) {
   const Eigen::Vector3d out = kTurn.cwiseProduct(turn) - kTurnRate.cwiseProduct(rate) + hold_turn_;
   const double lean = std::max(0.5, view_.R_WB(2, 2));
   trim_ = {kHover_V + climb_V_, hold_turn_.x(), hold_turn_.y(), hold_turn_.z()};
-  Inputs inputs = {(kHover_V + climb_V_ + kClimb_V_s2_m * kClimb_1_s * error.z()) / std::sqrt(lean), out.x(), out.y(), out.z()};
+  Inputs inputs = {(kHover_V + climb_V_ + kClimb_V_s2_m * (kClimb_1_s * error.z() + target.acceleration_W.z())) / std::sqrt(lean), out.x(), out.y(), out.z()};
   inputs.amplitude_V = std::clamp(inputs.amplitude_V, 6.0, 16.0);
   return clipped(inputs, *figures_);
 }

@@ -8,7 +8,7 @@ namespace flappy::blind::c {
 
 struct Target {
   Eigen::Vector3d position_W = Eigen::Vector3d::Zero();
-  Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero();
+  Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero(), acceleration_W = Eigen::Vector3d::Zero();
   double heading_rad = 0;
 };
 

@@ -1,5 +1,5 @@
 // Rich flights visit one surface each (flight 0 the ground, 1 the ceiling, 2 the wall) between legs through free air. Inputs are
-// excited by a telegraph of random levels, a third of a second each, and two tones below the beat's frequency.
+// excited by a telegraph of random levels, a fifth of a second each, and two tones below the beat's frequency.
 #include "blind/c/programme.hpp"
 
 #include <algorithm>
@@ -9,11 +9,12 @@
 namespace flappy::blind::c {
 namespace {
 
-constexpr double kLevel_s = 0.33;
-constexpr std::array<double, 4> kLevels = {0.6, 0.3, 0.35, 0.03}, kTones = {0.35, 0.15, 0.15, 0.012};  // V, V, V, split cycle
+constexpr double kLevel_s = 0.2;
+constexpr std::array<double, 4> kLevels = {1.0, 0.4, 0.45, 0.035}, kTones = {0.4, 0.15, 0.15, 0.012};  // V, V, V, split cycle
 
 double smooth(double x) { return x * x * x * (10 + x * (6 * x - 15)); }
 double smooth_rate(double x) { return 30 * x * x * (1 - x) * (1 - x); }
+double smooth_bend(double x) { return 60 * x * (1 - x) * (1 - 2 * x); }
 
 }  // namespace
 
@@ -30,7 +31,7 @@ Programme::Programme(const Assignment& a, std::size_t flight, const Figures& fig
     Eigen::Vector3d at(random.uniform(-0.6, 0.6), random.uniform(-0.5, 0.4), random.uniform(0.5, 1.5));
     if (flight == 0) at.z() = Room::kGround_m + figures.below_m + close;
     if (flight == 1) at.z() = Room::kCeiling_m - figures.above_m - 0.01 - close;
-    if (flight == 2) at.y() = Room::kWall_m - figures.around_m - 0.02 - close;
+    if (flight == 2) at.y() = Room::kWall_m - figures.around_m - 0.03 - close;
     return at;
   };
   const double fast = random.uniform(0.8, 1.0);
@@ -75,6 +76,7 @@ Target Programme::target(double t_s) const {
   Target target;
   target.position_W = leg->from_W + smooth(x) * (leg->to_W - leg->from_W);
   target.velocity_W = smooth_rate(x) / takes_s * (leg->to_W - leg->from_W);
+  target.acceleration_W = smooth_bend(x) / (takes_s * takes_s) * (leg->to_W - leg->from_W);
   target.heading_rad = leg->from_heading + smooth(x) * (leg->to_heading - leg->from_heading);
   return target;
 }
@@ -87,7 +89,9 @@ Inputs Programme::excitation(double t_s) const {
     sum[input] = levels_[input][level];
     for (const Tone& tone : tones_[input]) sum[input] += kTones[input] * std::sin(2 * M_PI * tone.frequency_Hz * t_s + tone.phase);
   }
-  return {sum[0], sum[1], sum[2], sum[3]};
+  // beside the wall what pushes sideways is a third of it
+  const double free_m = Room::kWall_m - target(t_s).position_W.y() - 0.15, calm = std::clamp(free_m / 0.3, 0.3, 1.0);
+  return {sum[0], calm * sum[1], calm * sum[2], calm * sum[3]};
 }
 
 }  // namespace flappy::blind::c
