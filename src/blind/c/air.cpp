@@ -25,7 +25,7 @@ Air::Air(const Figures& figures, const Sizes& sizes, std::uint64_t seed, std::si
       wall_(sizes[Effect::kWall]),
       wake_(0.2 * sizes[Effect::kWakeCapture]),
       clap_(0.25 * sizes[Effect::kClapAndFling]),
-      flexibility_(250 * sizes[Effect::kWingFlexibility]),
+      flexibility_(175 * sizes[Effect::kWingFlexibility]),
       wind_(sizes[Effect::kWind]),
       tether_(0.2e-3 * sizes[Effect::kTether]),
       downwash_(0.03 * sizes[Effect::kDownwashOnBody]),

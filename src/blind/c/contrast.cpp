@@ -3,8 +3,6 @@
 // follow the torso's true acceleration. What only a sensor sees changes nothing here.
 #include "blind/c/contrast.hpp"
 
-#include "blind/c/flight.hpp"
-
 namespace flappy::blind::c {
 namespace {
 
@@ -28,13 +26,13 @@ struct Beats {
   }
 };
 
-Beats replayed(const Assignment& a, std::size_t flight, const Flown& flown) {
+Beats replayed(const Assignment& a, std::size_t flight, const Flown& flown, Length length) {
   Robot robot(a, flight);
   const Eigen::Vector3d place = sensor_figures(a, robot).imu.position_m;
   robot.mechanism().move_torso(flown.path.front());
   Beats beats;
   std::size_t step = 0;
-  const std::size_t before = static_cast<std::size_t>(std::lround(kTrim_s / robot.figures().hold_s)) * robot.steps_per_tick();
+  const std::size_t before = static_cast<std::size_t>(std::lround(length.trim_s / robot.figures().hold_s)) * robot.steps_per_tick();
   for (const std::array<double, 2>& voltages : flown.voltages) {
     robot.tick_held(voltages, &flown.path[step], [&] {
       if (step >= before && robot.is_finite()) {
@@ -55,14 +53,14 @@ Beats replayed(const Assignment& a, std::size_t flight, const Flown& flown) {
 
 }  // namespace
 
-Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double size) {
+Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double size, Length length) {
   Assignment without = a;
   std::erase_if(without.effects, [&](const auto& one) { return one.first == effect; });
   Assignment with = without;
   with.effects.emplace_back(effect, size);
   const Sizes checked(with.effects);  // refuses what it does not know before the work
-  const Flown flown = fly_one(without, flight, true);
-  const Beats plain = replayed(without, flight, flown), changed = replayed(with, flight, flown);
+  const Flown flown = fly_one(without, flight, true, length);
+  const Beats plain = replayed(without, flight, flown, length), changed = replayed(with, flight, flown, length);
   const double flapping_Hz = read_figures(a.vehicle_file).flapping_Hz;
   const double end_s = flown.flight.log.command.t_s.empty() ? 0 : flown.flight.log.command.t_s.back();
   Contrast contrast;

@@ -12,8 +12,6 @@
 //   trim               V, V, V, split cycle           previous_action  the same units
 #include "blind/c/escape.hpp"
 
-#include "blind/c/flight.hpp"
-
 namespace flappy::blind::c {
 namespace {
 
@@ -50,7 +48,7 @@ std::vector<double> observed(const std::vector<std::string>& names, const View& 
 
 }  // namespace
 
-FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssignment& rules) {
+FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssignment& rules, double trim_s) {
   const std::size_t stream = 1000 + number;
   Robot robot(a, stream);
   const Figures& f = robot.figures();
@@ -69,7 +67,7 @@ FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssi
   target.heading_rad = heading;
   robot.mechanism().place(target.position_W, Eigen::Quaterniond(Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ())));
   const double until_s = rules.keep_until_s > 0 ? rules.keep_until_s : 3;
-  const long before = std::lround(kTrim_s / tick_s), after = std::lround(until_s / tick_s), period = std::max(1L, std::lround(rules.action_period_s / tick_s));
+  const long before = std::lround(trim_s / tick_s), after = std::lround(until_s / tick_s), period = std::max(1L, std::lround(rules.action_period_s / tick_s));
   Inputs trim, mean_trim;
   std::array<double, 4> action{};
   bool policy_flies = true, kept = true;

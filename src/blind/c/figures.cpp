@@ -116,7 +116,15 @@ double Figures::mass_kg() const {
 
 bool is_physical(const Eigen::Matrix3d& inertia) {
   const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
-  return moments[0] > 0 && moments[2] <= moments[0] + moments[1];
+  return moments[0] > 0 && moments[2] <= (moments[0] + moments[1]) * (1 - 1e-9);
+}
+
+Eigen::Matrix3d made_physical(const Eigen::Matrix3d& inertia) {
+  if (is_physical(inertia)) return inertia;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(inertia);
+  Eigen::Vector3d moments = axes.eigenvalues();
+  moments[2] = (moments[0] + moments[1]) * (1 - 1e-6);
+  return axes.eigenvectors() * moments.asDiagonal() * axes.eigenvectors().transpose();
 }
 
 Figures read_figures(const std::filesystem::path& vehicle_file) {

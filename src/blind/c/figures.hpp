@@ -66,5 +66,7 @@ Figures drawn_figures(const Figures& nominal, std::uint64_t seed);
 
 /// Whether a body can have this inertia: no principal moment is above the sum of the others.
 bool is_physical(const Eigen::Matrix3d& inertia);
+/// The same, or with its largest principal moment cut to what a body can have.
+Eigen::Matrix3d made_physical(const Eigen::Matrix3d& inertia);
 
 }  // namespace flappy::blind::c

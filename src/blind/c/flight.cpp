@@ -32,7 +32,7 @@ std::string trouble(const Robot& robot, bool may_tumble) {
   return {};
 }
 
-Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path) {
+Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path, Length length) {
   if (flight >= Family::kFlights) throw io::InputError("flight " + std::to_string(flight) + ": accepted: 0 to 2");
   Robot robot(a, flight);
   const Figures& f = robot.figures();
@@ -40,9 +40,9 @@ Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path) {
   Pilot pilot(f, a.seed, flight);
   Sensors sensors(a, flight, robot, sensor_figures(a, robot));
   const double tick_s = f.hold_s;
-  const long before = std::lround(kTrim_s / tick_s), after = std::lround(Family::kFlight_s / tick_s);
+  const long before = std::lround(length.trim_s / tick_s), after = std::lround(length.flight_s / tick_s);
 
-  robot.mechanism().place(programme.start_W(), Eigen::Quaterniond(Eigen::AngleAxisd(programme.target(-kTrim_s).heading_rad, Eigen::Vector3d::UnitZ())));
+  robot.mechanism().place(programme.start_W(), Eigen::Quaterniond(Eigen::AngleAxisd(programme.target(-length.trim_s).heading_rad, Eigen::Vector3d::UnitZ())));
   Flown flown;
   flightlog::CommandStream& commands = flown.flight.log.command;
   double end_s = 0;

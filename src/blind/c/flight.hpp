@@ -7,8 +7,10 @@
 
 namespace flappy::blind::c {
 
-/// The robot trims itself for so long before a log begins.
-inline constexpr double kTrim_s = 5;
+/// The robot trims itself for so long before a log begins, which lasts for so long.
+struct Length {
+  double trim_s = 5, flight_s = Family::kFlight_s;
+};
 
 struct Flown {
   FamilyFlight flight;
@@ -16,7 +18,7 @@ struct Flown {
   std::vector<Motion> path;  ///< pose and motion at the start of each step with the acceleration in it, and of the end
 };
 
-Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path = false);
+Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path = false, Length length = {});
 
 /// Phase of the beat from 0 to 1; one begins at t = 0.
 double beat_phase(double t_s, double flapping_Hz);

@@ -21,7 +21,7 @@ namespace flappy::blind::c {
 
 /// What effects change of the bodies, drawn once for a robot.
 struct Build {
-  double damage = 0;                     ///< share of the area
+  double damage = 0;                     ///< share of the outer ellipse's area
   std::size_t damaged = 0;               ///< side
   double backlash_rad = 0;               ///< 0: the rotor is one with the stroke hinge
   double spar_stiffness_Nm_rad = 0;      ///< 0: rigid

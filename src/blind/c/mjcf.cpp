@@ -56,12 +56,12 @@ std::string wing_of(const Side& side, std::size_t number, const Build& build) {
   if (build.damage > 0 && number == build.damaged) {
     // area is cut off the outer ellipse: its inner end stays, and mass goes with area
     Strip& tip = strips.back();
-    const double half = tip.area * area / (M_PI * half_chord) / side.planform.length_m, share = build.damage / tip.area;
-    tip.radius -= half * share;
-    tip.area *= 1 - share;
-    body.mass_kg *= 1 - build.damage;
-    body.com_m.y() *= 1 - build.damage;
-    body.inertia_kg_m2 *= 1 - 2 * build.damage;
+    const double half = tip.area * area / (M_PI * half_chord) / side.planform.length_m, lost = build.damage * tip.area;
+    tip.radius -= half * build.damage;
+    tip.area -= lost;
+    body.mass_kg *= 1 - lost;
+    body.com_m.y() *= 1 - lost;
+    body.inertia_kg_m2 *= 1 - 2 * lost;
   }
   std::string text = inertial(body);
   for (std::size_t i = 0; i < strips.size(); ++i) {
@@ -93,7 +93,7 @@ std::string side_of(const Side& side, std::size_t number, const Build& build) {
   text += "<body name=\"" + name + "_edge\" pos=\"" + numbers(side.shoulder_m) + "\">\n" + inertial(side.leading_edge) +
           hinge(name + "_stroke", up, stops(side.stroke, 1) + (one ? rotor : std::string()));
   if (build.spar_stiffness_Nm_rad > 0)
-    text += hinge(name + "_spar", {out, 0, 0}, "stiffness=\"" + numbers({build.spar_stiffness_Nm_rad}) + "\" damping=\"" + numbers({build.spar_stiffness_Nm_rad * 3e-4}) + "\" ");
+    text += hinge(name + "_spar", {out, 0, 0}, "stiffness=\"" + numbers({build.spar_stiffness_Nm_rad}) + "\" damping=\"" + numbers({build.spar_stiffness_Nm_rad * 6e-4}) + "\" ");
   text += ellipsoid(name + "_edge", {0, 0, 0}, {1e-6, 1e-6, 1e-6}, {}) + "<body name=\"" + name + "_wing\">\n" +
           hinge(name + "_rotation", {0, 1, 0},
                 stops(side.rotation, build.stop_softness) + "damping=\"" + numbers({side.rotation.damping_Nm_s}) + "\" frictionloss=\"" + numbers({side.rotation.friction_Nm}) + "\" ") +

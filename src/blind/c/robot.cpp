@@ -15,6 +15,7 @@ Figures faulty(Figures f, const Sizes& sizes, std::uint64_t seed) {
     f.torso.inertia_kg_m2(0, axis) += way * product;
     f.torso.inertia_kg_m2(axis, 0) += way * product;
   }
+  f.torso.inertia_kg_m2 = made_physical(f.torso.inertia_kg_m2);
   const double shape = sizes[Effect::kWingInertia];
   for (Side& side : f.sides) {
     if (shape > 0) {
@@ -30,11 +31,11 @@ Figures faulty(Figures f, const Sizes& sizes, std::uint64_t seed) {
 Build build_of(const Sizes& sizes, std::uint64_t seed) {
   Random random(seed, "build");
   Build build;
-  build.damage = 0.05 * sizes[Effect::kWingDamage];
+  build.damage = 0.03 * sizes[Effect::kWingDamage];
   build.damaged = random.below(2);
   build.backlash_rad = kDegree * sizes[Effect::kGearBacklash];
   const double half_weight_Nm = 0.0611 * 0.0507;  // half of 12.4 g at the planform's centre of pressure
-  if (sizes[Effect::kSparBending] > 0) build.spar_stiffness_Nm_rad = half_weight_Nm / (kDegree * sizes[Effect::kSparBending]);
+  if (sizes[Effect::kSparBending] > 0) build.spar_stiffness_Nm_rad = half_weight_Nm / (0.5 * kDegree * sizes[Effect::kSparBending]);
   build.leg_mass_kg = 0.4e-3 * sizes[Effect::kLegFlexure];
   build.body_drag_m2 = 1.5e-3 * sizes[Effect::kBodyDrag];
   build.rotational_lift = sizes[Effect::kRotationalLift];
