@@ -17,7 +17,7 @@ const std::vector<FamilyEffect>& effect_table() {
       {"wake_capture", "20 % more air force at reversal, decaying over half a chord travelled", lift, {"stroke", "always"}},
       {"clap_and_fling", "25 % more air force on wings that part at no angle between them, decaying over 20 deg", lift, {"stroke", "amplitude"}},
       {"wing_flexibility", "outer part turned by 0.07 rad under 4e-4 N m about the hinge", {"force_z", "current"}, {"amplitude", "always"}},
-      {"wing_damage", "3 % of one wing's outer ellipse, at its tip: some 25 rad/s^2 of roll", {"torque_x", "torque_z", "current"}, {"always", "amplitude"}},
+      {"wing_damage", "5 % of one wing's outer ellipse, at its tip: some 24 rad/s^2 of roll", {"torque_x", "torque_z", "current"}, {"always", "amplitude"}},
       {"wind", "0.3 m/s level, with gusts of a third", {"force_x", "force_y", "torque_y"}, {"heading", "always"}},
       {"spring_hardening", "stiffness 10 %/rad^2, hyperbolic", {"force_z", "current"}, {"amplitude", "stroke"}},
       {"gear_backlash", "1 deg of play between rotor and wing", {"force_z", "current"}, {"stroke", "amplitude"}},

@@ -49,6 +49,7 @@ std::vector<double> observed(const std::vector<std::string>& names, const View& 
 }  // namespace
 
 FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssignment& rules, double trim_s) {
+  observed(rules.observation, {}, 0, 0, {}, {});  // refuses a part that it does not know before the work
   const std::size_t stream = 1000 + number;
   Robot robot(a, stream);
   const Figures& f = robot.figures();

@@ -24,9 +24,13 @@ std::string numbers(std::initializer_list<double> values) {
 std::string numbers(const Eigen::Vector3d& v) { return numbers({v.x(), v.y(), v.z()}); }
 
 std::string inertial(const RigidBody& body) {
-  const Eigen::Matrix3d& i = body.inertia_kg_m2;
-  return "<inertial pos=\"" + numbers(body.com_m) + "\" mass=\"" + numbers({body.mass_kg}) + "\" fullinertia=\"" +
-         numbers({i(0, 0), i(1, 1), i(2, 2), i(0, 1), i(0, 2), i(1, 2)}) + "\"/>\n";
+  // by principal axes of our own: MuJoCo's take products below 1e-12 kg m^2 for none
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(body.inertia_kg_m2);
+  Eigen::Matrix3d axes = principal.eigenvectors();
+  if (axes.determinant() < 0) axes.col(0) *= -1;
+  const Eigen::Quaterniond q(axes);
+  return "<inertial pos=\"" + numbers(body.com_m) + "\" mass=\"" + numbers({body.mass_kg}) + "\" quat=\"" +
+         numbers({q.w(), q.x(), q.y(), q.z()}) + "\" diaginertia=\"" + numbers(principal.eigenvalues()) + "\"/>\n";
 }
 
 /// An ellipsoid without mass or, where its coefficients are zero, air: it keeps MuJoCo from making a box of the body.

@@ -31,7 +31,7 @@ Figures faulty(Figures f, const Sizes& sizes, std::uint64_t seed) {
 Build build_of(const Sizes& sizes, std::uint64_t seed) {
   Random random(seed, "build");
   Build build;
-  build.damage = 0.03 * sizes[Effect::kWingDamage];
+  build.damage = 0.05 * sizes[Effect::kWingDamage];
   build.damaged = random.below(2);
   build.backlash_rad = kDegree * sizes[Effect::kGearBacklash];
   const double half_weight_Nm = 0.0611 * 0.0507;  // half of 12.4 g at the planform's centre of pressure

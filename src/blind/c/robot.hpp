@@ -14,6 +14,8 @@ namespace flappy::blind::c {
 class Robot {
  public:
   Robot(const Assignment& assignment, std::size_t flight);
+  Robot(const Robot&) = delete;  // drive and air look at its figures
+  Robot& operator=(const Robot&) = delete;
 
   const Figures& figures() const { return figures_; }
   const Sizes& sizes() const { return sizes_; }
