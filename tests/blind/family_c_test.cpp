@@ -12,9 +12,10 @@
 namespace flappy::blind::c {
 namespace {
 
-const std::filesystem::path kVehicle = std::filesystem::path(FLAPPY_SOURCE_DIR) / "configs/vehicles/hummingbird_nominal.toml";
+const std::filesystem::path kVehicle =
+    std::filesystem::path(FLAPPY_SOURCE_DIR) / "configs/vehicles/hummingbird_nominal.toml";
 // Long enough for all effects, short enough for all of them in a test.
-constexpr Length kShort = {0.3, 0.15};
+constexpr Length kShort = {0.1, 0.1};
 
 Assignment plain() {
   Assignment a;
@@ -30,7 +31,9 @@ Assignment with(const std::string& effect, double size) {
   return a;
 }
 
-flightlog::FlightLog short_log(const Assignment& a, std::size_t flight = 0) { return fly_one(a, flight, false, kShort).flight.log; }
+flightlog::FlightLog short_log(const Assignment& a, std::size_t flight = 0) {
+  return fly_one(a, flight, false, kShort).flight.log;
+}
 
 const Figures& nominal() {
   static const Figures figures = read_figures(kVehicle);
@@ -39,7 +42,8 @@ const Figures& nominal() {
 
 /// Motors and springs as those of a robot without effects.
 struct Bench {
-  explicit Bench(const Figures& f, double every_s = Mechanism::kStep_s) : figures(f), mechanism(figures, {}, every_s), drive(figures, Sizes({}), 1, 0), step_s(every_s) {}
+  explicit Bench(const Figures& f, double every_s = Mechanism::kStep_s)
+      : figures(f), mechanism(figures, {}, every_s), drive(figures, Sizes({}), 1, 0), step_s(every_s) {}
 
   /// Calls `each` after every step.
   template <class Each>
@@ -48,9 +52,13 @@ struct Bench {
     for (long i = 0; i < steps; ++i) {
       const double now_s = static_cast<double>(i) * step_s;
       if (i % tick == 0) drive.command(now_s, beat_voltages(inputs, beat_phase(now_s, figures.flapping_Hz), figures));
-      const auto torques = drive.torques(now_s, step_s, {mechanism.drive_angle(0), mechanism.drive_angle(1)}, {mechanism.drive_rate(0), mechanism.drive_rate(1)});
+      const auto torques = drive.torques(now_s, step_s, {mechanism.drive_angle(0), mechanism.drive_angle(1)},
+                                         {mechanism.drive_rate(0), mechanism.drive_rate(1)});
       const Motion still;
-      mechanism.step(torques, {-figures.sides[0].spring.positive_Nm_rad * mechanism.stroke(0), -figures.sides[1].spring.positive_Nm_rad * mechanism.stroke(1)}, {}, held ? &still : nullptr);
+      mechanism.step(torques,
+                     {-figures.sides[0].spring.positive_Nm_rad * mechanism.stroke(0),
+                      -figures.sides[1].spring.positive_Nm_rad * mechanism.stroke(1)},
+                     {}, held ? &still : nullptr);
       each(now_s);
       if (held) mechanism.move_torso(still);
     }
@@ -82,7 +90,8 @@ Momentum momentum(const Mechanism& mechanism) {
   const mjModel& m = mechanism.model();
   for (int body = 1; body < m.nbody; ++body) {
     mjtNum velocity[6];
-    mj_objectVelocity(&m, const_cast<mjData*>(&mechanism.data()), mjOBJ_BODY, body, velocity, 0);  // of the centre of mass
+    mj_objectVelocity(&m, const_cast<mjData*>(&mechanism.data()), mjOBJ_BODY, body, velocity,
+                      0);  // of the centre of mass
     const Eigen::Vector3d p = m.body_mass[body] * Eigen::Vector3d(velocity[3], velocity[4], velocity[5]);
     sum.linear += p;
     if (body > 1) sum.of_wings = std::max(sum.of_wings, p.norm());
@@ -133,7 +142,7 @@ TEST(FamilyC, FallsFreelyWithoutAir) {
   Mechanism mechanism(nominal(), {});
   mechanism.model().opt.density = mechanism.model().opt.viscosity = 0;
   const double before = momentum(mechanism).place.z();
-  for (int i = 0; i < 1000; ++i) mechanism.step({0, 0}, {0, 0}, {});
+  for (long i = 0; i < std::lround(0.1 / Mechanism::kStep_s); ++i) mechanism.step({0, 0}, {0, 0}, {});
   const double fallen = (before - momentum(mechanism).place.z()) / nominal().mass_kg();
   EXPECT_NEAR(fallen, 0.5 * 9.81 * 0.1 * 0.1, 1e-4);
 }
@@ -144,35 +153,36 @@ TEST(FamilyC, KeepsMomentumWithoutAirAndWeight) {
     mjOption& option = bench.mechanism.model().opt;
     option.density = option.viscosity = option.gravity[2] = 0;
     double wings = 0, all = 0;
-    bench.run({10, 0, 0, 0}, 0.05, false, [&](double) {
+    bench.run({10, 0, 0, 0}, 0.04, false, [&](double) {
       const Momentum now = momentum(bench.mechanism);
       wings = std::max(wings, now.of_wings);
       all = std::max(all, now.linear.norm());
     });
     EXPECT_GT(wings, 1e-4);  // kg m/s
-    printf("step %g all %g wings %g\n", step_s, all, wings);
     return all / wings;
   };
-  const double coarse = lost(1e-4), fine = lost(1e-5);
+  const double coarse = lost(Mechanism::kStep_s), fine = lost(Mechanism::kStep_s / 5);
   EXPECT_LT(fine, 0.02);
-  EXPECT_LT(fine, 0.2 * coarse);
+  EXPECT_LT(fine, 0.25 * coarse);
 }
 
 TEST(FamilyC, TenVoltsCarryTheWeightInSteps) {
   const double thrust = Bench(nominal()).thrust({10, 0, 0, 0});
   EXPECT_NEAR(thrust, 1.0, 0.03);
-  EXPECT_NEAR(Bench(nominal(), 5e-5).thrust({10, 0, 0, 0}), thrust, 0.01);
+  EXPECT_NEAR(Bench(nominal(), Mechanism::kStep_s / 2).thrust({10, 0, 0, 0}), thrust, 0.005);
 }
 
 TEST(FamilyC, SymmetricRobotFliesSymmetrically) {
   Figures f = nominal();
   const auto mirrored = [](RigidBody body) {
     body.com_m.y() *= -1;
-    for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}}) body.inertia_kg_m2(i, j) = body.inertia_kg_m2(j, i) = -body.inertia_kg_m2(i, j);
+    for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}})
+      body.inertia_kg_m2(i, j) = body.inertia_kg_m2(j, i) = -body.inertia_kg_m2(i, j);
     return body;
   };
   f.torso.com_m.y() = 0;
-  for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}}) f.torso.inertia_kg_m2(i, j) = f.torso.inertia_kg_m2(j, i) = 0;
+  for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}})
+    f.torso.inertia_kg_m2(i, j) = f.torso.inertia_kg_m2(j, i) = 0;
   f.sides[1].leading_edge = mirrored(f.sides[0].leading_edge);
   f.sides[1].wing = mirrored(f.sides[0].wing);
   Bench bench(f);
@@ -201,16 +211,16 @@ TEST(FamilyC, InputsTurnTheRobotAsPublished) {
   EXPECT_GT((turned({10, 0, 0, 0.1}) - none).z(), 0);
 }
 
-TEST(FamilyC, HoversForTenSeconds) {
+TEST(FamilyC, Hovers) {
   Assignment a = plain();
   a.hover = true;
   a.own_figures = true;
-  const FamilyFlight flight = make_family_c()->fly(a, 0);
+  const FamilyFlight flight = fly_one(a, 0, false, {1.5, 2}).flight;
   EXPECT_FALSE(flight.crashed) << flight.how;
-  EXPECT_EQ(flight.log.command.t_s.size(), 10000U);
+  EXPECT_EQ(flight.log.command.t_s.size(), 2000U);
   const flightlog::FlightLog again = flightlog::parse_flight_log(flightlog::flight_log_files(flight.log), "log");
   EXPECT_EQ(again.command, flight.log.command);
-  EXPECT_GT(flight.log.mocap.t_s.size(), 1200U);
+  EXPECT_GT(flight.log.mocap.t_s.size(), 250U);
   EXPECT_EQ(flight.log.header.ambient.walls.size(), 1U);
 }
 
@@ -219,7 +229,8 @@ TEST(FamilyC, EffectsOfNoSizeLeaveTheSameBytesAndOthersNot) {
   ASSERT_EQ(effects.size(), static_cast<std::size_t>(Effect::kCount));
   Assignment none = plain();
   for (const FamilyEffect& effect : effects) none.effects.emplace_back(effect.id, 0.0);
-  const std::array<flightlog::FlightLog, 3> without = {short_log(plain()), short_log(plain(), 1), short_log(plain(), 2)};
+  const std::array<flightlog::FlightLog, 3> without = {short_log(plain()), short_log(plain(), 1),
+                                                       short_log(plain(), 2)};
   EXPECT_EQ(short_log(none), without[0]);
   std::vector<int> same(effects.size());
   io::parallel_for(effects.size(), 2, [&](std::size_t i) {
@@ -228,13 +239,15 @@ TEST(FamilyC, EffectsOfNoSizeLeaveTheSameBytesAndOthersNot) {
   });
   for (std::size_t i = 0; i < effects.size(); ++i) {
     EXPECT_FALSE(same[i]) << effects[i].id;
-    EXPECT_FALSE(effects[i].typical.empty() || effects[i].channels.empty() || effects[i].regimes.empty()) << effects[i].id;
+    EXPECT_FALSE(effects[i].typical.empty() || effects[i].channels.empty() || effects[i].regimes.empty())
+        << effects[i].id;
   }
 }
 
 TEST(FamilyC, DriveLosesWhatItsEffectsTake) {
   const auto driven = [](const std::string& effect, double until_s) {
-    const Sizes sizes(effect.empty() ? std::vector<std::pair<std::string, double>>{} : std::vector<std::pair<std::string, double>>{{effect, 1}});
+    const Sizes sizes(effect.empty() ? std::vector<std::pair<std::string, double>>{}
+                                     : std::vector<std::pair<std::string, double>>{{effect, 1}});
     Drive drive(nominal(), sizes, 3, 0);
     drive.command(0, {5, -5});
     for (double t = 0; t < until_s; t += 1e-4) drive.torques(t, 1e-4, {0, 0}, {0, 0});
@@ -283,11 +296,14 @@ TEST(FamilyC, SensorsErrAsTheirEffectsSay) {
   EXPECT_EQ(late.imu, log.imu);
   EXPECT_EQ(late.header, log.header);
   // samples from before t = 0 arrive later by 5 ms: those that are in both logs are the same poses
-  const std::size_t more = static_cast<std::size_t>(std::find(late.mocap.x_m.begin(), late.mocap.x_m.end(), log.mocap.x_m[0]) - late.mocap.x_m.begin());
+  const std::size_t more = static_cast<std::size_t>(
+      std::find(late.mocap.x_m.begin(), late.mocap.x_m.end(), log.mocap.x_m[0]) - late.mocap.x_m.begin());
   ASSERT_LT(more, late.mocap.x_m.size());
   EXPECT_NEAR(late.mocap.t_s[more], log.mocap.t_s[0] + 5e-3, 1e-12);
   const flightlog::FlightLog tilted = short_log(with("mocap_tilt", 1)), offset = short_log(with("marker_offset", 1));
-  const auto place = [](const flightlog::FlightLog& of) { return Eigen::Vector3d(of.mocap.x_m[3], of.mocap.y_m[3], of.mocap.z_m[3]); };
+  const auto place = [](const flightlog::FlightLog& of) {
+    return Eigen::Vector3d(of.mocap.x_m[3], of.mocap.y_m[3], of.mocap.z_m[3]);
+  };
   EXPECT_NEAR((place(tilted) - place(log)).norm(), 0.01 * place(log).norm(), 0.01 * place(log).norm());
   EXPECT_GT((place(tilted) - place(log)).norm(), 1e-4);
   EXPECT_NEAR((place(offset) - place(log)).norm(), 2e-3, 1e-6);
@@ -296,13 +312,13 @@ TEST(FamilyC, SensorsErrAsTheirEffectsSay) {
 }
 
 TEST(FamilyC, ContrastIsWhatTheEffectDoes) {
-  const Length length = {0.3, 0.25};
+  const Length length = {0.12, 0.2};
   const auto mean = [&](const std::string& effect, double size) {
     const Contrast contrast = contrast_of(plain(), 0, effect, size, length);
-    EXPECT_EQ(contrast.beat_s.size(), 8U);
+    EXPECT_EQ(contrast.beat_s.size(), 6U);
     Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
     for (const auto& beat : contrast.change)
-      for (int channel = 0; channel < 6; ++channel) sum[channel] += beat[static_cast<std::size_t>(channel) * 5] / 8;
+      for (int channel = 0; channel < 6; ++channel) sum[channel] += beat[static_cast<std::size_t>(channel) * 5] / 6;
     return sum;
   };
   const auto com = mean("com_offset", 1);  // 1 mm under the weight: about 31 rad/s^2
@@ -318,7 +334,8 @@ TEST(FamilyC, ContrastIsWhatTheEffectDoes) {
 
 TEST(FamilyC, EscapeKeepsItsRules) {
   EscapeAssignment rules;
-  rules.observation = {"goal_rotation", "position_error", "velocity", "body_rate", "beat_phase", "time", "trim", "previous_action"};
+  rules.observation = {"goal_rotation", "position_error", "velocity", "body_rate",
+                       "beat_phase",    "time",           "trim",     "previous_action"};
   std::size_t width = 0, calls = 0;
   rules.policy = [&](const std::vector<double>& observation) {
     width = observation.size();
@@ -366,10 +383,12 @@ TEST(FamilyC, ConventionsChangeDeclarationsWithinTheirBounds) {
     EXPECT_LE(std::abs(l.imu.latency_s - (exact.imu.latency_s + half_s)), 0.5e-3 + 1e-12);
     EXPECT_LE(std::abs(l.mocap.latency_s - e.mocap.latency_s), 0.5e-3);
     EXPECT_LE((Eigen::Vector3d(l.imu.position_m.data()) - exact.imu.position_m).norm(), 2e-3 + 1e-12);
-    EXPECT_LE(Eigen::AngleAxisd(Eigen::Matrix3d(exact.imu.gyro_axes.inverse() * loose.imu.gyro_axes)).angle(), M_PI / 180 + 1e-9);
+    EXPECT_LE(Eigen::AngleAxisd(Eigen::Matrix3d(exact.imu.gyro_axes.inverse() * loose.imu.gyro_axes)).angle(),
+              M_PI / 180 + 1e-9);
     EXPECT_NEAR(l.imu.rate_hz / e.imu.rate_hz, 1, 0.01);
     EXPECT_NEAR(l.mocap.rate_hz / e.mocap.rate_hz, 1, 0.02);
-    for (const double ratio : {l.imu.gyro_noise_rad_s / e.imu.gyro_noise_rad_s, l.mocap.position_noise_m / e.mocap.position_noise_m}) {
+    for (const double ratio :
+         {l.imu.gyro_noise_rad_s / e.imu.gyro_noise_rad_s, l.mocap.position_noise_m / e.mocap.position_noise_m}) {
       EXPECT_GE(ratio, 0.7);
       EXPECT_LE(ratio, 1.5);
     }
@@ -392,13 +411,15 @@ TEST(FamilyC, DeclaredNoiseIsThatOfTheSamples) {
   const Robot robot(a, 0);
   const SensorFigures figures = sensor_figures(a, robot);
   Sensors sensors(a, 0, robot, figures);
-  for (int i = 0; i < 60000; ++i) sensors.after_step(robot, 1e-4 * i);
+  for (int i = 0; i < 120000; ++i) sensors.after_step(robot, robot.step_s() * i);
   flightlog::FlightLog log;
   sensors.finish(log, 1e9);
   double position = 0, attitude = 0;
   for (std::size_t i = 0; i < log.mocap.t_s.size(); ++i) {
-    position += log.mocap.x_m[i] * log.mocap.x_m[i] + log.mocap.y_m[i] * log.mocap.y_m[i] + log.mocap.z_m[i] * log.mocap.z_m[i];
-    attitude += 4 * (log.mocap.qx[i] * log.mocap.qx[i] + log.mocap.qy[i] * log.mocap.qy[i] + log.mocap.qz[i] * log.mocap.qz[i]);
+    position +=
+        log.mocap.x_m[i] * log.mocap.x_m[i] + log.mocap.y_m[i] * log.mocap.y_m[i] + log.mocap.z_m[i] * log.mocap.z_m[i];
+    attitude +=
+        4 * (log.mocap.qx[i] * log.mocap.qx[i] + log.mocap.qy[i] * log.mocap.qy[i] + log.mocap.qz[i] * log.mocap.qz[i]);
   }
   const double count = 3 * static_cast<double>(log.mocap.t_s.size());
   EXPECT_NEAR(std::sqrt(position / count) / figures.declared.mocap.position_noise_m, 1, 0.1);
@@ -415,7 +436,10 @@ TEST(FamilyC, FiguresAreDrawnApartAndPhysical) {
       EXPECT_GT(side.rotation.upper_rad, 0.6);
     }
     EXPECT_NE(drawn.sides[0].motor.resistance_ohm, drawn.sides[1].motor.resistance_ohm);
-    spread += Eigen::Vector3d(drawn.torso.mass_kg / nominal().torso.mass_kg - 1, drawn.sides[0].motor.resistance_ohm / 12.4 - 1, drawn.torso.com_m.x() - nominal().torso.com_m.x()).cwiseAbs2();
+    spread += Eigen::Vector3d(drawn.torso.mass_kg / nominal().torso.mass_kg - 1,
+                              drawn.sides[0].motor.resistance_ohm / 12.4 - 1,
+                              drawn.torso.com_m.x() - nominal().torso.com_m.x())
+                  .cwiseAbs2();
   }
   spread = (spread / count).cwiseSqrt();
   EXPECT_NEAR(spread[0], 0.03, 0.005);
@@ -449,10 +473,14 @@ TEST(FamilyC, RefusesWhatItDoesNotKnow) {
     return "";
   };
   const auto family = make_family_c();
-  EXPECT_EQ(refusal([&] { family->fly(with("wnid", 1), 0); }), "effect wnid: family C has no such effect; did you mean \"wind\"?");
-  EXPECT_EQ(refusal([&] { family->fly(with("wind", 4.5), 0); }), "effect wind: size 4.5 is out of range; accepted: a number from 0 to 4");
-  EXPECT_EQ(refusal([&] { family->fly(with("wind", std::nan("")), 0); }), "effect wind: size nan is out of range; accepted: a number from 0 to 4");
-  EXPECT_EQ(refusal([&] { family->contrast(plain(), 0, "wind", -1); }), "effect wind: size -1 is out of range; accepted: a number from 0 to 4");
+  EXPECT_EQ(refusal([&] { family->fly(with("wnid", 1), 0); }),
+            "effect wnid: family C has no such effect; did you mean \"wind\"?");
+  EXPECT_EQ(refusal([&] { family->fly(with("wind", 4.5), 0); }),
+            "effect wind: size 4.5 is out of range; accepted: a number from 0 to 4");
+  EXPECT_EQ(refusal([&] { family->fly(with("wind", std::nan("")), 0); }),
+            "effect wind: size nan is out of range; accepted: a number from 0 to 4");
+  EXPECT_EQ(refusal([&] { family->contrast(plain(), 0, "wind", -1); }),
+            "effect wind: size -1 is out of range; accepted: a number from 0 to 4");
   EXPECT_NE(refusal([&] { family->fly(plain(), 3); }).find("flight 3"), std::string::npos);
   EscapeAssignment rules;
   rules.observation = {"velocty"};

@@ -91,7 +91,8 @@ Wrench Air::act(Mechanism& mechanism, double step_s) {
       twist_rad_[side] += (1 - std::exp(-step_s / 1e-3)) * (bound - twist_rad_[side]);
       mechanism.twist(side, twist_rad_[side]);
     }
-    if (downwash_ > 0) stroke_rate_squared_ += (1 - std::exp(-step_s / 0.015)) / 2 * (rate * rate - stroke_rate_squared_);
+    if (downwash_ > 0)
+      stroke_rate_squared_ += (1 - std::exp(-step_s / 0.015)) / 2 * (rate * rate - stroke_rate_squared_);
   }
   const double weight = figures_->mass_kg() * Mechanism::kGravity_m_s2;
   if (wall_ > 0) {
@@ -101,13 +102,15 @@ Wrench Air::act(Mechanism& mechanism, double step_s) {
   if (tether_ > 0) {
     const Eigen::Vector3d at_B(0, 0, -0.01), at_W = torso.R_WB * at_B, from = torso.position_W + at_W - anchor_;
     const double lifted = tether_ * std::max(0.0, from.z());
-    const Eigen::Vector3d force(-lifted / 3 * Mechanism::kGravity_m_s2 * from.x(), -lifted / 3 * Mechanism::kGravity_m_s2 * from.y(), -lifted * Mechanism::kGravity_m_s2);
+    const Eigen::Vector3d force(-lifted / 3 * Mechanism::kGravity_m_s2 * from.x(),
+                                -lifted / 3 * Mechanism::kGravity_m_s2 * from.y(), -lifted * Mechanism::kGravity_m_s2);
     wrench.force_W += force;
     wrench.torque_W += at_W.cross(force);
   }
   if (downwash_ > 0) {
     const double sideways = torso.velocity_W.head<2>().norm() / 0.7;
-    wrench.force_W -= torso.R_WB.col(2) * (downwash_ * weight * stroke_rate_squared_ / kHoverRate2 / (1 + sideways * sideways));
+    wrench.force_W -=
+        torso.R_WB.col(2) * (downwash_ * weight * stroke_rate_squared_ / kHoverRate2 / (1 + sideways * sideways));
   }
   return wrench;
 }

@@ -26,7 +26,8 @@ class Air {
   const Figures* figures_;
   double ground_, ceiling_, wall_, wake_, clap_, flexibility_, wind_, tether_, downwash_;
   Random random_;
-  Eigen::Vector3d mean_wind_ = Eigen::Vector3d::Zero(), gust_ = Eigen::Vector3d::Zero(), anchor_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_wind_ = Eigen::Vector3d::Zero(), gust_ = Eigen::Vector3d::Zero(),
+                  anchor_ = Eigen::Vector3d::Zero();
   std::array<double, 2> travelled_m_{}, direction_{}, twist_rad_{};
   double stroke_rate_squared_ = 0;
   bool any_factor_;

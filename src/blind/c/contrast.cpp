@@ -19,7 +19,8 @@ struct Beats {
       counts.resize(beat + 1);
     }
     const double angle = 2 * M_PI * phase;
-    const std::array<double, 5> basis = {1, 2 * std::cos(angle), 2 * std::sin(angle), 2 * std::cos(2 * angle), 2 * std::sin(2 * angle)};
+    const std::array<double, 5> basis = {1, 2 * std::cos(angle), 2 * std::sin(angle), 2 * std::cos(2 * angle),
+                                         2 * std::sin(2 * angle)};
     for (std::size_t channel = 0; channel < 6; ++channel)
       for (std::size_t i = 0; i < 5; ++i) sums[beat][channel * 5 + i] += basis[i] * value[static_cast<int>(channel)];
     ++counts[beat];
@@ -32,7 +33,8 @@ Beats replayed(const Assignment& a, std::size_t flight, const Flown& flown, Leng
   robot.mechanism().move_torso(flown.path.front());
   Beats beats;
   std::size_t step = 0;
-  const std::size_t before = static_cast<std::size_t>(std::lround(length.trim_s / robot.figures().hold_s)) * robot.steps_per_tick();
+  const std::size_t before =
+      static_cast<std::size_t>(std::lround(length.trim_s / robot.figures().hold_s)) * robot.steps_per_tick();
   for (const std::array<double, 2>& voltages : flown.voltages) {
     robot.tick_held(voltages, &flown.path[step], [&] {
       if (step >= before && robot.is_finite()) {
@@ -68,7 +70,9 @@ Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string&
     if (static_cast<double>(beat + 1) / flapping_Hz > end_s + 1e-3) break;  // only whole beats
     contrast.beat_s.push_back(static_cast<double>(beat) / flapping_Hz);
     std::array<double, 30>& change = contrast.change.emplace_back();
-    for (std::size_t i = 0; i < 30; ++i) change[i] = changed.sums[beat][i] / std::max(1.0, changed.counts[beat]) - plain.sums[beat][i] / std::max(1.0, plain.counts[beat]);
+    for (std::size_t i = 0; i < 30; ++i)
+      change[i] = changed.sums[beat][i] / std::max(1.0, changed.counts[beat]) -
+                  plain.sums[beat][i] / std::max(1.0, plain.counts[beat]);
   }
   return contrast;
 }

@@ -5,6 +5,7 @@
 
 namespace flappy::blind::c {
 
-Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double size, Length length = {});
+Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double size,
+                     Length length = {});
 
 }  // namespace flappy::blind::c

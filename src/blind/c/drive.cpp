@@ -7,7 +7,7 @@ namespace {
 
 constexpr double kCopper_1_K = 0.00393;  // temperature coefficient of copper's resistance (effect catalogue)
 constexpr double kWindingToAir_K_W = 45, kWinding_J_K = 0.35;  // of a coreless motor 6 mm across; typical, not measured
-constexpr double kHover_A = 0.19;         // drawn from the battery by a nominal robot that hovers
+constexpr double kHover_A = 0.19;                              // drawn from the battery by a nominal robot that hovers
 constexpr double kInternal_ohm = 1.2, kBuffer_s = 5e-3;
 
 }  // namespace
@@ -26,7 +26,8 @@ std::array<double, 2> beat_voltages(const Inputs& in, double phase, const Figure
     const double sign = side == 0 ? 1 : -1, first = 0.5 - sign * in.split_cycle;
     const double half = phase < first ? phase / first : 1 + (phase - first) / (1 - first);  // of a period of two
     const double limit = f.sides[side].motor.voltage_limit_V;
-    volts[side] = std::clamp((in.amplitude_V + sign * in.difference_V) * std::cos(M_PI * half) + in.bias_V, -limit, limit);
+    volts[side] =
+        std::clamp((in.amplitude_V + sign * in.difference_V) * std::cos(M_PI * half) + in.bias_V, -limit, limit);
   }
   return volts;
 }
@@ -51,7 +52,8 @@ void Drive::command(double now_s, const std::array<double, 2>& voltages) {
   waiting_.push_back({now_s + delay_s_ + jitter_s_ * random_.uniform(), voltages});
 }
 
-std::array<double, 2> Drive::torques(double now_s, double step_s, const std::array<double, 2>& angles, const std::array<double, 2>& rates) {
+std::array<double, 2> Drive::torques(double now_s, double step_s, const std::array<double, 2>& angles,
+                                     const std::array<double, 2>& rates) {
   while (!waiting_.empty() && waiting_.front().from_s <= now_s + 1e-9) {
     applied_ = waiting_.front().voltages;
     waiting_.erase(waiting_.begin());
@@ -71,11 +73,13 @@ std::array<double, 2> Drive::torques(double now_s, double step_s, const std::arr
     volts *= battery_V_ / kBattery_V;
     if (shared_ohm_ > 0) volts *= 1 - std::min(0.5, shared_ohm_ * bus_A_ / kBattery_V);
     const double gear = motor.gear_ratio * (1 + eccentricity_ * std::sin(6 * angles[side] + gear_phase_[side]));
-    const double constant = motor.torque_constant_Nm_A * (1 + ripple_ * std::cos(2 * motor.gear_ratio * angles[side] + gear_phase_[side]));
+    const double constant =
+        motor.torque_constant_Nm_A * (1 + ripple_ * std::cos(2 * motor.gear_ratio * angles[side] + gear_phase_[side]));
     const double resistance = motor.resistance_ohm * (1 + kCopper_1_K * warmth_K_[side]);
     const double current = (volts - constant * gear * rates[side]) / resistance;
     if (heating_ > 0)
-      warmth_K_[side] += step_s / kWinding_J_K * (heating_ * current * current * resistance - warmth_K_[side] / kWindingToAir_K_W);
+      warmth_K_[side] +=
+          step_s / kWinding_J_K * (heating_ * current * current * resistance - warmth_K_[side] / kWindingToAir_K_W);
     voltages_[side] = volts;
     currents_[side] = current;
     torques[side] = gear * motor.efficiency * constant * current;
@@ -86,7 +90,8 @@ std::array<double, 2> Drive::torques(double now_s, double step_s, const std::arr
   if (sag_ > 0) {
     load_A_ += step_s / kBuffer_s * (drawn_A - load_A_);
     charge_As_ += step_s * load_A_;
-    battery_V_ = kBattery_V * std::max(0.3, 1 - sag_ * 0.05 * charge_As_ / (60 * kHover_A)) - sag_ * kInternal_ohm * load_A_;
+    battery_V_ =
+        kBattery_V * std::max(0.3, 1 - sag_ * 0.05 * charge_As_ / (60 * kHover_A)) - sag_ * kInternal_ohm * load_A_;
   }
   return torques;
 }

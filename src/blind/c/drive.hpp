@@ -33,7 +33,8 @@ class Drive {
   /// The driver's update.
   void command(double now_s, const std::array<double, 2>& voltages);
   /// Torques behind the gears over the next step of `step_s`.
-  std::array<double, 2> torques(double now_s, double step_s, const std::array<double, 2>& angles, const std::array<double, 2>& rates);
+  std::array<double, 2> torques(double now_s, double step_s, const std::array<double, 2>& angles,
+                                const std::array<double, 2>& rates);
   const std::array<double, 2>& currents() const { return currents_; }
   /// At the motors, after all losses.
   const std::array<double, 2>& voltages() const { return voltages_; }

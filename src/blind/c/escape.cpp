@@ -17,18 +17,24 @@ namespace {
 
 const Eigen::Vector3d kGoal_W(0, 0, 1);
 
-bool within(const EscapeAssignment::Bounds& bounds, const Eigen::Vector3d& from_goal, const Eigen::Vector3d& velocity, const Eigen::Vector3d& rate, const Eigen::Matrix3d& R) {
+bool within(const EscapeAssignment::Bounds& bounds, const Eigen::Vector3d& from_goal, const Eigen::Vector3d& velocity,
+            const Eigen::Vector3d& rate, const Eigen::Matrix3d& R) {
   // a bound that is not positive is none
   const auto holds = [](double value, double bound) { return !(bound > 0) || value < bound; };
-  return holds(from_goal.norm(), bounds.distance_m) && holds(velocity.norm(), bounds.speed_m_s) && holds(rate.norm(), bounds.body_rate_rad_s) &&
-         holds(std::acos(std::clamp(R(2, 2), -1.0, 1.0)), bounds.tilt_rad) && holds(std::abs(heading_of(R)), bounds.heading_rad);
+  return holds(from_goal.norm(), bounds.distance_m) && holds(velocity.norm(), bounds.speed_m_s) &&
+         holds(rate.norm(), bounds.body_rate_rad_s) &&
+         holds(std::acos(std::clamp(R(2, 2), -1.0, 1.0)), bounds.tilt_rad) &&
+         holds(std::abs(heading_of(R)), bounds.heading_rad);
 }
 
-std::vector<double> observed(const std::vector<std::string>& names, const View& view, double phase, double t_s, const Inputs& trim, const std::array<double, 4>& previous) {
+std::vector<double> observed(const std::vector<std::string>& names, const View& view, double phase, double t_s,
+                             const Inputs& trim, const std::array<double, 4>& previous) {
   std::vector<double> all;
   const auto add = [&](std::initializer_list<double> values) { all.insert(all.end(), values); };
   const auto add3 = [&](const Eigen::Vector3d& v) { add({v.x(), v.y(), v.z()}); };
-  static const std::vector<std::string> known = {"goal_rotation", "rotation_matrix", "position_error", "velocity", "body_rate", "heading_error", "beat_phase", "time", "trim", "previous_action"};
+  static const std::vector<std::string> known = {"goal_rotation", "rotation_matrix", "position_error", "velocity",
+                                                 "body_rate",     "heading_error",   "beat_phase",     "time",
+                                                 "trim",          "previous_action"};
   for (const std::string& name : names) {
     if (name == "goal_rotation") add3(rotation_between(view.R_WB, Eigen::Matrix3d::Identity()));
     else if (name == "rotation_matrix")
@@ -58,7 +64,8 @@ FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssi
   Sensors sensors(a, stream, robot, sensor_figures(a, robot));
   Random random(a.seed, "escape", number);
   Eigen::Vector3d start;
-  for (std::size_t i = 0; i < 3; ++i) start[static_cast<int>(i)] = rules.start_m[i] + rules.start_half_m[i] * random.uniform(-1, 1);
+  for (std::size_t i = 0; i < 3; ++i)
+    start[static_cast<int>(i)] = rules.start_m[i] + rules.start_half_m[i] * random.uniform(-1, 1);
   start.x() = std::clamp(start.x(), rules.x_low_m, rules.x_high_m);
   const double heading = rules.heading_rad + rules.heading_half_rad * random.uniform(-1, 1);
 
@@ -68,7 +75,8 @@ FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssi
   target.heading_rad = heading;
   robot.mechanism().place(target.position_W, Eigen::Quaterniond(Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ())));
   const double until_s = rules.keep_until_s > 0 ? rules.keep_until_s : 3;
-  const long before = std::lround(trim_s / tick_s), after = std::lround(until_s / tick_s), period = std::max(1L, std::lround(rules.action_period_s / tick_s));
+  const long before = std::lround(trim_s / tick_s), after = std::lround(until_s / tick_s),
+             period = std::max(1L, std::lround(rules.action_period_s / tick_s));
   Inputs trim, mean_trim;
   std::array<double, 4> action{};
   bool policy_flies = true, kept = true;
@@ -93,11 +101,15 @@ FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssi
     pilot.look(robot.mechanism().motion(), tick_s);
     const View& view = pilot.view();
     Inputs inputs;
-    if (tick >= 0 && policy_flies && (t_s >= rules.hand_back_at_s || (tick > 0 && within(rules.hand_back, view.position_W - kGoal_W, view.velocity_W, view.rate_B, view.R_WB))))
+    if (tick >= 0 && policy_flies &&
+        (t_s >= rules.hand_back_at_s ||
+         (tick > 0 && within(rules.hand_back, view.position_W - kGoal_W, view.velocity_W, view.rate_B, view.R_WB))))
       policy_flies = false;
     if (tick >= 0 && policy_flies) {
       if (tick % period == 0) action = rules.policy(observed(rules.observation, view, phase, t_s, trim, action));
-      inputs = clipped({trim.amplitude_V + action[0], trim.difference_V + action[1], trim.bias_V + action[2], trim.split_cycle + action[3]}, f);
+      inputs = clipped({trim.amplitude_V + action[0], trim.difference_V + action[1], trim.bias_V + action[2],
+                        trim.split_cycle + action[3]},
+                       f);
     } else {
       inputs = pilot.fly(target, tick_s);
       const Inputs now = pilot.trim();  // of the last second, about
@@ -120,8 +132,12 @@ FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssi
     if (tick < 0) continue;
     const Motion now = robot.mechanism().motion();
     const Eigen::Vector3d from_goal = now.position_W - kGoal_W;
-    if (escape.captured_s == 0 && end_s <= rules.capture_by_s + 1e-9 && within(rules.capture, from_goal, now.velocity_W, now.rate_B, now.R_WB)) escape.captured_s = end_s;
-    if (end_s >= rules.keep_from_s && end_s <= rules.keep_until_s + 1e-9 && !within(rules.keep, from_goal, now.velocity_W, now.rate_B, now.R_WB)) kept = false;
+    if (escape.captured_s == 0 && end_s <= rules.capture_by_s + 1e-9 &&
+        within(rules.capture, from_goal, now.velocity_W, now.rate_B, now.R_WB))
+      escape.captured_s = end_s;
+    if (end_s >= rules.keep_from_s && end_s <= rules.keep_until_s + 1e-9 &&
+        !within(rules.keep, from_goal, now.velocity_W, now.rate_B, now.R_WB))
+      kept = false;
   }
   escape.success = !escape.crashed && escape.captured_s > 0 && kept;
   sensors.finish(escape.log, end_s);

@@ -5,6 +5,7 @@
 
 namespace flappy::blind::c {
 
-FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssignment& rules, double trim_s = Length{}.trim_s);
+FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssignment& rules,
+                       double trim_s = Length{}.trim_s);
 
 }  // namespace flappy::blind::c

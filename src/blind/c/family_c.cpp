@@ -13,8 +13,12 @@ class FamilyC final : public Family {
   std::string name() const override { return "C"; }
   const std::vector<FamilyEffect>& effects() const override { return effect_table(); }
   FamilyFlight fly(const Assignment& a, std::size_t flight) const override { return fly_one(a, flight).flight; }
-  Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const override { return contrast_of(a, flight, effect, size); }
-  FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const override { return escape_of(a, number, rules); }
+  Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const override {
+    return contrast_of(a, flight, effect, size);
+  }
+  FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const override {
+    return escape_of(a, number, rules);
+  }
 };
 
 }  // namespace

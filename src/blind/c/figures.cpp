@@ -26,7 +26,9 @@ RigidBody read_body(const io::Table& at, const char* key) {
                zz = inertia.number("zz", io::positive()), xy = inertia.number("xy"), yz = inertia.number("yz"),
                xz = inertia.number("xz");
   read.inertia_kg_m2 << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-  if (!is_physical(read.inertia_kg_m2)) body.fail("inertia_kg_m2", "no body has this inertia", "principal moments none of which is above the sum of the others");
+  if (!is_physical(read.inertia_kg_m2))
+    body.fail("inertia_kg_m2", "no body has this inertia",
+              "principal moments none of which is above the sum of the others");
   return read;
 }
 
@@ -37,17 +39,19 @@ Hinge read_hinge(const io::Table& at, const char* key) {
 }
 
 Side read_side(const io::Table& root, const char* key) {
-  const io::Table at = root.table(key), motor = at.table("motor"), spring = at.table("spring"), plan = at.table("planform");
+  const io::Table at = root.table(key), motor = at.table("motor"), spring = at.table("spring"),
+                  plan = at.table("planform");
   Side side;
   side.leading_edge = read_body(at, "leading_edge");
   side.wing = read_body(at, "wing");
   side.shoulder_m = read_vector(at, "shoulder_m");
   side.stroke = read_hinge(at, "stroke");
   side.rotation = read_hinge(at, "rotation");
-  side.motor = {motor.number("resistance_ohm", io::positive()),       motor.number("torque_constant_Nm_A", io::positive()),
-                motor.number("gear_ratio", io::positive()),           motor.number("efficiency", io::positive(1)),
-                motor.number("friction_Nm", io::non_negative()),      motor.number("damping_Nm_s", io::non_negative()),
-                motor.number("rotor_inertia_kg_m2", io::positive()),  motor.number("voltage_limit_V", io::positive())};
+  side.motor = {
+      motor.number("resistance_ohm", io::positive()),      motor.number("torque_constant_Nm_A", io::positive()),
+      motor.number("gear_ratio", io::positive()),          motor.number("efficiency", io::positive(1)),
+      motor.number("friction_Nm", io::non_negative()),     motor.number("damping_Nm_s", io::non_negative()),
+      motor.number("rotor_inertia_kg_m2", io::positive()), motor.number("voltage_limit_V", io::positive())};
   side.spring = {spring.number("stiffness_positive_Nm_rad", io::non_negative()),
                  spring.number("stiffness_negative_Nm_rad", io::non_negative()), spring.number("rest_angle_rad")};
   side.planform = {plan.number("wing_length_m", io::positive()), plan.number("mean_chord_m", io::positive()),
@@ -67,7 +71,8 @@ Eigen::Matrix3d drawn_inertia(const Eigen::Matrix3d& nominal, double mass_factor
       drawn(i, i) *= 1 + 0.07 * random.cut_normal();
       for (int j = 0; j < i; ++j) {
         drawn(i, j) += 0.07 * drawn(i, j) * random.cut_normal();
-        drawn(i, j) += 0.01 * std::sqrt(drawn(i, i) * drawn(j, j) / (mean * mean)) * std::min(drawn(i, i), drawn(j, j)) * random.cut_normal();
+        drawn(i, j) += 0.01 * std::sqrt(drawn(i, i) * drawn(j, j) / (mean * mean)) *
+                       std::min(drawn(i, i), drawn(j, j)) * random.cut_normal();
         drawn(j, i) = drawn(i, j);
       }
     }
@@ -115,7 +120,8 @@ double Figures::mass_kg() const {
 }
 
 bool is_physical(const Eigen::Matrix3d& inertia) {
-  const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector3d moments =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
   return moments[0] > 0 && moments[2] <= (moments[0] + moments[1]) * (1 - 1e-9);
 }
 

@@ -1,12 +1,11 @@
 // All figures of one robot of family C: those of the vehicle's file, or drawn about them.
 #pragma once
 
+#include <Eigen/Dense>
 #include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
-
-#include <Eigen/Dense>
 
 namespace flappy::blind::c {
 
@@ -22,8 +21,8 @@ struct Hinge {
 
 /// Friction, damping and inertia on the motor's side of the gear.
 struct Motor {
-  double resistance_ohm = 0, torque_constant_Nm_A = 0, gear_ratio = 0, efficiency = 0, friction_Nm = 0, damping_Nm_s = 0,
-         rotor_inertia_kg_m2 = 0, voltage_limit_V = 0;
+  double resistance_ohm = 0, torque_constant_Nm_A = 0, gear_ratio = 0, efficiency = 0, friction_Nm = 0,
+         damping_Nm_s = 0, rotor_inertia_kg_m2 = 0, voltage_limit_V = 0;
 };
 
 struct Spring {
@@ -50,8 +49,8 @@ struct Side {
 
 struct Figures {
   std::string file_name;
-  double density_kg_m3 = 0, flapping_Hz = 0, hold_s = 0, amplitude_limit_V = 0, difference_limit_V = 0, bias_limit_V = 0,
-         split_cycle_limit = 0, below_m = 0, above_m = 0, around_m = 0;
+  double density_kg_m3 = 0, flapping_Hz = 0, hold_s = 0, amplitude_limit_V = 0, difference_limit_V = 0,
+         bias_limit_V = 0, split_cycle_limit = 0, below_m = 0, above_m = 0, around_m = 0;
   RigidBody torso;
   std::array<Side, 2> sides;  ///< left, right
 

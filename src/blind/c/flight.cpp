@@ -7,7 +7,8 @@ double beat_phase(double t_s, double flapping_Hz) {
   return std::max(0.0, beats - std::floor(beats) - 1e-9);
 }
 
-void add_command(flightlog::CommandStream& commands, double t_s, const std::array<double, 2>& voltages, const Inputs& inputs, double phase) {
+void add_command(flightlog::CommandStream& commands, double t_s, const std::array<double, 2>& voltages,
+                 const Inputs& inputs, double phase) {
   if (!commands.inputs) commands.inputs.emplace();
   if (!commands.phase_rad) commands.phase_rad.emplace();
   commands.t_s.push_back(t_s);
@@ -42,7 +43,9 @@ Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path, Length le
   const double tick_s = f.hold_s;
   const long before = std::lround(length.trim_s / tick_s), after = std::lround(length.flight_s / tick_s);
 
-  robot.mechanism().place(programme.start_W(), Eigen::Quaterniond(Eigen::AngleAxisd(programme.target(-length.trim_s).heading_rad, Eigen::Vector3d::UnitZ())));
+  robot.mechanism().place(
+      programme.start_W(),
+      Eigen::Quaterniond(Eigen::AngleAxisd(programme.target(-length.trim_s).heading_rad, Eigen::Vector3d::UnitZ())));
   Flown flown;
   flightlog::CommandStream& commands = flown.flight.log.command;
   double end_s = 0;
@@ -51,8 +54,8 @@ Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path, Length le
     const double t_s = static_cast<double>(tick) * tick_s;
     pilot.look(robot.mechanism().motion(), tick_s);
     const Inputs piloted = pilot.fly(programme.target(t_s), tick_s), more = programme.excitation(t_s);
-    const Inputs inputs = clipped({piloted.amplitude_V + more.amplitude_V, piloted.difference_V + more.difference_V, piloted.bias_V + more.bias_V,
-                                   piloted.split_cycle + more.split_cycle},
+    const Inputs inputs = clipped({piloted.amplitude_V + more.amplitude_V, piloted.difference_V + more.difference_V,
+                                   piloted.bias_V + more.bias_V, piloted.split_cycle + more.split_cycle},
                                   f);
     const double phase = beat_phase(t_s, f.flapping_Hz);
     const std::array<double, 2> voltages = beat_voltages(inputs, phase, f);

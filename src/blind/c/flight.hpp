@@ -23,7 +23,8 @@ Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path = false, L
 /// Phase of the beat from 0 to 1; one begins at t = 0.
 double beat_phase(double t_s, double flapping_Hz);
 /// A row of the log's commands, with the inputs.
-void add_command(flightlog::CommandStream& commands, double t_s, const std::array<double, 2>& voltages, const Inputs& inputs, double phase);
+void add_command(flightlog::CommandStream& commands, double t_s, const std::array<double, 2>& voltages,
+                 const Inputs& inputs, double phase);
 /// What the robot has run into, or that it is upside down; empty if nothing.
 std::string trouble(const Robot& robot, bool may_tumble);
 

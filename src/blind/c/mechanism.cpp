@@ -15,7 +15,8 @@ mjModel* compiled(const std::string& text) {
   const auto files = std::make_unique<mjVFS>();
   mj_defaultVFS(files.get());
   const char* name = "flapper.xml";
-  if (mj_makeEmptyFileVFS(files.get(), name, static_cast<int>(text.size())) != 0) throw std::runtime_error("family C: no room for a model");
+  if (mj_makeEmptyFileVFS(files.get(), name, static_cast<int>(text.size())) != 0)
+    throw std::runtime_error("family C: no room for a model");
   std::memcpy(files->filedata[mj_findFileVFS(files.get(), name)], text.data(), text.size());
   char error[1000] = "";
   mjModel* model = mj_loadXML(name, files.get(), error, sizeof error);
@@ -36,15 +37,19 @@ Mechanism::Mechanism(const Figures& figures, const Build& build, double step_s)
   mjModel& m = *model_;
   const std::array<std::string, 2> names = {"left", "right"};
   for (std::size_t side = 0; side < 2; ++side) {
-    const auto joint = [&](const std::string& what) { return mj_name2id(&m, mjOBJ_JOINT, (names[side] + what).c_str()); };
-    const int stroke = joint("_stroke"), rotation = joint("_rotation"), rotor = joint("_rotor"), drive = rotor < 0 ? stroke : rotor;
+    const auto joint = [&](const std::string& what) {
+      return mj_name2id(&m, mjOBJ_JOINT, (names[side] + what).c_str());
+    };
+    const int stroke = joint("_stroke"), rotation = joint("_rotation"), rotor = joint("_rotor"),
+              drive = rotor < 0 ? stroke : rotor;
     stroke_q_[side] = m.jnt_qposadr[stroke];
     stroke_v_[side] = m.jnt_dofadr[stroke];
     rotation_q_[side] = m.jnt_qposadr[rotation];
     rotation_v_[side] = m.jnt_dofadr[rotation];
     drive_q_[side] = m.jnt_qposadr[drive];
     drive_v_[side] = m.jnt_dofadr[drive];
-    for (std::size_t i = 0; i < kStrips; ++i) strips_[side][i] = mj_name2id(&m, mjOBJ_GEOM, (names[side] + "_strip_" + std::to_string(i)).c_str());
+    for (std::size_t i = 0; i < kStrips; ++i)
+      strips_[side][i] = mj_name2id(&m, mjOBJ_GEOM, (names[side] + "_strip_" + std::to_string(i)).c_str());
     std::memcpy(strip_quat_[side].data(), m.geom_quat + 4 * strips_[side].back(), sizeof strip_quat_[side]);
   }
   // What stands for no air has no virtual mass either.
@@ -68,7 +73,9 @@ Motion Mechanism::motion() const {
   return now;
 }
 
-Eigen::Vector3d Mechanism::strip_position(std::size_t side, std::size_t strip) const { return vector_of(data_->geom_xpos + 3 * strips_[side][strip]); }
+Eigen::Vector3d Mechanism::strip_position(std::size_t side, std::size_t strip) const {
+  return vector_of(data_->geom_xpos + 3 * strips_[side][strip]);
+}
 
 bool Mechanism::is_finite() const {
   for (int i = 0; i < model_->nv; ++i)
@@ -97,16 +104,21 @@ void Mechanism::set_stroke(std::size_t side, double angle_rad, double rate_rad_s
 
 void Mechanism::set_wind(const Eigen::Vector3d& wind_W) { vector_at(model_->opt.wind) = wind_W; }
 
-void Mechanism::scale_air(std::size_t side, std::size_t strip, double factor) { model_->geom_fluid[mjNFLUID * strips_[side][strip]] = factor; }
+void Mechanism::scale_air(std::size_t side, std::size_t strip, double factor) {
+  model_->geom_fluid[mjNFLUID * strips_[side][strip]] = factor;
+}
 
 void Mechanism::twist(std::size_t side, double angle_rad) {
   const double by[4] = {std::cos(angle_rad / 2), 0, std::sin(angle_rad / 2), 0};
   mju_mulQuat(model_->geom_quat + 4 * strips_[side].back(), by, strip_quat_[side].data());
 }
 
-void Mechanism::set_friction(std::size_t side, double torque_Nm) { model_->dof_frictionloss[drive_v_[side]] = torque_Nm; }
+void Mechanism::set_friction(std::size_t side, double torque_Nm) {
+  model_->dof_frictionloss[drive_v_[side]] = torque_Nm;
+}
 
-void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<double, 2>& spring_Nm, const Wrench& wrench, const Motion* held) {
+void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<double, 2>& spring_Nm,
+                     const Wrench& wrench, const Motion* held) {
   mjModel* m = model_.get();
   mjData* d = data_.get();
   mj_step1(m, d);
@@ -137,7 +149,8 @@ void Mechanism::add_virtual_mass() {
       const mjtNum* fluid = m->geom_fluid + mjNFLUID * geom;
       const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(d->geom_xmat + 9 * geom);
       const double scale = added_mass_ * m->opt.density * fluid[0];
-      const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> v = R.transpose() * along, w = R.transpose() * about;
+      const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> v = R.transpose() * along,
+                                                                             w = R.transpose() * about;
       const Eigen::Vector3d mass = scale * vector_of(fluid + 6), moment = scale * vector_of(fluid + 9);
       for (int i = 0; i < nv; ++i) {
         int at = m->dof_Madr[i];
@@ -161,7 +174,8 @@ void Mechanism::hold_torso(const Motion& held) {
   Eigen::Matrix<double, 6, 1> change;
   change.head<3>() = held.acceleration_W - vector_of(d->qacc);
   change.tail<3>() = held.turning_B - vector_of(d->qacc + 3);
-  const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 32, 1> other = M.bottomRightCorner(rest, rest).ldlt().solve(-M.bottomLeftCorner(rest, 6) * change);
+  const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 32, 1> other =
+      M.bottomRightCorner(rest, rest).ldlt().solve(-M.bottomLeftCorner(rest, 6) * change);
   for (int i = 0; i < rest; ++i) {
     d->qvel[6 + i] += m->opt.timestep * other[i];
     d->qpos[7 + i] += m->opt.timestep * m->opt.timestep * other[i];  // every joint after the first is a hinge

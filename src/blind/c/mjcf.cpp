@@ -6,7 +6,7 @@ namespace flappy::blind::c {
 namespace {
 
 constexpr double kViscosity_Pa_s = 1.82e-5;  // air at 20 degC
-constexpr double kThickness_m = 0.2e-3;      // half of the ellipsoids'; it matters for nothing but their edges' projection
+constexpr double kThickness_m = 0.2e-3;  // half of the ellipsoids'; it matters for nothing but their edges' projection
 // A stop gives under load as a spring that is the stiffer the heavier what runs into it: MuJoCo's constraints are set by their time.
 // The rotation's stop of the nominal robot gives by some 2 deg in mid-stroke.
 constexpr double kStopTime_s = 0.5e-3, kStopDamping = 0.7, kStopImpedance = 0.8;
@@ -34,9 +34,11 @@ std::string inertial(const RigidBody& body) {
 }
 
 /// An ellipsoid without mass or, where its coefficients are zero, air: it keeps MuJoCo from making a box of the body.
-std::string ellipsoid(const std::string& name, const Eigen::Vector3d& at, const Eigen::Vector3d& axes, const FluidCoefficients& fluid) {
-  return "<geom name=\"" + name + "\" type=\"ellipsoid\" mass=\"0\" pos=\"" + numbers(at) + "\" size=\"" + numbers(axes) +
-         "\" fluidshape=\"ellipsoid\" fluidcoef=\"" + numbers({fluid[0], fluid[1], fluid[2], fluid[3], fluid[4]}) + "\"/>\n";
+std::string ellipsoid(const std::string& name, const Eigen::Vector3d& at, const Eigen::Vector3d& axes,
+                      const FluidCoefficients& fluid) {
+  return "<geom name=\"" + name + "\" type=\"ellipsoid\" mass=\"0\" pos=\"" + numbers(at) + "\" size=\"" +
+         numbers(axes) + "\" fluidshape=\"ellipsoid\" fluidcoef=\"" +
+         numbers({fluid[0], fluid[1], fluid[2], fluid[3], fluid[4]}) + "\"/>\n";
 }
 
 std::string hinge(const std::string& name, const Eigen::Vector3d& axis, const std::string& more) {
@@ -48,7 +50,8 @@ std::string stops(const Hinge& range, double softness) {
   const double stiffness = 1 / (kStopTime_s * kStopTime_s * kStopDamping * kStopDamping) / softness;
   const double damping = 2 * kStopDamping * std::sqrt(stiffness);
   return "limited=\"true\" range=\"" + numbers({range.lower_rad, range.upper_rad}) + "\" solreflimit=\"" +
-         numbers({-stiffness, -damping}) + "\" solimplimit=\"" + numbers({kStopImpedance, kStopImpedance, 1e-3}) + "\" ";
+         numbers({-stiffness, -damping}) + "\" solimplimit=\"" + numbers({kStopImpedance, kStopImpedance, 1e-3}) +
+         "\" ";
 }
 
 std::string wing_of(const Side& side, std::size_t number, const Build& build) {
@@ -85,22 +88,28 @@ std::string side_of(const Side& side, std::size_t number, const Build& build) {
   const double out = number == 0 ? 1 : -1;
   const Motor& motor = side.motor;
   const double gear = motor.efficiency * motor.gear_ratio;
-  const std::string rotor = "armature=\"" + numbers({gear * motor.gear_ratio * motor.rotor_inertia_kg_m2}) + "\" damping=\"" +
-                            numbers({gear * motor.gear_ratio * motor.damping_Nm_s + side.stroke.damping_Nm_s}) + "\" frictionloss=\"" +
-                            numbers({gear * motor.friction_Nm + side.stroke.friction_Nm}) + "\" ";
+  const std::string rotor =
+      "armature=\"" + numbers({gear * motor.gear_ratio * motor.rotor_inertia_kg_m2}) + "\" damping=\"" +
+      numbers({gear * motor.gear_ratio * motor.damping_Nm_s + side.stroke.damping_Nm_s}) + "\" frictionloss=\"" +
+      numbers({gear * motor.friction_Nm + side.stroke.friction_Nm}) + "\" ";
   const Eigen::Vector3d up(0, 0, out);
   const bool one = build.backlash_rad == 0;
   std::string text;
   if (!one)  // of next to no mass: its inertia is the armature
-    text += "<body name=\"" + name + "_rotor\" pos=\"" + numbers(side.shoulder_m) + "\">\n<inertial pos=\"0 0 0\" mass=\"1e-9\" diaginertia=\"1e-13 1e-13 1e-13\"/>\n" +
-            hinge(name + "_rotor", up, rotor) + ellipsoid(name + "_rotor", {0, 0, 0}, {1e-6, 1e-6, 1e-6}, {}) + "</body>\n";
+    text += "<body name=\"" + name + "_rotor\" pos=\"" + numbers(side.shoulder_m) +
+            "\">\n<inertial pos=\"0 0 0\" mass=\"1e-9\" diaginertia=\"1e-13 1e-13 1e-13\"/>\n" +
+            hinge(name + "_rotor", up, rotor) + ellipsoid(name + "_rotor", {0, 0, 0}, {1e-6, 1e-6, 1e-6}, {}) +
+            "</body>\n";
   text += "<body name=\"" + name + "_edge\" pos=\"" + numbers(side.shoulder_m) + "\">\n" + inertial(side.leading_edge) +
           hinge(name + "_stroke", up, stops(side.stroke, 1) + (one ? rotor : std::string()));
   if (build.spar_stiffness_Nm_rad > 0)
-    text += hinge(name + "_spar", {out, 0, 0}, "stiffness=\"" + numbers({build.spar_stiffness_Nm_rad}) + "\" damping=\"" + numbers({build.spar_stiffness_Nm_rad * 6e-4}) + "\" ");
+    text += hinge(name + "_spar", {out, 0, 0},
+                  "stiffness=\"" + numbers({build.spar_stiffness_Nm_rad}) + "\" damping=\"" +
+                      numbers({build.spar_stiffness_Nm_rad * 6e-4}) + "\" ");
   text += ellipsoid(name + "_edge", {0, 0, 0}, {1e-6, 1e-6, 1e-6}, {}) + "<body name=\"" + name + "_wing\">\n" +
           hinge(name + "_rotation", {0, 1, 0},
-                stops(side.rotation, build.stop_softness) + "damping=\"" + numbers({side.rotation.damping_Nm_s}) + "\" frictionloss=\"" + numbers({side.rotation.friction_Nm}) + "\" ") +
+                stops(side.rotation, build.stop_softness) + "damping=\"" + numbers({side.rotation.damping_Nm_s}) +
+                    "\" frictionloss=\"" + numbers({side.rotation.friction_Nm}) + "\" ") +
           wing_of(side, number, build) + "</body>\n</body>\n";
   return text;
 }
@@ -117,11 +126,13 @@ std::array<Strip, Mechanism::kStrips> strips_of(const Planform& p) {
 }
 
 std::string mjcf_text(const Figures& figures, const Build& build, double step_s) {
-  std::string text = "<mujoco model=\"flapper\">\n<compiler angle=\"radian\" inertiafromgeom=\"false\"/>\n<option timestep=\"" + numbers({step_s}) +
-                     "\" gravity=\"0 0 " + numbers({-Mechanism::kGravity_m_s2}) + "\" density=\"" + numbers({figures.density_kg_m3}) +
-                     "\" viscosity=\"" + numbers({kViscosity_Pa_s}) +
-                     "\" integrator=\"Euler\" solver=\"Newton\" tolerance=\"1e-12\" iterations=\"30\">\n<flag contact=\"disable\"/>\n</option>\n"
-                     "<worldbody>\n<body name=\"torso\">\n<freejoint name=\"torso\"/>\n";
+  std::string text =
+      "<mujoco model=\"flapper\">\n<compiler angle=\"radian\" inertiafromgeom=\"false\"/>\n<option timestep=\"" +
+      numbers({step_s}) + "\" gravity=\"0 0 " + numbers({-Mechanism::kGravity_m_s2}) + "\" density=\"" +
+      numbers({figures.density_kg_m3}) + "\" viscosity=\"" + numbers({kViscosity_Pa_s}) +
+      "\" integrator=\"Euler\" solver=\"Newton\" tolerance=\"1e-12\" iterations=\"30\">\n<flag "
+      "contact=\"disable\"/>\n</option>\n"
+      "<worldbody>\n<body name=\"torso\">\n<freejoint name=\"torso\"/>\n";
   RigidBody torso = figures.torso;
   const Eigen::Vector3d foot(0, 0, -0.02);
   if (build.leg_mass_kg > 0) {  // what is left has the same mass and centre of mass together with the leg
@@ -136,17 +147,20 @@ std::string mjcf_text(const Figures& figures, const Build& build, double step_s)
   for (std::size_t side = 0; side < 2; ++side) text += side_of(figures.sides[side], side, build);
   if (build.leg_mass_kg > 0) {
     const double length = 0.012, inertia = build.leg_mass_kg * length * length, rate = 2 * M_PI * 20;
-    const std::string flexure = "stiffness=\"" + numbers({inertia * rate * rate}) + "\" damping=\"" + numbers({0.1 * inertia * rate}) + "\" ";
-    text += "<body name=\"leg\" pos=\"0 0 -0.008\">\n<inertial pos=\"" + numbers({0, 0, -length}) + "\" mass=\"" + numbers({build.leg_mass_kg}) +
-            "\" diaginertia=\"1e-9 1e-9 1e-9\"/>\n" + hinge("leg_x", {1, 0, 0}, flexure) + hinge("leg_y", {0, 1, 0}, flexure) +
+    const std::string flexure =
+        "stiffness=\"" + numbers({inertia * rate * rate}) + "\" damping=\"" + numbers({0.1 * inertia * rate}) + "\" ";
+    text += "<body name=\"leg\" pos=\"0 0 -0.008\">\n<inertial pos=\"" + numbers({0, 0, -length}) + "\" mass=\"" +
+            numbers({build.leg_mass_kg}) + "\" diaginertia=\"1e-9 1e-9 1e-9\"/>\n" +
+            hinge("leg_x", {1, 0, 0}, flexure) + hinge("leg_y", {0, 1, 0}, flexure) +
             ellipsoid("leg", {0, 0, 0}, {1e-6, 1e-6, 1e-6}, {}) + "</body>\n";
   }
   text += "</body>\n</worldbody>\n";
   if (build.backlash_rad > 0) {
     text += "<tendon>\n";
     for (const std::string name : {"left", "right"})
-      text += "<fixed limited=\"true\" range=\"" + numbers({-build.backlash_rad / 2, build.backlash_rad / 2}) + "\" solreflimit=\"" +
-              numbers({4 * step_s, 1}) + "\" solimplimit=\"0.95 0.99 0.001\"><joint joint=\"" + name + "_rotor\" coef=\"1\"/><joint joint=\"" + name + "_stroke\" coef=\"-1\"/></fixed>\n";
+      text += "<fixed limited=\"true\" range=\"" + numbers({-build.backlash_rad / 2, build.backlash_rad / 2}) +
+              "\" solreflimit=\"" + numbers({4 * step_s, 1}) + "\" solimplimit=\"0.95 0.99 0.001\"><joint joint=\"" +
+              name + "_rotor\" coef=\"1\"/><joint joint=\"" + name + "_stroke\" coef=\"-1\"/></fixed>\n";
     text += "</tendon>\n";
   }
   return text + "</mujoco>\n";

@@ -7,7 +7,8 @@ namespace {
 
 // Tried out on the nominal robot and on 40 drawn ones.
 constexpr double kHover_V = 10.0, kClimb_V_s2_m = 0.75;  // V per m/s^2: the slope of thrust over voltage, per mass
-constexpr double kPlace_1_s = 3.2, kSpeed_1_s = 6, kSpeedHold_1_s2 = 4, kHeight_1_s = 5, kClimb_1_s = 8, kClimbHold_1_s2 = 6;
+constexpr double kPlace_1_s = 3.2, kSpeed_1_s = 6, kSpeedHold_1_s2 = 4, kHeight_1_s = 5, kClimb_1_s = 8,
+                 kClimbHold_1_s2 = 6;
 constexpr double kMaxAcceleration = 4.5;
 // V or split cycle per rad, per rad/s, and per rad s: roll, pitch, yaw
 const Eigen::Vector3d kTurn(1.9, 2.6, 0.12), kTurnRate(0.15, 0.2, 0.012), kTurnHold(2.2, 3.0, 0.12);
@@ -24,7 +25,8 @@ Eigen::Vector3d rotation_between(const Eigen::Matrix3d& from, const Eigen::Matri
   return turn.angle() * turn.axis();
 }
 
-Pilot::Pilot(const Figures& figures, std::uint64_t seed, std::size_t flight) : figures_(&figures), random_(seed, "pilot", flight) {
+Pilot::Pilot(const Figures& figures, std::uint64_t seed, std::size_t flight)
+    : figures_(&figures), random_(seed, "pilot", flight) {
   beat_ticks_ = static_cast<std::size_t>(std::max(1.0, std::round(1 / (figures.flapping_Hz * figures.hold_s))));
   late_ticks_ = 2;
   past_.resize(beat_ticks_ + late_ticks_);
@@ -59,7 +61,8 @@ void Pilot::look(const Motion& now, double tick_s) {
   const Eigen::Vector3d lead = mean.rate_B * late_s;
   if (lead.norm() > 1e-9) q = q * Eigen::Quaterniond(Eigen::AngleAxisd(lead.norm(), lead.normalized()));
   mean.R_WB = q.toRotationMatrix();
-  mean.position_W = past_[(next_ + past_.size() - 1 - late_ticks_) % past_.size()].position_W + mean.velocity_W * tick_s * static_cast<double>(late_ticks_);
+  mean.position_W = past_[(next_ + past_.size() - 1 - late_ticks_) % past_.size()].position_W +
+                    mean.velocity_W * tick_s * static_cast<double>(late_ticks_);
   view_ = mean;
 }
 
@@ -110,7 +113,9 @@ Inputs Pilot::fly(const Target& target, double tick_s) {
   const Eigen::Vector3d out = kTurn.cwiseProduct(turn) - kTurnRate.cwiseProduct(rate) + hold_turn_;
   const double lean = std::max(0.5, view_.R_WB(2, 2));
   trim_ = {kHover_V + climb_V_, hold_turn_.x(), hold_turn_.y(), hold_turn_.z()};
-  Inputs inputs = {(kHover_V + climb_V_ + kClimb_V_s2_m * (kClimb_1_s * error.z() + target.acceleration_W.z())) / std::sqrt(lean), out.x(), out.y(), out.z()};
+  Inputs inputs = {
+      (kHover_V + climb_V_ + kClimb_V_s2_m * (kClimb_1_s * error.z() + target.acceleration_W.z())) / std::sqrt(lean),
+      out.x(), out.y(), out.z()};
   inputs.amplitude_V = std::clamp(inputs.amplitude_V, 6.0, 16.0);
   return clipped(inputs, *figures_);
 }

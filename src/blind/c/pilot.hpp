@@ -14,7 +14,8 @@ struct Target {
 
 /// What the pilot takes for true.
 struct View {
-  Eigen::Vector3d position_W = Eigen::Vector3d::Zero(), velocity_W = Eigen::Vector3d::Zero(), rate_B = Eigen::Vector3d::Zero();
+  Eigen::Vector3d position_W = Eigen::Vector3d::Zero(), velocity_W = Eigen::Vector3d::Zero(),
+                  rate_B = Eigen::Vector3d::Zero();
   Eigen::Matrix3d R_WB = Eigen::Matrix3d::Identity();
 };
 

@@ -10,7 +10,8 @@ namespace flappy::blind::c {
 namespace {
 
 constexpr double kLevel_s = 0.2;
-constexpr std::array<double, 4> kLevels = {1.0, 0.4, 0.45, 0.035}, kTones = {0.4, 0.15, 0.15, 0.012};  // V, V, V, split cycle
+constexpr std::array<double, 4> kLevels = {1.0, 0.4, 0.45, 0.035},
+                                kTones = {0.4, 0.15, 0.15, 0.012};  // V, V, V, split cycle
 
 double smooth(double x) { return x * x * x * (10 + x * (6 * x - 15)); }
 double smooth_rate(double x) { return 30 * x * x * (1 - x) * (1 - x); }
@@ -21,7 +22,8 @@ double smooth_bend(double x) { return 60 * x * (1 - x) * (1 - 2 * x); }
 Programme::Programme(const Assignment& a, std::size_t flight, const Figures& figures) : hover_(a.hover) {
   Random random(a.seed, "programme", flight);
   const double height = random.uniform(0.5, 1.0), heading = random.uniform(-0.6, 0.6);
-  Eigen::Vector3d start(random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.2), hover_ ? random.uniform(0.4, 1.4) : height);
+  Eigen::Vector3d start(random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.2),
+                        hover_ ? random.uniform(0.4, 1.4) : height);
   if (!hover_ && flight == 1) start.z() += 0.5;
   if (!hover_ && flight == 2) start.y() += 0.3;
   legs_.push_back({-1e3, 0.4, start, start, heading, heading});
@@ -50,7 +52,8 @@ Programme::Programme(const Assignment& a, std::size_t flight, const Figures& fig
     add_leg(away, legs_.back().to_heading + random.uniform(-1.5, 1.5), fast);
   }
   for (std::size_t input = 0; input < 4; ++input) {
-    for (double t = 0; t < Family::kFlight_s + kLevel_s; t += kLevel_s) levels_[input].push_back(kLevels[input] * random.uniform(-1, 1));
+    for (double t = 0; t < Family::kFlight_s + kLevel_s; t += kLevel_s)
+      levels_[input].push_back(kLevels[input] * random.uniform(-1, 1));
     for (int i = 0; i < 2; ++i) {
       const double frequency = random.uniform(1.5, 9);
       tones_[input].push_back({frequency, random.uniform(0, 2 * M_PI)});
@@ -61,7 +64,9 @@ Programme::Programme(const Assignment& a, std::size_t flight, const Figures& fig
 void Programme::add_leg(const Eigen::Vector3d& to_W, double heading, double speed_m_s) {
   const Leg& last = legs_.back();
   const double mean_m_s = speed_m_s / smooth_rate(0.5);  // it is fastest half way
-  const double takes_s = std::max({0.6, (to_W - last.to_W).norm() / mean_m_s, std::abs(heading - last.to_heading) * smooth_rate(0.5) / 3.0, std::abs(to_W.z() - last.to_W.z()) * smooth_rate(0.5) / 0.45});
+  const double takes_s =
+      std::max({0.6, (to_W - last.to_W).norm() / mean_m_s, std::abs(heading - last.to_heading) * smooth_rate(0.5) / 3.0,
+                std::abs(to_W.z() - last.to_W.z()) * smooth_rate(0.5) / 0.45});
   legs_.push_back({last.until_s, last.until_s + takes_s, last.to_W, to_W, last.to_heading, heading});
 }
 
@@ -87,7 +92,8 @@ Inputs Programme::excitation(double t_s) const {
   for (std::size_t input = 0; input < 4; ++input) {
     const std::size_t level = std::min(static_cast<std::size_t>(t_s / kLevel_s), levels_[input].size() - 1);
     sum[input] = levels_[input][level];
-    for (const Tone& tone : tones_[input]) sum[input] += kTones[input] * std::sin(2 * M_PI * tone.frequency_Hz * t_s + tone.phase);
+    for (const Tone& tone : tones_[input])
+      sum[input] += kTones[input] * std::sin(2 * M_PI * tone.frequency_Hz * t_s + tone.phase);
   }
   // beside the wall what pushes sideways is a third of it
   const double free_m = Room::kWall_m - target(t_s).position_W.y() - 0.15, calm = std::clamp(free_m / 0.3, 0.3, 1.0);

@@ -2,12 +2,11 @@
 // std::normal_distribution differ between libraries.
 #pragma once
 
+#include <Eigen/Dense>
 #include <cmath>
 #include <cstdint>
 #include <random>
 #include <string_view>
-
-#include <Eigen/Dense>
 
 namespace flappy::blind::c {
 

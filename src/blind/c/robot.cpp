@@ -9,7 +9,8 @@ constexpr double kDegree = M_PI / 180;
 Figures faulty(Figures f, const Sizes& sizes, std::uint64_t seed) {
   Random random(seed, "faults");
   const double heading = random.uniform(0, 2 * M_PI), sign = random.sign(), other = random.sign(), wing = random.sign();
-  f.torso.com_m += 1e-3 * sizes[Effect::kComOffset] * f.mass_kg() / f.torso.mass_kg * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0);
+  f.torso.com_m += 1e-3 * sizes[Effect::kComOffset] * f.mass_kg() / f.torso.mass_kg *
+                   Eigen::Vector3d(std::cos(heading), std::sin(heading), 0);
   const double product = 0.05 * sizes[Effect::kInertiaProducts] * f.torso.inertia_kg_m2(0, 0);
   for (const auto& [axis, way] : {std::pair{1, sign}, std::pair{2, other}}) {
     f.torso.inertia_kg_m2(0, axis) += way * product;
@@ -35,7 +36,8 @@ Build build_of(const Sizes& sizes, std::uint64_t seed) {
   build.damaged = random.below(2);
   build.backlash_rad = kDegree * sizes[Effect::kGearBacklash];
   const double half_weight_Nm = 0.0611 * 0.0507;  // half of 12.4 g at the planform's centre of pressure
-  if (sizes[Effect::kSparBending] > 0) build.spar_stiffness_Nm_rad = half_weight_Nm / (0.5 * kDegree * sizes[Effect::kSparBending]);
+  if (sizes[Effect::kSparBending] > 0)
+    build.spar_stiffness_Nm_rad = half_weight_Nm / (0.5 * kDegree * sizes[Effect::kSparBending]);
   build.leg_mass_kg = 0.4e-3 * sizes[Effect::kLegFlexure];
   build.body_drag_m2 = 1.5e-3 * sizes[Effect::kBodyDrag];
   build.rotational_lift = sizes[Effect::kRotationalLift];
@@ -56,11 +58,14 @@ Robot::Robot(const Assignment& a, std::size_t flight) : sizes_(a.effects), figur
   air_ = std::make_unique<Air>(figures_, sizes_, a.seed, flight);
   for (std::size_t side = 0; side < 2; ++side) {
     const Motor& motor = figures_.sides[side].motor;
-    friction_Nm_[side] = motor.efficiency * motor.gear_ratio * motor.friction_Nm + figures_.sides[side].stroke.friction_Nm;
+    friction_Nm_[side] =
+        motor.efficiency * motor.gear_ratio * motor.friction_Nm + figures_.sides[side].stroke.friction_Nm;
   }
 }
 
-void Robot::tick(const std::array<double, 2>& voltages, const std::function<void()>& after) { tick_held(voltages, nullptr, after); }
+void Robot::tick(const std::array<double, 2>& voltages, const std::function<void()>& after) {
+  tick_held(voltages, nullptr, after);
+}
 
 void Robot::tick_held(const std::array<double, 2>& voltages, const Motion* held, const std::function<void()>& after) {
   drive_->command(static_cast<double>(done_) * step_s_, voltages);
@@ -75,9 +80,11 @@ void Robot::step(const Motion* held) {
   Mechanism& m = *mechanism_;
   const double now_s = static_cast<double>(done_) * step_s_;
   const Wrench wrench = air_->act(m, step_s_);
-  const std::array<double, 2> motor = drive_->torques(now_s, step_s_, {m.drive_angle(0), m.drive_angle(1)}, {m.drive_rate(0), m.drive_rate(1)});
+  const std::array<double, 2> motor =
+      drive_->torques(now_s, step_s_, {m.drive_angle(0), m.drive_angle(1)}, {m.drive_rate(0), m.drive_rate(1)});
   const double creep = 2 * kDegree * sizes_[Effect::kSpringCreep] * (1 - std::exp(-now_s / 6));
-  const double harder = std::sqrt(6 * 0.1 * sizes_[Effect::kSpringHardening]), stiction = sizes_[Effect::kCoulombFriction];
+  const double harder = std::sqrt(6 * 0.1 * sizes_[Effect::kSpringHardening]),
+               stiction = sizes_[Effect::kCoulombFriction];
   std::array<double, 2> spring{};
   for (std::size_t side = 0; side < 2; ++side) {
     const Spring& of = figures_.sides[side].spring;
@@ -95,7 +102,8 @@ void Robot::step(const Motion* held) {
 
 Eigen::Vector3d specific_force_B(const Motion& now, const Eigen::Vector3d& at) {
   const Eigen::Vector3d gravity(0, 0, -Mechanism::kGravity_m_s2);
-  return now.R_WB.transpose() * (now.acceleration_W - gravity) + now.turning_B.cross(at) + now.rate_B.cross(now.rate_B.cross(at));
+  return now.R_WB.transpose() * (now.acceleration_W - gravity) + now.turning_B.cross(at) +
+         now.rate_B.cross(now.rate_B.cross(at));
 }
 
 }  // namespace flappy::blind::c

@@ -47,7 +47,8 @@ void declare_loosely(SensorFigures& f, const Robot& robot, Random random) {
   // a mean is half an interval late, and so is a held sample on average; it is declared, or not, but never more than 0.5 ms off
   const double half_s = f.imu.sampling == Sampling::kInstant ? 0 : interval_s / 2;
   const bool counted = random.uniform() < 0.5;
-  h.imu.latency_s = std::clamp(f.imu.latency_s + (counted ? half_s : 0), f.imu.latency_s + half_s - 0.5e-3, f.imu.latency_s + half_s);
+  h.imu.latency_s =
+      std::clamp(f.imu.latency_s + (counted ? half_s : 0), f.imu.latency_s + half_s - 0.5e-3, f.imu.latency_s + half_s);
   h.mocap.latency_s += random.uniform(-0.5e-3, 0.5e-3);
   h.imu.rate_hz = rounded(h.imu.rate_hz);
   h.mocap.rate_hz = rounded(h.mocap.rate_hz);
@@ -56,8 +57,11 @@ void declare_loosely(SensorFigures& f, const Robot& robot, Random random) {
   const Eigen::Matrix3d mounting = turned(random.uniform(0.1, 1.0) * kDegree * random.direction());
   f.imu.gyro_axes = f.imu.gyro_axes * mounting;
   f.imu.accel_axes = f.imu.accel_axes * mounting;
-  for (double* noise : {&h.mocap.position_noise_m, &h.mocap.attitude_noise_rad, &h.imu.gyro_noise_rad_s, &h.imu.accel_noise_m_s2}) *noise *= random.uniform(0.7, 1.5);
-  const double fast = random.uniform(0, 50e-6), power_noise = random.uniform(0.7, 1.5), wing_noise = random.uniform(0.7, 1.5);
+  for (double* noise :
+       {&h.mocap.position_noise_m, &h.mocap.attitude_noise_rad, &h.imu.gyro_noise_rad_s, &h.imu.accel_noise_m_s2})
+    *noise *= random.uniform(0.7, 1.5);
+  const double fast = random.uniform(0, 50e-6), power_noise = random.uniform(0.7, 1.5),
+               wing_noise = random.uniform(0.7, 1.5);
   (random.uniform() < 0.5 ? f.fast_imu : f.fast_mocap) = fast;
   const double power_late_s = random.uniform(-0.5e-3, 0.5e-3);
   f.power.battery_side = random.uniform() < 0.5;
@@ -80,7 +84,9 @@ SensorFigures sensor_figures(const Assignment& a, const Robot& robot) {
   SensorFigures f;
   const auto rate = [&](std::size_t steps) { return 1 / (static_cast<double>(steps) * robot.step_s()); };
   const std::array<std::size_t, 5> imu_steps = {10, 12, 14, 16, 20}, mocap_steps = {40, 45, 50, 60, 66};
-  f.imu.steps = imu_steps[random.below(5)];
+  const std::size_t tenths =
+      static_cast<std::size_t>(std::max(1L, std::lround(1e-4 / robot.step_s())));  // steps in 0.1 ms
+  f.imu.steps = tenths * imu_steps[random.below(5)];
   f.imu.bandwidth_hz = random.uniform(150, 320);
   f.imu.latency_s = random.uniform(0.5e-3, 2e-3);
   for (int i = 0; i < 3; ++i) f.imu.position_m[i] = 4e-3 * random.uniform(-1, 1);
@@ -90,16 +96,18 @@ SensorFigures sensor_figures(const Assignment& a, const Robot& robot) {
   for (int i = 0; i < 3; ++i) f.imu.gyro_bias[i] = f.imu.gyro_bias_sd[i] * random.cut_normal();
   f.imu.gyro_noise = random.uniform(0.01, 0.05);
   f.imu.accel_noise = random.uniform(0.2, 0.5);
-  f.mocap.steps = mocap_steps[random.below(5)];
+  f.mocap.steps = tenths * mocap_steps[random.below(5)];
   f.mocap.latency_s = random.uniform(6e-3, 20e-3);
   f.mocap.marker_noise_m = random.uniform(0.1e-3, 0.25e-3);
-  f.mocap.markers_m = {Eigen::Vector3d(0.022, 0.004, 0.020), Eigen::Vector3d(-0.020, 0.008, 0.028), Eigen::Vector3d(0.003, 0.021, -0.012),
-                       Eigen::Vector3d(-0.005, -0.022, -0.006)};
+  f.mocap.markers_m = {Eigen::Vector3d(0.022, 0.004, 0.020), Eigen::Vector3d(-0.020, 0.008, 0.028),
+                       Eigen::Vector3d(0.003, 0.021, -0.012), Eigen::Vector3d(-0.005, -0.022, -0.006)};
   for (Eigen::Vector3d& marker : f.mocap.markers_m) marker += 2e-3 * random.normal3();
   for (std::size_t i = 0; i < 6; ++i) {
     const double around = M_PI / 3 * static_cast<double>(i) + random.uniform(-0.3, 0.3), up = random.uniform(0.2, 0.6);
-    f.mocap.cameras_W[i] = Eigen::Vector3d(std::cos(around) * std::cos(up), std::sin(around) * std::cos(up), std::sin(up));
+    f.mocap.cameras_W[i] =
+        Eigen::Vector3d(std::cos(around) * std::cos(up), std::sin(around) * std::cos(up), std::sin(up));
   }
+  f.power.steps = f.wings.steps = 10 * tenths;
   f.power.latency_s = random.uniform(0.2e-3, 1.5e-3);
   for (double& offset : f.power.offset_A) offset = 4e-3 * random.cut_normal();
   for (std::size_t i = 0; i < 4; ++i) {
@@ -114,9 +122,13 @@ SensorFigures sensor_figures(const Assignment& a, const Robot& robot) {
   h.ambient = {robot.figures().density_kg_m3, Room::kGround_m, Room::kCeiling_m, {{0, Room::kWall_m, 0, -1}}};
   const auto [position_noise, attitude_noise] = pose_noise(f.mocap);
   h.mocap = {rate(f.mocap.steps), f.mocap.latency_s, position_noise, attitude_noise};
-  h.imu = {rate(f.imu.steps), f.imu.latency_s, f.imu.bandwidth_hz, {f.imu.position_m.x(), f.imu.position_m.y(), f.imu.position_m.z()},
-           f.imu.gyro_noise, {f.imu.gyro_bias_sd.x(), f.imu.gyro_bias_sd.y(), f.imu.gyro_bias_sd.z()}, f.imu.accel_noise};
-  if (a.power) h.power = flightlog::PowerHeader{Drive::kBattery_V, rate(f.power.steps), f.power.latency_s, f.power.voltage_noise, f.power.current_noise};
+  h.imu = {rate(f.imu.steps),  f.imu.latency_s,
+           f.imu.bandwidth_hz, {f.imu.position_m.x(), f.imu.position_m.y(), f.imu.position_m.z()},
+           f.imu.gyro_noise,   {f.imu.gyro_bias_sd.x(), f.imu.gyro_bias_sd.y(), f.imu.gyro_bias_sd.z()},
+           f.imu.accel_noise};
+  if (a.power)
+    h.power = flightlog::PowerHeader{Drive::kBattery_V, rate(f.power.steps), f.power.latency_s, f.power.voltage_noise,
+                                     f.power.current_noise};
   if (a.wings) h.wings = flightlog::WingsHeader{rate(f.wings.steps), f.wings.noise_rad};
   if (a.conventions) declare_loosely(f, robot, Random(a.seed, "conventions"));
   return f;

@@ -5,13 +5,17 @@
 namespace flappy::blind::c {
 namespace {
 
-constexpr double kGyroLimit_rad_s = 34.9, kGyroDigit_rad_s = 34.9 / 32768;  // 2000 deg/s in 16 bits
+constexpr double kGyroLimit_rad_s = 34.9, kGyroDigit_rad_s = 34.9 / 32768;    // 2000 deg/s in 16 bits
 constexpr double kAccelLimit_m_s2 = 156.9, kAccelDigit_m_s2 = 156.9 / 32768;  // 16 g
 constexpr double kCurrentDigit_A = 2.0 / 4096;                                // 12 bits
 
-double digital(double value, double limit, double digit) { return std::clamp(digit * std::round(value / digit), -limit, limit); }
+double digital(double value, double limit, double digit) {
+  return std::clamp(digit * std::round(value / digit), -limit, limit);
+}
 
-Eigen::Matrix3d turned(double angle, const Eigen::Vector3d& axis) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); }
+Eigen::Matrix3d turned(double angle, const Eigen::Vector3d& axis) {
+  return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+}
 
 }  // namespace
 
@@ -33,8 +37,10 @@ Sensors::Sensors(const Assignment& a, std::size_t flight, const Robot& robot, Se
   warm_ = bias_size_ * once.direction();
   const Eigen::Vector3d axis = once.direction(), place = once.direction();
   const double level = once.uniform(0, 2 * M_PI);
-  if (sizes[Effect::kAccelerometerMisalignment] > 0) misaligned_ = turned(0.02 * sizes[Effect::kAccelerometerMisalignment], axis);
-  if (sizes[Effect::kMocapTilt] > 0) tilt_ = turned(0.01 * sizes[Effect::kMocapTilt], Eigen::Vector3d(std::cos(level), std::sin(level), 0));
+  if (sizes[Effect::kAccelerometerMisalignment] > 0)
+    misaligned_ = turned(0.02 * sizes[Effect::kAccelerometerMisalignment], axis);
+  if (sizes[Effect::kMocapTilt] > 0)
+    tilt_ = turned(0.01 * sizes[Effect::kMocapTilt], Eigen::Vector3d(std::cos(level), std::sin(level), 0));
   marker_offset_ = 2e-3 * sizes[Effect::kMarkerOffset] * place;
   const double foam = sizes[Effect::kImuMount];
   if (foam > 0) mount_rate_ = 2 * M_PI * 120 / std::sqrt(foam);
@@ -75,7 +81,9 @@ void Sensors::imu(const Robot& robot, double t_s) {
   // held: the sensor itself samples half an interval before, on its own clock
   if (count_ % f_.imu.steps == f_.imu.steps / 2) held_ = passed_;
   if (count_ % f_.imu.steps != 0) return;
-  Vector6 sample = f_.imu.sampling == Sampling::kInstant ? passed_ : f_.imu.sampling == Sampling::kHeld ? held_ : Vector6(sum_ / static_cast<double>(f_.imu.steps));
+  Vector6 sample = f_.imu.sampling == Sampling::kInstant ? passed_
+                   : f_.imu.sampling == Sampling::kHeld  ? held_
+                                                         : Vector6(sum_ / static_cast<double>(f_.imu.steps));
   sum_.setZero();
   Eigen::Vector3d bias = f_.imu.gyro_bias;
   if (bias_size_ > 0) bias += warm_ * (1 - std::exp(-std::max(0.0, t_s + 5) / 6)) + walked_;
@@ -84,8 +92,11 @@ void Sensors::imu(const Robot& robot, double t_s) {
   const double arrives_s = (t_s + f_.imu.latency_s) * (1 + f_.fast_imu);
   if (arrives_s < 0) return;
   imu_.t_s.push_back(arrives_s);
-  flightlog::Column* columns[6] = {&imu_.gyro_x_rad_s, &imu_.gyro_y_rad_s, &imu_.gyro_z_rad_s, &imu_.accel_x_m_s2, &imu_.accel_y_m_s2, &imu_.accel_z_m_s2};
-  for (int i = 0; i < 6; ++i) columns[i]->push_back(i < 3 ? digital(sample[i], kGyroLimit_rad_s, kGyroDigit_rad_s) : digital(sample[i], kAccelLimit_m_s2, kAccelDigit_m_s2));
+  flightlog::Column* columns[6] = {&imu_.gyro_x_rad_s, &imu_.gyro_y_rad_s, &imu_.gyro_z_rad_s,
+                                   &imu_.accel_x_m_s2, &imu_.accel_y_m_s2, &imu_.accel_z_m_s2};
+  for (int i = 0; i < 6; ++i)
+    columns[i]->push_back(i < 3 ? digital(sample[i], kGyroLimit_rad_s, kGyroDigit_rad_s)
+                                : digital(sample[i], kAccelLimit_m_s2, kAccelDigit_m_s2));
 }
 
 // A rigid body is fitted to the markers that two cameras see (Kabsch's solution by singular values).
@@ -96,7 +107,8 @@ void Sensors::mocap(const Robot& robot, double t_s) {
   for (const Eigen::Vector3d& marker : f_.mocap.markers_m) {
     const Eigen::Vector3d noise = f_.mocap.marker_noise_m * mocap_noise_.normal3();
     std::size_t cameras = 0;
-    for (const Eigen::Vector3d& camera : f_.mocap.cameras_W) cameras += (now.R_WB * marker.normalized()).dot(camera) > -0.45;
+    for (const Eigen::Vector3d& camera : f_.mocap.cameras_W)
+      cameras += (now.R_WB * marker.normalized()).dot(camera) > -0.45;
     if (cameras < 2) continue;
     seen_W[seen] = now.position_W + now.R_WB * marker + noise;
     model_B[seen++] = marker - marker_offset_;
@@ -121,7 +133,8 @@ void Sensors::mocap(const Robot& robot, double t_s) {
   if (q.w() < 0) q.coeffs() *= -1;
   const double arrives_s = (t_s + f_.mocap.latency_s + delay_s_) * (1 + f_.fast_mocap);
   if (arrives_s < 0) return;
-  flightlog::Column* columns[8] = {&mocap_.t_s, &mocap_.x_m, &mocap_.y_m, &mocap_.z_m, &mocap_.qw, &mocap_.qx, &mocap_.qy, &mocap_.qz};
+  flightlog::Column* columns[8] = {&mocap_.t_s, &mocap_.x_m, &mocap_.y_m, &mocap_.z_m,
+                                   &mocap_.qw,  &mocap_.qx,  &mocap_.qy,  &mocap_.qz};
   const double values[8] = {arrives_s, position.x(), position.y(), position.z(), q.w(), q.x(), q.y(), q.z()};
   for (std::size_t i = 0; i < 8; ++i) columns[i]->push_back(values[i]);
 }
@@ -133,7 +146,8 @@ void Sensors::power(const Robot& robot, double t_s) {
     double current = robot.drive().currents()[side];
     // on the battery's side of the bridge it is what the switches let through
     if (f_.power.battery_side) current *= std::abs(robot.drive().voltages()[side]) / robot.drive().battery_V();
-    currents[side] = digital(current + f_.power.offset_A[side] + f_.power.current_noise * power_noise_.normal(), 2, kCurrentDigit_A);
+    currents[side] =
+        digital(current + f_.power.offset_A[side] + f_.power.current_noise * power_noise_.normal(), 2, kCurrentDigit_A);
   }
   if (t_s + f_.power.latency_s < 0) return;
   power_log_.t_s.push_back(t_s + f_.power.latency_s);
@@ -145,10 +159,12 @@ void Sensors::power(const Robot& robot, double t_s) {
 void Sensors::wings(const Robot& robot, double t_s) {
   const Mechanism& m = robot.mechanism();
   const double angles[4] = {m.stroke(0), m.rotation(0), m.stroke(1), m.rotation(1)};
-  flightlog::Column* columns[4] = {&wings_log_.left_stroke_rad, &wings_log_.left_rotation_rad, &wings_log_.right_stroke_rad, &wings_log_.right_rotation_rad};
+  flightlog::Column* columns[4] = {&wings_log_.left_stroke_rad, &wings_log_.left_rotation_rad,
+                                   &wings_log_.right_stroke_rad, &wings_log_.right_rotation_rad};
   double read[4];
   for (std::size_t i = 0; i < 4; ++i)  // a Hall sensor's field is no pure sine
-    read[i] = angles[i] + f_.wings.bend_rad[i] * std::sin(2 * angles[i] + f_.wings.bend_phase[i]) + f_.wings.noise_rad * wing_noise_.normal();
+    read[i] = angles[i] + f_.wings.bend_rad[i] * std::sin(2 * angles[i] + f_.wings.bend_phase[i]) +
+              f_.wings.noise_rad * wing_noise_.normal();
   if (t_s < 0) return;
   wings_log_.t_s.push_back(t_s);
   for (std::size_t i = 0; i < 4; ++i) columns[i]->push_back(read[i]);
@@ -170,7 +186,9 @@ void Sensors::finish(flightlog::FlightLog& log, double end_s) const {
   cut({&m.t_s, &m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz});
   cut({&i.t_s, &i.gyro_x_rad_s, &i.gyro_y_rad_s, &i.gyro_z_rad_s, &i.accel_x_m_s2, &i.accel_y_m_s2, &i.accel_z_m_s2});
   if (log.power) cut({&log.power->t_s, &log.power->battery_V, &log.power->left_current_A, &log.power->right_current_A});
-  if (log.wings) cut({&log.wings->t_s, &log.wings->left_stroke_rad, &log.wings->left_rotation_rad, &log.wings->right_stroke_rad, &log.wings->right_rotation_rad});
+  if (log.wings)
+    cut({&log.wings->t_s, &log.wings->left_stroke_rad, &log.wings->left_rotation_rad, &log.wings->right_stroke_rad,
+         &log.wings->right_rotation_rad});
 }
 
 }  // namespace flappy::blind::c

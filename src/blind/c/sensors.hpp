@@ -20,7 +20,8 @@ struct SensorFigures {
     double bandwidth_hz = 250, latency_s = 1e-3;
     Sampling sampling = Sampling::kInstant;
     Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d gyro_axes = Eigen::Matrix3d::Identity(), accel_axes = Eigen::Matrix3d::Identity();  ///< scale, skew and mounting
+    Eigen::Matrix3d gyro_axes = Eigen::Matrix3d::Identity(),
+                    accel_axes = Eigen::Matrix3d::Identity();  ///< scale, skew and mounting
     Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), gyro_bias_sd = {0.02, 0.03, 0.015};
     double gyro_noise = 0.02, accel_noise = 0.3;
   } imu;
@@ -66,11 +67,13 @@ class Sensors {
   Random imu_noise_, mocap_noise_, power_noise_, wing_noise_, walk_;
   // effects
   double bias_size_, rectification_, g_sensitivity_, delay_s_;
-  Eigen::Vector3d warm_ = Eigen::Vector3d::Zero(), walked_ = Eigen::Vector3d::Zero(), marker_offset_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d warm_ = Eigen::Vector3d::Zero(), walked_ = Eigen::Vector3d::Zero(),
+                  marker_offset_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d misaligned_ = Eigen::Matrix3d::Identity(), tilt_ = Eigen::Matrix3d::Identity();
   double mount_rate_ = 0;
   using Vector6 = Eigen::Matrix<double, 6, 1>;
-  Vector6 passed_ = Vector6::Zero(), sum_ = Vector6::Zero(), held_ = Vector6::Zero(), foam_ = Vector6::Zero(), foam_rate_ = Vector6::Zero();
+  Vector6 passed_ = Vector6::Zero(), sum_ = Vector6::Zero(), held_ = Vector6::Zero(), foam_ = Vector6::Zero(),
+          foam_rate_ = Vector6::Zero();
   std::size_t count_ = 0, lost_ = 0;
   bool settled_ = false;
   flightlog::MocapStream mocap_;
