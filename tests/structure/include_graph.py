@@ -41,6 +41,7 @@ ROOMS = {
     "server/record": BASE | {"flightlog", "flightlog/import", "flightlog/ros", "server/dds"},
     "server/sitl": ROLLOUT | {"server/dds", "server/telemetry"},
     "blind": FLIGHT | {"flightlog"},
+    "blind/c": {"io", "blind", "flightlog"},
     "benchmark": GAP | {"blind", "benchmark/predict"},
     "server/jobs": {"io"},
     "server/http": {"io", "server/jobs"},
@@ -51,6 +52,7 @@ ROOMS = {
 ONLY = {
     "blind": {"flightlog/flight_log.hpp", "flight/pid.hpp", "flight/episode.hpp", "flight/excitation.hpp", "model/wing_beat.hpp", "sim/randomise.hpp",
               "flappy/vehicle.hpp", "flappy/vehicle_file.hpp"},
+    "blind/c": {"blind/family.hpp", "flightlog/flight_log.hpp"},
 }
 # Programs that must not know a room: a diagnosis never sees the truth.
 IGNORANT = {"tools/flappy_gap": {"blind", "benchmark", "benchmark/predict"}}
@@ -145,6 +147,9 @@ def self_test():
         ({"src/blind/x.cpp": '#include "flight/c.hpp"\n'}, "flight/c.hpp: blind may include io and"),
         ({"src/blind/x.cpp": '#include "flappy/batch.hpp"\n'}, "flappy/batch.hpp: blind may include io and"),
         ({"src/blind/x.cpp": '#include "flappy/vehicle.hpp"\n#include "io/files.hpp"\n#include "blind/y.hpp"\n', "src/blind/y.hpp": ""}, None),
+        ({"src/blind/c/x.cpp": '#include "flappy/vehicle.hpp"\n'}, "blind/c may include io and blind/family.hpp, flightlog/flight_log.hpp only"),
+        ({"src/blind/c/x.cpp": '#include "blind/robot.hpp"\n', "src/blind/robot.hpp": ""}, "blind/c may include io and"),
+        ({"src/blind/c/x.cpp": '#include "io/files.hpp"\n#include <mujoco/mujoco.h>\n#include "blind/c/y.hpp"\n', "src/blind/c/y.hpp": ""}, None),
         ({"src/benchmark/x.cpp": '#include "gap/replay/b.hpp"\n#include "blind/y.hpp"\n', "src/blind/y.hpp": "", "src/gap/replay/b.hpp": ""}, None),
         ({"src/benchmark/predict/x.cpp": '#include "gap/replay/b.hpp"\n', "src/gap/replay/b.hpp": ""}, None),
         ({"src/benchmark/predict/x.cpp": '#include "blind/y.hpp"\n', "src/blind/y.hpp": ""}, "not blind"),

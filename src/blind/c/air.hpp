@@ -1,0 +1,36 @@
+// What the room, the wind and the wings' own flow do beyond MuJoCo's fluid model: mostly one factor on the force of each ellipsoid,
+// which MuJoCo has a place for.
+#pragma once
+
+#include "blind/c/drive.hpp"
+#include "blind/c/mechanism.hpp"
+
+namespace flappy::blind::c {
+
+/// As declared in every log: the ground z = 0, the ceiling z = 2, one wall through y = 1.
+struct Room {
+  static constexpr double kGround_m = 0, kCeiling_m = 2, kWall_m = 1;
+};
+
+class Air {
+ public:
+  Air(const Figures& figures, const Sizes& sizes, std::uint64_t seed, std::size_t flight);
+  /// Sets factors, wind and twist for the next step; the wrench is that on the torso at its origin.
+  Wrench act(Mechanism& mechanism, double step_s);
+
+ private:
+  double room_factor(const Mechanism& mechanism, std::size_t side, double wall_m) const;
+  double wing_factor(const Mechanism& mechanism, std::size_t side);
+  void blow(Mechanism& mechanism, double step_s);
+
+  const Figures* figures_;
+  double ground_, ceiling_, wall_, wake_, clap_, flexibility_, wind_, tether_, downwash_;
+  Random random_;
+  Eigen::Vector3d mean_wind_ = Eigen::Vector3d::Zero(), gust_ = Eigen::Vector3d::Zero(),
+                  anchor_ = Eigen::Vector3d::Zero();
+  std::array<double, 2> travelled_m_{}, direction_{}, twist_rad_{};
+  double stroke_rate_squared_ = 0;
+  bool any_factor_;
+};
+
+}  // namespace flappy::blind::c

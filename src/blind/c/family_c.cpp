@@ -1,0 +1,28 @@
+#include "blind/c/family_c.hpp"
+
+#include "blind/c/contrast.hpp"
+#include "blind/c/effects.hpp"
+#include "blind/c/escape.hpp"
+#include "blind/c/flight.hpp"
+
+namespace flappy::blind::c {
+namespace {
+
+class FamilyC final : public Family {
+ public:
+  std::string name() const override { return "C"; }
+  const std::vector<FamilyEffect>& effects() const override { return effect_table(); }
+  FamilyFlight fly(const Assignment& a, std::size_t flight) const override { return fly_one(a, flight).flight; }
+  Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const override {
+    return contrast_of(a, flight, effect, size);
+  }
+  FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const override {
+    return escape_of(a, number, rules);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Family> make_family_c() { return std::make_unique<FamilyC>(); }
+
+}  // namespace flappy::blind::c

@@ -1,0 +1,12 @@
+// The MJCF text of a robot.
+#pragma once
+
+#include <string>
+
+#include "blind/c/mechanism.hpp"
+
+namespace flappy::blind::c {
+
+std::string mjcf_text(const Figures& figures, const Build& build, double step_s);
+
+}  // namespace flappy::blind::c

@@ -1,0 +1,34 @@
+// Where the robots of family C fly, and how their inputs are excited on the way.
+#pragma once
+
+#include "blind/c/pilot.hpp"
+
+namespace flappy::blind::c {
+
+class Programme {
+ public:
+  Programme(const Assignment& a, std::size_t flight, const Figures& figures);
+  Target target(double t_s) const;
+  /// To be added to the pilot's inputs; none before t = 0 and in hover.
+  Inputs excitation(double t_s) const;
+  Eigen::Vector3d start_W() const { return legs_.front().to_W; }
+
+ private:
+  struct Leg {
+    double from_s, until_s;
+    Eigen::Vector3d from_W, to_W;
+    double from_heading, to_heading;
+  };
+  struct Tone {
+    double frequency_Hz, phase;
+  };
+
+  void add_leg(const Eigen::Vector3d& to_W, double heading, double speed_m_s);
+
+  std::vector<Leg> legs_;
+  bool hover_;
+  std::array<std::vector<Tone>, 4> tones_;
+  std::array<std::vector<double>, 4> levels_;
+};
+
+}  // namespace flappy::blind::c

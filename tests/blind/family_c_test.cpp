@@ -1,0 +1,491 @@
+// Robots of family C: the engine's model is the vehicle's file, the physics holds where it must, and effects, declarations and
+// arguments do what they say.
+#include "blind/c/family_c.hpp"
+
+#include <gtest/gtest.h>
+
+#include "blind/c/contrast.hpp"
+#include "blind/c/escape.hpp"
+#include "blind/c/flight.hpp"
+#include "io/parallel.hpp"
+
+namespace flappy::blind::c {
+namespace {
+
+const std::filesystem::path kVehicle =
+    std::filesystem::path(FLAPPY_SOURCE_DIR) / "configs/vehicles/hummingbird_nominal.toml";
+// Long enough for all effects, short enough for all of them in a test.
+constexpr Length kShort = {0.1, 0.1};
+
+Assignment plain() {
+  Assignment a;
+  a.vehicle_file = kVehicle;
+  a.seed = 5;
+  a.power = a.wings = true;
+  return a;
+}
+
+Assignment with(const std::string& effect, double size) {
+  Assignment a = plain();
+  a.effects = {{effect, size}};
+  return a;
+}
+
+flightlog::FlightLog short_log(const Assignment& a, std::size_t flight = 0) {
+  return fly_one(a, flight, false, kShort).flight.log;
+}
+
+const Figures& nominal() {
+  static const Figures figures = read_figures(kVehicle);
+  return figures;
+}
+
+/// Motors and springs as those of a robot without effects.
+struct Bench {
+  explicit Bench(const Figures& f, double every_s = Mechanism::kStep_s)
+      : figures(f), mechanism(figures, {}, every_s), drive(figures, Sizes({}), 1, 0), step_s(every_s) {}
+
+  /// Calls `each` after every step.
+  template <class Each>
+  void run(const Inputs& inputs, double until_s, bool held, const Each& each) {
+    const long steps = std::lround(until_s / step_s), tick = std::lround(1e-3 / step_s);
+    for (long i = 0; i < steps; ++i) {
+      const double now_s = static_cast<double>(i) * step_s;
+      if (i % tick == 0) drive.command(now_s, beat_voltages(inputs, beat_phase(now_s, figures.flapping_Hz), figures));
+      const auto torques = drive.torques(now_s, step_s, {mechanism.drive_angle(0), mechanism.drive_angle(1)},
+                                         {mechanism.drive_rate(0), mechanism.drive_rate(1)});
+      const Motion still;
+      mechanism.step(torques,
+                     {-figures.sides[0].spring.positive_Nm_rad * mechanism.stroke(0),
+                      -figures.sides[1].spring.positive_Nm_rad * mechanism.stroke(1)},
+                     {}, held ? &still : nullptr);
+      each(now_s);
+      if (held) mechanism.move_torso(still);
+    }
+  }
+  /// Over the robot's weight, with the torso held, over ten beats after ten.
+  double thrust(const Inputs& inputs) {
+    double sum = 0, count = 0;
+    run(inputs, 20 / figures.flapping_Hz, true, [&](double now_s) {
+      if (now_s < 10 / figures.flapping_Hz) return;
+      sum += mechanism.motion().acceleration_W.z();
+      ++count;
+    });
+    return 1 + sum / count / Mechanism::kGravity_m_s2;
+  }
+
+  Figures figures;
+  Mechanism mechanism;
+  Drive drive;
+  double step_s;
+};
+
+struct Momentum {
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero(), place = Eigen::Vector3d::Zero();
+  double of_wings = 0;
+};
+
+Momentum momentum(const Mechanism& mechanism) {
+  Momentum sum;
+  const mjModel& m = mechanism.model();
+  for (int body = 1; body < m.nbody; ++body) {
+    mjtNum velocity[6];
+    mj_objectVelocity(&m, const_cast<mjData*>(&mechanism.data()), mjOBJ_BODY, body, velocity,
+                      0);  // of the centre of mass
+    const Eigen::Vector3d p = m.body_mass[body] * Eigen::Vector3d(velocity[3], velocity[4], velocity[5]);
+    sum.linear += p;
+    if (body > 1) sum.of_wings = std::max(sum.of_wings, p.norm());
+    sum.place += m.body_mass[body] * Eigen::Vector3d(mechanism.data().xipos + 3 * body);
+  }
+  return sum;
+}
+
+TEST(FamilyC, ModelHasTheFilesMassesAndInertias) {
+  const Mechanism mechanism(nominal(), {});
+  const mjModel& m = mechanism.model();
+  double mass = 0;
+  for (int body = 1; body < m.nbody; ++body) mass += m.body_mass[body];
+  EXPECT_NEAR(mass, 12.448e-3, 1e-6);
+  const std::vector<std::pair<std::string, RigidBody>> bodies = {{"torso", nominal().torso},
+                                                                 {"left_edge", nominal().sides[0].leading_edge},
+                                                                 {"right_edge", nominal().sides[1].leading_edge},
+                                                                 {"left_wing", nominal().sides[0].wing},
+                                                                 {"right_wing", nominal().sides[1].wing}};
+  for (const auto& [name, body] : bodies) {
+    const int id = mj_name2id(&m, mjOBJ_BODY, name.c_str());
+    ASSERT_GE(id, 0) << name;
+    EXPECT_NEAR(m.body_mass[id], body.mass_kg, 1e-12) << name;
+    const mjtNum* q = m.body_iquat + 4 * id;
+    const Eigen::Matrix3d R = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+    const Eigen::Matrix3d inertia = R * Eigen::Vector3d(m.body_inertia + 3 * id).asDiagonal() * R.transpose();
+    EXPECT_LT((inertia - body.inertia_kg_m2).norm(), 1e-6 * body.inertia_kg_m2.norm()) << name;
+    EXPECT_LT((Eigen::Vector3d(m.body_ipos + 3 * id) - body.com_m).norm(), 1e-12) << name;
+  }
+}
+
+TEST(FamilyC, EllipsoidsHaveThePlanformsMoments) {
+  const Planform& p = nominal().sides[0].planform;
+  double r0 = 0, r1 = 0, r2 = 0, r3 = 0;
+  for (const Strip& s : strips_of(p)) {
+    r0 += s.area;
+    r1 += s.area * s.radius;
+    r2 += s.area * s.radius * s.radius;
+    r3 += s.area * s.radius * s.radius * s.radius;
+  }
+  EXPECT_NEAR(r0, p.r00, 1e-12);
+  EXPECT_NEAR(r1, p.r11, 1e-12);
+  EXPECT_NEAR(r2, p.r22, 1e-12);
+  EXPECT_NEAR(r3, p.r33, 1e-12);
+}
+
+TEST(FamilyC, FallsFreelyWithoutAir) {
+  Mechanism mechanism(nominal(), {});
+  mechanism.model().opt.density = mechanism.model().opt.viscosity = 0;
+  const double before = momentum(mechanism).place.z();
+  for (long i = 0; i < std::lround(0.1 / Mechanism::kStep_s); ++i) mechanism.step({0, 0}, {0, 0}, {});
+  const double fallen = (before - momentum(mechanism).place.z()) / nominal().mass_kg();
+  EXPECT_NEAR(fallen, 0.5 * 9.81 * 0.1 * 0.1, 1e-4);
+}
+
+TEST(FamilyC, KeepsMomentumWithoutAirAndWeight) {
+  const auto lost = [](double step_s) {
+    Bench bench(nominal(), step_s);
+    mjOption& option = bench.mechanism.model().opt;
+    option.density = option.viscosity = option.gravity[2] = 0;
+    double wings = 0, all = 0;
+    bench.run({10, 0, 0, 0}, 0.04, false, [&](double) {
+      const Momentum now = momentum(bench.mechanism);
+      wings = std::max(wings, now.of_wings);
+      all = std::max(all, now.linear.norm());
+    });
+    EXPECT_GT(wings, 1e-4);  // kg m/s
+    return all / wings;
+  };
+  const double coarse = lost(Mechanism::kStep_s), fine = lost(Mechanism::kStep_s / 5);
+  EXPECT_LT(fine, 0.02);
+  EXPECT_LT(fine, 0.25 * coarse);
+}
+
+TEST(FamilyC, TenVoltsCarryTheWeightInSteps) {
+  const double thrust = Bench(nominal()).thrust({10, 0, 0, 0});
+  EXPECT_NEAR(thrust, 1.0, 0.03);
+  EXPECT_NEAR(Bench(nominal(), Mechanism::kStep_s / 2).thrust({10, 0, 0, 0}), thrust, 0.005);
+}
+
+TEST(FamilyC, SymmetricRobotFliesSymmetrically) {
+  Figures f = nominal();
+  const auto mirrored = [](RigidBody body) {
+    body.com_m.y() *= -1;
+    for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}})
+      body.inertia_kg_m2(i, j) = body.inertia_kg_m2(j, i) = -body.inertia_kg_m2(i, j);
+    return body;
+  };
+  f.torso.com_m.y() = 0;
+  for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}})
+    f.torso.inertia_kg_m2(i, j) = f.torso.inertia_kg_m2(j, i) = 0;
+  f.sides[1].leading_edge = mirrored(f.sides[0].leading_edge);
+  f.sides[1].wing = mirrored(f.sides[0].wing);
+  Bench bench(f);
+  double aside = 0, along = 0, strokes = 0;
+  bench.run({10, 0, 0.2, 0}, 0.15, false, [&](double) {
+    const Motion now = bench.mechanism.motion();
+    aside = std::max({aside, std::abs(now.velocity_W.y()), std::abs(now.rate_B.x()), std::abs(now.rate_B.z())});
+    along = std::max(along, std::abs(now.rate_B.y()));
+    strokes = std::max(strokes, std::abs(bench.mechanism.stroke(0) - bench.mechanism.stroke(1)));
+  });
+  EXPECT_GT(along, 0.5);
+  EXPECT_LT(aside, 1e-5);
+  EXPECT_LT(strokes, 1e-6);
+}
+
+TEST(FamilyC, InputsTurnTheRobotAsPublished) {
+  const auto turned = [](const Inputs& inputs) {
+    Bench bench(nominal());
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    bench.run(inputs, 8 / 34.0, true, [&](double) { sum += bench.mechanism.motion().turning_B; });
+    return sum;
+  };
+  const Eigen::Vector3d none = turned({10, 0, 0, 0});
+  EXPECT_GT((turned({10, 1, 0, 0}) - none).x(), 0);
+  EXPECT_GT((turned({10, 0, 1, 0}) - none).y(), 0);
+  EXPECT_GT((turned({10, 0, 0, 0.1}) - none).z(), 0);
+}
+
+TEST(FamilyC, Hovers) {
+  Assignment a = plain();
+  a.hover = true;
+  a.own_figures = true;
+  const FamilyFlight flight = fly_one(a, 0, false, {1.5, 2}).flight;
+  EXPECT_FALSE(flight.crashed) << flight.how;
+  EXPECT_EQ(flight.log.command.t_s.size(), 2000U);
+  const flightlog::FlightLog again = flightlog::parse_flight_log(flightlog::flight_log_files(flight.log), "log");
+  EXPECT_EQ(again.command, flight.log.command);
+  EXPECT_GT(flight.log.mocap.t_s.size(), 250U);
+  EXPECT_EQ(flight.log.header.ambient.walls.size(), 1U);
+}
+
+TEST(FamilyC, EffectsOfNoSizeLeaveTheSameBytesAndOthersNot) {
+  const std::vector<FamilyEffect>& effects = effect_table();
+  ASSERT_EQ(effects.size(), static_cast<std::size_t>(Effect::kCount));
+  Assignment none = plain();
+  for (const FamilyEffect& effect : effects) none.effects.emplace_back(effect.id, 0.0);
+  const std::array<flightlog::FlightLog, 3> without = {short_log(plain()), short_log(plain(), 1),
+                                                       short_log(plain(), 2)};
+  EXPECT_EQ(short_log(none), without[0]);
+  std::vector<int> same(effects.size());
+  io::parallel_for(effects.size(), 2, [&](std::size_t i) {
+    const std::size_t flight = effects[i].id == "ceiling_effect" ? 1 : effects[i].id == "wall_effect" ? 2 : 0;
+    same[i] = short_log(with(effects[i].id, 1), flight) == without[flight];
+  });
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    EXPECT_FALSE(same[i]) << effects[i].id;
+    EXPECT_FALSE(effects[i].typical.empty() || effects[i].channels.empty() || effects[i].regimes.empty())
+        << effects[i].id;
+  }
+}
+
+TEST(FamilyC, DriveLosesWhatItsEffectsTake) {
+  const auto driven = [](const std::string& effect, double until_s) {
+    const Sizes sizes(effect.empty() ? std::vector<std::pair<std::string, double>>{}
+                                     : std::vector<std::pair<std::string, double>>{{effect, 1}});
+    Drive drive(nominal(), sizes, 3, 0);
+    drive.command(0, {5, -5});
+    for (double t = 0; t < until_s; t += 1e-4) drive.torques(t, 1e-4, {0, 0}, {0, 0});
+    return std::pair{drive.currents()[0], drive.battery_V()};
+  };
+  const double current = driven("", 0.01).first;
+  EXPECT_NEAR(current, 5 / 12.4, 1e-12);
+  EXPECT_NEAR(driven("driver_dead_zone", 0.01).first, (5 - 0.4) / 12.4, 0.002);
+  EXPECT_LT(driven("driver_bandwidth", 5e-4).first, 0.5 * current);
+  EXPECT_NEAR(driven("driver_bandwidth", 0.02).first, current, 1e-9);
+  EXPECT_EQ(driven("command_delay", 0.3 / 34 - 2e-4).first, 0);
+  EXPECT_NEAR(driven("command_delay", 0.3 / 34 + 4e-4).first, current, 1e-12);
+  EXPECT_LT(driven("winding_heating", 3).first, 0.98 * current);
+  EXPECT_LT(driven("battery_sag", 0.1).second, Drive::kBattery_V);
+  EXPECT_LT(driven("outside_shared_supply", 0.01).first, current);
+}
+
+TEST(FamilyC, AirActsWhereItsEffectsAre) {
+  struct Acted {
+    Wrench wrench;
+    double factor;
+  };
+  const auto acted = [](const std::string& effect, const Eigen::Vector3d& at) {
+    Mechanism mechanism(nominal(), {});
+    Air air(nominal(), Sizes({{effect, 1}}), 3, 0);
+    mechanism.place(at, Eigen::Quaterniond::Identity());
+    mj_kinematics(&mechanism.model(), const_cast<mjData*>(&mechanism.data()));
+    const Wrench wrench = air.act(mechanism, 1e-4);
+    const int strip = mj_name2id(&mechanism.model(), mjOBJ_GEOM, "left_strip_1");
+    return Acted{wrench, mechanism.model().geom_fluid[mjNFLUID * strip]};
+  };
+  EXPECT_GT(acted("ground_effect", {0, 0, 0.03}).factor, 1.02);
+  EXPECT_LT(acted("ground_effect", {0, 0, 0.03}).factor, 1.10);
+  EXPECT_NEAR(acted("ground_effect", {0, 0, 1}).factor, 1, 1e-6);
+  EXPECT_GT(acted("ceiling_effect", {0, 0, 1.95}).factor, 1.02);
+  EXPECT_LT(acted("wall_effect", {0, 0.9, 1}).factor, 0.99);
+  EXPECT_GT(acted("wall_effect", {0, 0.9, 1}).wrench.force_W.y(), 1e-3);
+  EXPECT_LT(acted("wall_effect", {0, 0, 1}).wrench.force_W.y(), 1e-6);
+  EXPECT_NEAR(acted("tether", {0, 0, 1.01}).wrench.force_W.z(), -0.2e-3 * 9.81, 1e-6);
+  EXPECT_NEAR(acted("tether", {0, 0, 0.01}).wrench.force_W.z(), 0, 1e-9);
+}
+
+TEST(FamilyC, SensorsErrAsTheirEffectsSay) {
+  const flightlog::FlightLog log = short_log(plain()), late = short_log(with("mocap_delay", 1));
+  EXPECT_EQ(late.command, log.command);
+  EXPECT_EQ(late.imu, log.imu);
+  EXPECT_EQ(late.header, log.header);
+  // samples from before t = 0 arrive later by 5 ms: those that are in both logs are the same poses
+  const std::size_t more = static_cast<std::size_t>(
+      std::find(late.mocap.x_m.begin(), late.mocap.x_m.end(), log.mocap.x_m[0]) - late.mocap.x_m.begin());
+  ASSERT_LT(more, late.mocap.x_m.size());
+  EXPECT_NEAR(late.mocap.t_s[more], log.mocap.t_s[0] + 5e-3, 1e-12);
+  const flightlog::FlightLog tilted = short_log(with("mocap_tilt", 1)), offset = short_log(with("marker_offset", 1));
+  const auto place = [](const flightlog::FlightLog& of) {
+    return Eigen::Vector3d(of.mocap.x_m[3], of.mocap.y_m[3], of.mocap.z_m[3]);
+  };
+  EXPECT_NEAR((place(tilted) - place(log)).norm(), 0.01 * place(log).norm(), 0.01 * place(log).norm());
+  EXPECT_GT((place(tilted) - place(log)).norm(), 1e-4);
+  EXPECT_NEAR((place(offset) - place(log)).norm(), 2e-3, 1e-6);
+  EXPECT_EQ(short_log(with("gyro_bias", 1)).imu.accel_x_m_s2, log.imu.accel_x_m_s2);
+  EXPECT_EQ(short_log(with("vibration_rectification", 1)).imu.gyro_x_rad_s, log.imu.gyro_x_rad_s);
+}
+
+TEST(FamilyC, ContrastIsWhatTheEffectDoes) {
+  const Length length = {0.12, 0.2};
+  const auto mean = [&](const std::string& effect, double size) {
+    const Contrast contrast = contrast_of(plain(), 0, effect, size, length);
+    EXPECT_EQ(contrast.beat_s.size(), 6U);
+    Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
+    for (const auto& beat : contrast.change)
+      for (int channel = 0; channel < 6; ++channel) sum[channel] += beat[static_cast<std::size_t>(channel) * 5] / 6;
+    return sum;
+  };
+  const auto com = mean("com_offset", 1);  // 1 mm under the weight: about 31 rad/s^2
+  EXPECT_NEAR(std::hypot(com[3], com[4]), 31, 9);
+  EXPECT_NEAR(mean("com_offset", 2).segment<2>(3).norm() / com.segment<2>(3).norm(), 2, 0.15);
+  EXPECT_EQ(mean("com_offset", 0).norm(), 0);
+  EXPECT_EQ(mean("gyro_bias", 1).norm(), 0);
+  EXPECT_LT(mean("driver_dead_zone", 1)[2], -0.2);
+  const auto damage = mean("wing_damage", 1);
+  EXPECT_NEAR(std::abs(damage[3]), 24, 8);
+  EXPECT_LT(damage[2], 0);
+}
+
+TEST(FamilyC, EscapeKeepsItsRules) {
+  EscapeAssignment rules;
+  rules.observation = {"goal_rotation", "position_error", "velocity", "body_rate",
+                       "beat_phase",    "time",           "trim",     "previous_action"};
+  std::size_t width = 0, calls = 0;
+  rules.policy = [&](const std::vector<double>& observation) {
+    width = observation.size();
+    ++calls;
+    return std::array<double, 4>{};
+  };
+  rules.start_m = {-0.02, 0, 0};
+  rules.hand_back = {0.01, 0.1, 1, 0.1, 0.1};
+  rules.hand_back_at_s = 0.1;
+  rules.capture = {0.1, 1, 15, 0.7, 0.8};
+  rules.capture_by_s = 0.35;
+  rules.keep = {0.1, 0, 0, 0.8, 0.8};
+  rules.keep_from_s = 0.3;
+  rules.keep_until_s = 0.5;
+  const FamilyEscape escape = escape_of(plain(), 0, rules, 1);
+  EXPECT_TRUE(escape.success);
+  EXPECT_EQ(width, 23U);
+  EXPECT_LE(calls, 10U);
+  EXPECT_LT(escape.captured_s, 0.02);
+  EXPECT_EQ(escape.log.header.ambient.ground_z_m, -1);
+  rules.policy = [](const std::vector<double>&) { return std::array<double, 4>{-5, 3, 0, 0}; };
+  rules.hand_back_at_s = 0.3;
+  rules.capture = {0.001, 0.01, 15, 0.7, 0.8};
+  EXPECT_FALSE(escape_of(plain(), 0, rules, 0.5).success);
+}
+
+TEST(FamilyC, ConventionsChangeDeclarationsWithinTheirBounds) {
+  double latencies = 0, places = 0;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    Assignment a = plain();
+    a.seed = seed;
+    const Robot robot(a, 0);
+    const SensorFigures exact = sensor_figures(a, robot);
+    a.conventions = true;
+    const SensorFigures loose = sensor_figures(a, robot);
+    const flightlog::FlightHeader &e = exact.declared, &l = loose.declared;
+    EXPECT_EQ(e.imu.latency_s, exact.imu.latency_s);
+    EXPECT_EQ(e.imu.position_m[1], exact.imu.position_m.y());
+    EXPECT_EQ(e.mocap.latency_s, exact.mocap.latency_s);
+    EXPECT_EQ(exact.fast_imu + exact.fast_mocap, 0);
+    EXPECT_EQ(exact.imu.sampling, Sampling::kInstant);
+    EXPECT_EQ(loose.imu.latency_s, exact.imu.latency_s);
+    EXPECT_EQ(loose.imu.gyro_noise, exact.imu.gyro_noise);
+    const double half_s = loose.imu.sampling == Sampling::kInstant ? 0 : 0.5 / e.imu.rate_hz;
+    EXPECT_LE(std::abs(l.imu.latency_s - (exact.imu.latency_s + half_s)), 0.5e-3 + 1e-12);
+    EXPECT_LE(std::abs(l.mocap.latency_s - e.mocap.latency_s), 0.5e-3);
+    EXPECT_LE((Eigen::Vector3d(l.imu.position_m.data()) - exact.imu.position_m).norm(), 2e-3 + 1e-12);
+    EXPECT_LE(Eigen::AngleAxisd(Eigen::Matrix3d(exact.imu.gyro_axes.inverse() * loose.imu.gyro_axes)).angle(),
+              M_PI / 180 + 1e-9);
+    EXPECT_NEAR(l.imu.rate_hz / e.imu.rate_hz, 1, 0.01);
+    EXPECT_NEAR(l.mocap.rate_hz / e.mocap.rate_hz, 1, 0.02);
+    for (const double ratio :
+         {l.imu.gyro_noise_rad_s / e.imu.gyro_noise_rad_s, l.mocap.position_noise_m / e.mocap.position_noise_m}) {
+      EXPECT_GE(ratio, 0.7);
+      EXPECT_LE(ratio, 1.5);
+    }
+    EXPECT_LE(loose.fast_imu + loose.fast_mocap, 50e-6);
+    EXPECT_EQ(l.ambient, e.ambient);
+    latencies += l.mocap.latency_s != e.mocap.latency_s;
+    places += l.imu.position_m != e.imu.position_m;
+  }
+  EXPECT_EQ(latencies, 12);
+  EXPECT_EQ(places, 12);
+  Assignment a = plain();
+  const flightlog::FlightLog exact = short_log(a);
+  a.conventions = true;
+  EXPECT_EQ(short_log(a).command, exact.command);
+}
+
+TEST(FamilyC, DeclaredNoiseIsThatOfTheSamples) {
+  // a robot at rest: what varies from pose to pose is noise
+  Assignment a = plain();
+  const Robot robot(a, 0);
+  const SensorFigures figures = sensor_figures(a, robot);
+  Sensors sensors(a, 0, robot, figures);
+  for (int i = 0; i < 120000; ++i) sensors.after_step(robot, robot.step_s() * i);
+  flightlog::FlightLog log;
+  sensors.finish(log, 1e9);
+  double position = 0, attitude = 0;
+  for (std::size_t i = 0; i < log.mocap.t_s.size(); ++i) {
+    position +=
+        log.mocap.x_m[i] * log.mocap.x_m[i] + log.mocap.y_m[i] * log.mocap.y_m[i] + log.mocap.z_m[i] * log.mocap.z_m[i];
+    attitude +=
+        4 * (log.mocap.qx[i] * log.mocap.qx[i] + log.mocap.qy[i] * log.mocap.qy[i] + log.mocap.qz[i] * log.mocap.qz[i]);
+  }
+  const double count = 3 * static_cast<double>(log.mocap.t_s.size());
+  EXPECT_NEAR(std::sqrt(position / count) / figures.declared.mocap.position_noise_m, 1, 0.1);
+  EXPECT_NEAR(std::sqrt(attitude / count) / figures.declared.mocap.attitude_noise_rad, 1, 0.1);
+}
+
+TEST(FamilyC, FiguresAreDrawnApartAndPhysical) {
+  Eigen::Vector3d spread = Eigen::Vector3d::Zero();
+  constexpr int count = 200;
+  for (std::uint64_t seed = 0; seed < count; ++seed) {
+    const Figures drawn = drawn_figures(nominal(), seed);
+    for (const Side& side : drawn.sides) {
+      EXPECT_TRUE(is_physical(side.wing.inertia_kg_m2) && is_physical(side.leading_edge.inertia_kg_m2));
+      EXPECT_GT(side.rotation.upper_rad, 0.6);
+    }
+    EXPECT_NE(drawn.sides[0].motor.resistance_ohm, drawn.sides[1].motor.resistance_ohm);
+    spread += Eigen::Vector3d(drawn.torso.mass_kg / nominal().torso.mass_kg - 1,
+                              drawn.sides[0].motor.resistance_ohm / 12.4 - 1,
+                              drawn.torso.com_m.x() - nominal().torso.com_m.x())
+                  .cwiseAbs2();
+  }
+  spread = (spread / count).cwiseSqrt();
+  EXPECT_NEAR(spread[0], 0.03, 0.005);
+  EXPECT_NEAR(spread[1], 0.07, 0.01);
+  EXPECT_NEAR(spread[2], 0.3e-3, 0.05e-3);
+}
+
+TEST(FamilyC, SameBytesOnAnyNumberOfThreads) {
+  const auto flown = [](int threads) {
+    std::vector<flightlog::FlightLog> logs(4);
+    io::parallel_for(logs.size(), threads, [&](std::size_t i) {
+      Assignment a = with(i % 2 == 0 ? "wind" : "gear_backlash", 1);
+      a.own_figures = a.conventions = true;
+      a.seed = i / 2;
+      logs[i] = short_log(a, i % 3);
+    });
+    return logs;
+  };
+  const auto one = flown(1);
+  EXPECT_EQ(one, flown(2));
+  EXPECT_NE(one[0].mocap.x_m, one[2].mocap.x_m);
+}
+
+TEST(FamilyC, RefusesWhatItDoesNotKnow) {
+  const auto refusal = [](const auto& call) -> std::string {
+    try {
+      call();
+    } catch (const io::InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const auto family = make_family_c();
+  EXPECT_EQ(refusal([&] { family->fly(with("wnid", 1), 0); }),
+            "effect wnid: family C has no such effect; did you mean \"wind\"?");
+  EXPECT_EQ(refusal([&] { family->fly(with("wind", 4.5), 0); }),
+            "effect wind: size 4.5 is out of range; accepted: a number from 0 to 4");
+  EXPECT_EQ(refusal([&] { family->fly(with("wind", std::nan("")), 0); }),
+            "effect wind: size nan is out of range; accepted: a number from 0 to 4");
+  EXPECT_EQ(refusal([&] { family->contrast(plain(), 0, "wind", -1); }),
+            "effect wind: size -1 is out of range; accepted: a number from 0 to 4");
+  EXPECT_NE(refusal([&] { family->fly(plain(), 3); }).find("flight 3"), std::string::npos);
+  EscapeAssignment rules;
+  rules.observation = {"velocty"};
+  EXPECT_NE(refusal([&] { escape_of(plain(), 0, rules, 0.1); }).find("did you mean \"velocity\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace flappy::blind::c
