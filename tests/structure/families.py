@@ -21,7 +21,8 @@ def may_include(family, bracket, name):
     if ".." in name.split("/"):
         return False
     if bracket == "<":
-        return bool(STANDARD.fullmatch(name)) or name.startswith("Eigen/")
+        engine = family == "c" and name == "mujoco/mujoco.h"  # what family C stands on
+        return bool(STANDARD.fullmatch(name)) or name.startswith("Eigen/") or engine
     return name in SHARED or name.startswith(f"blind/{family}/") or name.startswith("io/")
 
 
