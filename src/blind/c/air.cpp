@@ -20,8 +20,8 @@ constexpr double kHoverRate2 = 2.9e4;  // mean square of the stroke rate of the 
 
 Air::Air(const Figures& figures, const Sizes& sizes, std::uint64_t seed, std::size_t flight)
     : figures_(&figures),
-      ground_(0.10 * sizes[Effect::kGround]),
-      ceiling_(0.08 * sizes[Effect::kCeiling]),
+      ground_(0.15 * sizes[Effect::kGround]),
+      ceiling_(0.12 * sizes[Effect::kCeiling]),
       wall_(sizes[Effect::kWall]),
       wake_(0.2 * sizes[Effect::kWakeCapture]),
       clap_(0.25 * sizes[Effect::kClapAndFling]),
@@ -38,12 +38,12 @@ Air::Air(const Figures& figures, const Sizes& sizes, std::uint64_t seed, std::si
 }
 
 double Air::room_factor(const Mechanism& mechanism, std::size_t side, double wall_m) const {
-  const double length = 0.7 * figures_->sides[side].planform.length_m;
+  const double length = figures_->sides[side].planform.length_m;
   const double z = mechanism.strip_position(side, Mechanism::kStrips - 1).z();
   double factor = 1;
   if (ground_ > 0) factor += ground_ * std::exp(-std::max(0.0, z - Room::kGround_m) / length);
   if (ceiling_ > 0) factor += ceiling_ * std::exp(-std::max(0.0, Room::kCeiling_m - z) / length);
-  if (wall_ > 0) factor -= 0.04 * wall_ * std::exp(-std::max(0.0, wall_m) / length);
+  if (wall_ > 0) factor -= 0.06 * wall_ * std::exp(-std::max(0.0, wall_m) / length);
   return factor;
 }
 
@@ -97,7 +97,7 @@ Wrench Air::act(Mechanism& mechanism, double step_s) {
   const double weight = figures_->mass_kg() * Mechanism::kGravity_m_s2;
   if (wall_ > 0) {
     const double away = std::max(0.0, Room::kWall_m - torso.position_W.y() - figures_->around_m);
-    wrench.force_W.y() += 0.02 * wall_ * weight * std::exp(-away / (0.7 * figures_->sides[0].planform.length_m));
+    wrench.force_W.y() += 0.02 * wall_ * weight * std::exp(-away / figures_->sides[0].planform.length_m);
   }
   if (tether_ > 0) {
     const Eigen::Vector3d at_B(0, 0, -0.01), at_W = torso.R_WB * at_B, from = torso.position_W + at_W - anchor_;

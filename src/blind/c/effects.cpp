@@ -7,13 +7,17 @@ namespace flappy::blind::c {
 const std::vector<FamilyEffect>& effect_table() {
   const std::vector<std::string> lift = {"force_z", "current"}, turn = {"torque_x", "torque_z"};
   static const std::vector<FamilyEffect> table = {
-      {"ground_effect", "10 % more air force at no height, decaying over 0.7 wing lengths", lift, {"height", "place"}},
+      {"ground_effect",
+       "15 % more air force at no height, decaying over a wing's length: 3 to 8 % in flights near the ground",
+       lift,
+       {"height", "place"}},
       {"ceiling_effect",
-       "8 % more air force at no clearance, decaying over 0.7 wing lengths",
+       "12 % more air force at no clearance, decaying over a wing's length",
        lift,
        {"ceiling", "place"}},
       {"wall_effect",
-       "at the wall 4 % less air force on the wing beside it, pull of 2 % of the weight",
+       "at the wall 6 % less air force on the wing beside it, and a pull of 2 % of the weight; both decay over a "
+       "wing's length",
        {"force_y", "torque_x"},
        {"wall", "place"}},
       {"body_drag", "an ellipsoid of C_d A 1.5e-3 m^2 as the torso", {"force_x", "force_y", "force_z"}, {"velocity"}},
