@@ -92,7 +92,7 @@ void Robot::step(const Motion* held) {
     const double give = harder > 0 ? std::sinh(harder * angle) / harder : angle;
     spring[side] = -(angle > 0 ? of.positive_Nm_rad : of.negative_Nm_rad) * give;
     if (stiction > 0) {  // Stribeck's law: friction falls from its value at rest as exp(-(w/w_s)^2)
-      const double slip = m.drive_rate(side) / 40;
+      const double slip = m.drive_rate(side) / 120;
       m.set_friction(side, friction_Nm_[side] * (1 + stiction * std::exp(-slip * slip)));
     }
   }
