@@ -117,7 +117,7 @@ const std::vector<FamilyEffect>& effect_table() {
        {"force_z", "torque_x", "current"},
        {"difference", "amplitude"}},
       {"outside_hinge_stiction",
-       "2e-5 N m of dry friction in the rotation hinges",
+       "6e-5 N m of dry friction in the rotation hinges",
        {"force_z", "force_x"},
        {"always", "amplitude"}},
       {"outside_spring_creep", "rest angle of both springs creeps by 2 deg over 15 s", {"torque_y"}, {"time"}},
