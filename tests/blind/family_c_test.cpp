@@ -343,6 +343,23 @@ TEST(FamilyC, WingsFollowATorsoThatIsHeld) {
   EXPECT_NEAR(mechanism.stroke_rate(1), -mechanism.stroke_rate(0), 1e-3);
 }
 
+TEST(FamilyC, PilotRemembersWhereItWasCarried) {
+  Pilot pilot(nominal(), 1, 0);
+  Motion still;
+  still.position_W = {0.1, 0, 1};
+  still.velocity_W = {0.2, 0, 0};
+  for (int i = 0; i < 60; ++i) pilot.look(still, 1e-3);
+  pilot.carry(still.position_W, M_PI / 2, {0, 0.5, 0});
+  still.position_W = {0.1, 0.5, 1};
+  still.velocity_W = {0, 0.2, 0};
+  still.q_WB = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ());
+  still.R_WB = still.q_WB.toRotationMatrix();
+  pilot.look(still, 1e-3);
+  EXPECT_LT((pilot.view().position_W - still.position_W).norm(), 0.01);
+  EXPECT_LT((pilot.view().velocity_W - still.velocity_W).norm(), 1e-9);
+  EXPECT_NEAR(heading_of(pilot.view().R_WB), M_PI / 2, 0.02);
+}
+
 TEST(FamilyC, EscapeKeepsItsRules) {
   EscapeAssignment rules;
   rules.observation = {"goal_rotation", "position_error", "velocity", "body_rate",

@@ -13,7 +13,7 @@
 namespace flappy::blind::c {
 namespace {
 
-constexpr double kGustTime_s = 0.4;
+constexpr double kGustTime_s = 0.4, kMeeting_rad = 20 * M_PI / 180;
 constexpr double kHoverRate2 = 2.9e4;  // mean square of the stroke rate of the nominal robot in hover, rad^2/s^2
 
 }  // namespace
@@ -23,7 +23,7 @@ Air::Air(const Figures& figures, const Sizes& sizes, std::uint64_t seed, std::si
       ground_(0.15 * sizes[Effect::kGround]),
       ceiling_(0.12 * sizes[Effect::kCeiling]),
       wall_(sizes[Effect::kWall]),
-      wake_(0.2 * sizes[Effect::kWakeCapture]),
+      wake_(0.3 * sizes[Effect::kWakeCapture]),
       clap_(0.25 * sizes[Effect::kClapAndFling]),
       flexibility_(175 * sizes[Effect::kWingFlexibility]),
       wind_(sizes[Effect::kWind]),
@@ -47,19 +47,13 @@ double Air::room_factor(const Mechanism& mechanism, std::size_t side, double wal
   return factor;
 }
 
-double Air::wing_factor(const Mechanism& mechanism, std::size_t side) {
+double Air::wing_factor(std::size_t side) const {
+  const double chord = figures_->sides[side].planform.chord_m;
   double factor = 1;
-  if (wake_ > 0) {
-    // what the wing left behind is half a chord long
-    factor += wake_ * std::exp(-travelled_m_[side] / (0.5 * figures_->sides[side].planform.chord_m));
-  }
-  if (clap_ > 0) {
-    const double sum = mechanism.stroke(0) + mechanism.stroke(1);
-    const double behind = M_PI - sum, before = M_PI + sum, gap = std::max(0.0, std::min(behind, before));
-    const double closing = (behind < before ? 1 : -1) * mechanism.stroke_rate(side);
-    const double parting = 0.5 - 0.5 * std::tanh(closing / 30);  // only on wings that part
-    factor += clap_ * parting * std::exp(-gap / (20 * M_PI / 180));
-  }
+  if (wake_ > 0) factor += wake_ * std::exp(-travelled_m_[side] / chord);  // what the wing left behind is a chord long
+  if (clap_ > 0)
+    factor += clap_ * met_[side] *
+              std::exp(-travelled_m_[side] / (3 * chord));  // circulation of the fling stays for some chords
   return factor;
 }
 
@@ -80,10 +74,13 @@ Wrench Air::act(Mechanism& mechanism, double step_s) {
     if (rate * direction_[side] <= 0) {
       direction_[side] = rate < 0 ? -1 : 1;
       travelled_m_[side] = 0;
+      // how near the wings are where this one turns, before or behind the body
+      const double sum = std::abs(mechanism.stroke(0) + mechanism.stroke(1));
+      met_[side] = std::exp(-std::max(0.0, M_PI - sum) / kMeeting_rad);
     }
     travelled_m_[side] += std::abs(rate) * 0.72 * figures_->sides[side].planform.length_m * step_s;
     if (any_factor_) {
-      const double factor = room_factor(mechanism, side, wall_m[side]) * wing_factor(mechanism, side);
+      const double factor = room_factor(mechanism, side, wall_m[side]) * wing_factor(side);
       for (std::size_t i = 0; i < Mechanism::kStrips; ++i) mechanism.scale_air(side, i, factor);
     }
     if (flexibility_ > 0) {  // the outer part gives way to the load within a millisecond

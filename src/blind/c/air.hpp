@@ -20,7 +20,7 @@ class Air {
 
  private:
   double room_factor(const Mechanism& mechanism, std::size_t side, double wall_m) const;
-  double wing_factor(const Mechanism& mechanism, std::size_t side);
+  double wing_factor(std::size_t side) const;
   void blow(Mechanism& mechanism, double step_s);
 
   const Figures* figures_;
@@ -28,7 +28,7 @@ class Air {
   Random random_;
   Eigen::Vector3d mean_wind_ = Eigen::Vector3d::Zero(), gust_ = Eigen::Vector3d::Zero(),
                   anchor_ = Eigen::Vector3d::Zero();
-  std::array<double, 2> travelled_m_{}, direction_{}, twist_rad_{};
+  std::array<double, 2> travelled_m_{}, met_{}, direction_{}, twist_rad_{};
   double stroke_rate_squared_ = 0;
   bool any_factor_;
 };

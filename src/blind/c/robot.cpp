@@ -24,7 +24,7 @@ Figures faulty(Figures f, const Sizes& sizes, std::uint64_t seed) {
       const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.1 * shape * wing, Eigen::Vector3d::UnitX()).toRotationMatrix();
       side.wing.inertia_kg_m2 = turn * side.wing.inertia_kg_m2 * turn.transpose();
     }
-    side.rotation.friction_Nm += 2e-5 * sizes[Effect::kHingeStiction];
+    side.rotation.friction_Nm += 6e-5 * sizes[Effect::kHingeStiction];
   }
   return f;
 }
@@ -78,6 +78,7 @@ void Robot::tick_held(const std::array<double, 2>& voltages, const Motion* held,
 
 void Robot::step(const Motion* held) {
   Mechanism& m = *mechanism_;
+  if (!m.is_finite()) return;  // MuJoCo would complain in a file of its own
   const double now_s = static_cast<double>(done_) * step_s_;
   const Wrench wrench = air_->act(m, step_s_);
   const std::array<double, 2> motor =
@@ -92,7 +93,7 @@ void Robot::step(const Motion* held) {
     const double give = harder > 0 ? std::sinh(harder * angle) / harder : angle;
     spring[side] = -(angle > 0 ? of.positive_Nm_rad : of.negative_Nm_rad) * give;
     if (stiction > 0) {  // Stribeck's law: friction falls from its value at rest as exp(-(w/w_s)^2)
-      const double slip = m.drive_rate(side) / 40;
+      const double slip = m.drive_rate(side) / 120;
       m.set_friction(side, friction_Nm_[side] * (1 + stiction * std::exp(-slip * slip)));
     }
   }
