@@ -16,8 +16,13 @@ struct PoseReading {
   std::array<double, 4> quaternion;  ///< as logged, declared w, x, y, z
   Eigen::Quaterniond attitude() const { return {quaternion[0], quaternion[1], quaternion[2], quaternion[3]}; }
 };
-/// Of the log, without lost ones: where noise is declared, these repeat the pose before.
+/// Of the log, without lost ones, which repeat the pose before where noise is declared, and without those whose markers were taken for
+/// others, which leap away and back within a few frames.
 std::vector<PoseReading> pose_readings(const FlightLog& log);
+
+/// The log with samples of motion capture, IMU and power at the instants of the regular clocks that took them, where their times are
+/// those of arrival: a line through them, gaps counted. Left as they are where no such clock is found.
+FlightLog on_its_clocks(FlightLog log);
 
 /// A sample of the IMU, in B.
 struct ImuReading {

@@ -5,6 +5,7 @@
 #include "flightlog/check/check.hpp"
 #include "flightlog/check/data_faults.hpp"
 #include "gap/diagnose/diagnose_command.hpp"
+#include "gap/evidence/learn_discrepancy.hpp"
 #include "import_command.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"
@@ -140,6 +141,15 @@ int main(int argc, char** argv) {
   diagnose.option("--withhold", command.withheld, "entries that the catalogue is to lack");
   diagnose.option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
   diagnose.option("--threads", command.threads, "0: one for each processor").range(0, 1024);
+  io::Command learn = program.app().command(
+      "learn-discrepancy", "what models get wrong, from robots of which all is known that the vehicle's file says");
+  gap::LearnCommand lessons{.vehicle = {}, .priors = command.priors, .discrepancy = command.discrepancy};
+  learn.option("--vehicle", lessons.vehicle, "the vehicle's file").required();
+  learn.option("--robots", lessons.robots, "folders, each with the flights of one robot").required();
+  learn.option("--priors", lessons.priors, "what is uncertain of the vehicle").shows_default();
+  learn.option("--discrepancy", lessons.discrepancy, "to begin with").shows_default();
+  learn.option("--out", lessons.out, "file for what is learnt").required();
+  learn.option("--threads", lessons.threads, "0: one for each processor").range(0, 1024);
   const io::Command blind = program.app().hidden_command("blind");  // where the benchmark was until now
   program.app().expect_commands(1, 1);
   bool faulty = false;
@@ -153,6 +163,8 @@ int main(int argc, char** argv) {
       program.write_json(found);
     } else if (import.given()) {
       program.write_json(gap::run_import(import_command));
+    } else if (learn.given()) {
+      gap::run_learn_discrepancy(lessons);
     } else {
       program.write_json(gap::run_diagnose(command));
     }

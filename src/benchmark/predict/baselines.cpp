@@ -165,7 +165,7 @@ std::map<std::string, Baseline> baselines(const std::vector<gap::PredictedFlight
     candidates.push_back(plain.candidate(there));
     effects.emplace_back();
   }
-  for (gap::SizeStep& s : gap::size_steps(uncertain, {}, at, withheld)) {
+  for (gap::SizeStep& s : gap::size_steps(uncertain, at, withheld)) {
     candidates.push_back(std::move(s.candidate));
     effects.push_back(std::move(s.effect));
   }

@@ -11,17 +11,12 @@
 
 namespace flappy::gap {
 
-/// What no entry explains: a smooth function of the regime, in a channel and a harmonic of the beat, or in all of them.
+/// What no entry explains: a block of the discrepancy that is larger than models are wrong by.
 struct Term {
-  int channel = kAll, harmonic = kAll;
-  int function = 0;  ///< of the basis
-  double times = 0;  ///< how much larger it may be than what every model gets wrong
+  int channel = 0, harmonic = 0;
+  int function = 0;  ///< of the basis, the one that takes most of the block
+  double times = 0;  ///< how much larger it is than usual for this robot
   double gain = 0;   ///< nats
-  static constexpr int kAll = -1;
-  bool has(int group) const {
-    return (channel == kAll || group / kCoefficients == channel) &&
-           (harmonic == kAll || (group % kCoefficients + 1) / 2 == harmonic);
-  }
 };
 
 /// What explains the flights, one of several hypotheses that exclude each other.
@@ -30,7 +25,8 @@ struct ScoredHypothesis {
   std::vector<std::string> effects;
   double log_evidence = 0;  ///< of all flights
   double probability = 0;
-  std::vector<Term> terms;                ///< of an unknown cause
+  double log_prior = 0;
+  std::vector<Term> terms;                ///< of an unknown cause, or of what is left beside effects
   std::vector<std::string> jointly_with;  ///< of an unknown cause: effects that its terms act jointly with
   /// Of effects and parameters. An effect that would gain nothing is weighed as far as a linear model sees: no residual, and
   /// its size is what flights that tell nothing of it leave probable.
@@ -55,6 +51,7 @@ struct Conclusion {
   std::vector<std::string> effects;  ///< of a group: of its sets that hold a twentieth of it
   double probability = 0;            ///< of a group: all of it
   std::size_t hypothesis = 0;        ///< the most probable one of what is concluded
+  bool remainder = false;            ///< beside effects something is left that no entry explains
 };
 
 struct Diagnosis {

@@ -110,18 +110,19 @@ Report verdict_report_of(const std::vector<PredictedFlight>& flights, const sim:
         r.closure = c.closure;
       }
     }
-    if (a.kind == ScoredHypothesis::Kind::unknown) {
-      const RegimeBasis basis(flights);
-      for (const Term& t : a.terms)
-        r.unexplained.push_back({t.channel == Term::kAll ? "all" : channel_name(t.channel),
-                                 t.harmonic == Term::kAll ? "all" : std::to_string(t.harmonic), basis.name(t.function),
-                                 t.times, t.gain});
-      r.jointly_with = a.jointly_with;
-    }
     (effect ? r.candidates : others).push_back(std::move(c));
   }
   r.candidates.insert(r.candidates.end(), others.begin(), others.end());
   const ScoredHypothesis& concluded = d.hypotheses[r.conclusion.hypothesis];
+  const ScoredHypothesis& freest =
+      concluded.terms.empty()
+          ? *std::ranges::find(d.hypotheses, ScoredHypothesis::Kind::unknown, &ScoredHypothesis::kind)
+          : concluded;
+  const RegimeBasis basis(flights);
+  for (const Term& t : freest.terms)
+    r.unexplained.push_back(
+        {channel_name(t.channel), std::to_string(t.harmonic), basis.name(t.function), t.times, t.gain});
+  r.jointly_with = freest.jointly_with;
   if (concluded.kind == ScoredHypothesis::Kind::effect)
     r.moved = moved_by(concluded.fit, Hypothesis(uncertain, concluded.effects));
   else r.moved = moved_by(d.parameters, Hypothesis(uncertain, {}));
@@ -185,6 +186,7 @@ Json diagnosis_json(const Report& r) {
     candidates.push_back({{"effects", c.effects},
                           {"group", c.group},
                           {"probability", c.probability},
+                          {"log_evidence", c.log_evidence},
                           {"parameters", parameters},
                           {"closure", c.closure ? Json(c.closure->value) : Json(nullptr)}});
   }

@@ -82,6 +82,7 @@ Conclusion conclude(const std::vector<ScoredHypothesis>& hypotheses, const Verdi
   c.hypothesis = pool.best;
   c.probability = best.probability;
   c.effects = best.effects;
+  c.remainder = best.kind == ScoredHypothesis::Kind::effect && !best.terms.empty();
   switch (best.kind) {
     case ScoredHypothesis::Kind::none:
       c.kind = Conclusion::Kind::none;

@@ -13,19 +13,15 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
   root.schema(1);
   VerdictRule r{};
   const io::Table prior = root.table("prior");
-  r.prior = {prior.number("none", io::positive(1)), prior.number("parameters", io::positive(1)),
-             prior.number("effect", io::positive(1)), prior.number("unknown", io::positive(1)),
-             prior.number("further_effect", io::positive(1))};
+  r.prior = {prior.number("none", io::positive(1)),           prior.number("parameters", io::positive(1)),
+             prior.number("effect", io::positive(1)),         prior.number("unknown", io::positive(1)),
+             prior.number("further_effect", io::positive(1)), prior.number("remainder", io::positive(1))};
   if (!(std::abs(r.prior.none + r.prior.parameters + r.prior.effect + r.prior.unknown - 1) < 1e-9))
     prior.fail("", "none, parameters, effect and unknown do not add up to 1", "probabilities that do");
   const io::Table gain = root.table("gain");
   r.gain = {gain.number("by_chance_nats", kNats), gain.number("further_by_chance_nats", kNats),
             gain.number("further_screened_nats", kNats), gain.number("vanished_size", kPositive)};
-  const io::Table unknown = root.table("unknown");
-  r.unknown = {unknown.numbers("times", kPositive), static_cast<int>(unknown.integer("terms", 0, 1000)),
-               static_cast<int>(unknown.integer("tried", 1, 100)), unknown.number("term_cost_nats", kNats),
-               unknown.number("large_effect_nats", kNats)};
-  if (r.unknown.times.empty()) unknown.fail("times", "is empty", "numbers above 0");
+  r.unknown = {root.table("unknown").number("freeing_nats", kNats)};
   r.refutation = {root.table("refutation").number("share_of_gap", kNats)};
   const io::Table interval = root.table("interval");
   r.interval = {interval.number("sd_factor", kPositive), interval.number("size_error", kNats)};

@@ -11,15 +11,13 @@ namespace flappy::gap {
 
 struct VerdictRule {
   struct Prior {
-    double none, parameters, effect, unknown, further_effect;
+    double none, parameters, effect, unknown, further_effect, remainder;
   } prior;
   struct Gain {
     double by_chance_nats, further_by_chance_nats, further_screened_nats, vanished_size;
   } gain;
   struct UnknownCause {
-    std::vector<double> times;
-    int terms, tried;
-    double term_cost_nats, large_effect_nats;
+    double freeing_nats;
   } unknown;
   struct Refutation {
     double share_of_gap;

@@ -233,13 +233,26 @@ double Evidence::noise_sd(int group) const {
   return g.sd / std::sqrt(1 - g.past * g.past);
 }
 
+VectorXd Evidence::base_sd(int group) const {
+  VectorXd sd(basis_.size());
+  for (int i = 0; i < basis_.size(); ++i)
+    sd[i] = signal(group) * discrepancy_.share(group / kCoefficients, (group % kCoefficients + 1) / 2, basis_.kind(i));
+  return sd;
+}
+
 BasisCoefficients Evidence::discrepancy_sd() const {
   BasisCoefficients sd(kGroups, basis_.size());
-  for (int g = 0; g < kGroups; ++g)
+  for (int g = 0; g < kGroups; ++g) {
+    sd.row(g) = base_sd(g).transpose();
     for (int i = 0; i < basis_.size(); ++i)
-      sd(g, i) = groups_[static_cast<std::size_t>(g)].signal *
-                 discrepancy_.share(g / kCoefficients, (g % kCoefficients + 1) / 2, basis_.kind(i));
+      sd(g, i) *= scales_.blocks[static_cast<std::size_t>(block_of(g, basis_.kind(i)))];
+  }
   return sd;
+}
+
+double Evidence::squares_of(MatrixXd normal, const VectorXd& right) {
+  normal.diagonal().array() += kLooseRidge * normal(0, 0);
+  return normal.ldlt().solve(right).dot(right);
 }
 
 /// Of a group over the chosen flights: basis x basis, and basis x residual.
@@ -271,9 +284,7 @@ Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector
     }
     const VectorXd half_right = without.of(right);
     result.sums.row(k).head(k) += (right - without.half.transpose() * half_right).transpose() * change;
-    MatrixXd ridge = normal;
-    ridge.diagonal().array() += kLooseRidge * normal(0, 0);
-    result.sums(k, k) += ridge.ldlt().solve(right).dot(right) - half_right.squaredNorm();
+    result.sums(k, k) += squares_of(normal, right) - half_right.squaredNorm();
     result.log_scale -= without.llt.matrixLLT().diagonal().array().log().sum();
   }
   result.sums = MatrixXd(result.sums.selfadjointView<Eigen::Lower>());

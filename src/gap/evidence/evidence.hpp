@@ -12,6 +12,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -55,10 +56,26 @@ struct Reduced {
   double log_scale = 0;  ///< of what was integrated out
 };
 
+/// How far models of this robot are off, beside what is usual: factors of its discrepancy.
+struct Scales {
+  double robot = 1;
+  std::vector<double> blocks;  ///< [kBlocks]
+  std::vector<char> free;      ///< [kBlocks] whether it is larger than models are, by whatever it takes
+};
+inline constexpr int kClasses = static_cast<int>(Regimes::count), kBlocks = kChannels * (kHarmonics + 1) * kClasses;
+
 struct Posterior {
   double log_evidence = 0;
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
+};
+
+/// A hypothesis weighed with the scales that make the flights most probable.
+struct Weighed {
+  Posterior posterior;  ///< its evidence includes what is thought of the scales
+  Scales scales;
+  BasisCoefficients delta;    ///< mean of what is left for the discrepancy, over its sd
+  BasisCoefficients squares;  ///< expected square of delta, over that of its sd where all scales are 1; 0: not seen
 };
 
 class Evidence {
@@ -77,7 +94,7 @@ class Evidence {
   SufficientStatistics statistics(const Residuals& residual) const;
   /// Adds to a residual `share` times a smooth one.
   void add(double share, const BasisCoefficients& change, SufficientStatistics& to) const;
-  /// Sd of delta that every model of a wing has.
+  /// Sd of delta that every model of this robot has.
   BasisCoefficients discrepancy_sd() const;
   /// `use`: which flights. `discrepancy_sd`: of delta's coefficients.
   Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
@@ -86,6 +103,17 @@ class Evidence {
   /// stay as they are.
   BasisCoefficients local_gains(const SufficientStatistics& residual, const std::vector<char>& use,
                                 const BasisCoefficients& discrepancy_sd, const BasisCoefficients& more_sd) const;
+  /// Expectation-maximisation over the scales of the discrepancy, from `start` on. `own_sd`: what equations of effects get wrong of
+  /// themselves, which no scale changes. `freeing_nats`: the price at which a block may be larger than any model is off; none: no block.
+  Weighed weigh(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
+                const Eigen::VectorXd& prior_mean, const std::vector<char>& use, const BasisCoefficients& own_sd,
+                const Scales& start, std::optional<double> freeing_nats = {}, int iterations = kMostIterations) const;
+  static constexpr int kMostIterations = 12;
+  void set_discrepancy(ModelDiscrepancy discrepancy) { discrepancy_ = std::move(discrepancy); }
+  /// Those that every model of this robot has from now on.
+  void set_scales(const Scales& scales) { scales_ = scales; }
+  const Scales& scales() const { return scales_; }
+  static int block_of(int group, BasisFunction function);
   /// Of the chosen columns, whose theta has the given prior means and sd 1.
   static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns,
                              const Eigen::VectorXd& prior_mean);
@@ -106,6 +134,10 @@ class Evidence {
   void find_noise(const Residuals& residual, Find what);
   template <class Use>
   void for_rows(std::size_t flight, int channel, const Use& use) const;
+  /// Sd of a group's delta where every scale is 1.
+  Eigen::VectorXd base_sd(int group) const;
+  /// Of a residual whose sums are given, as far as the basis has it.
+  static double squares_of(Eigen::MatrixXd normal, const Eigen::VectorXd& right);
   template <class Use>
   void for_whitened(std::size_t flight, int group, const Use& use) const;
 
@@ -114,6 +146,7 @@ class Evidence {
   int threads_;
   RegimeBasis basis_;
   std::vector<Group> groups_;
+  Scales scales_{1, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
   Residuals weights_;
   std::vector<Eigen::MatrixXd> plain_inverse_;        ///< of basis x basis, by channel
   std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< basis x basis of the whitened rows, [flight][group]

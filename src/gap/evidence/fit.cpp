@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "gap/replay/sensor_correction.hpp"
@@ -21,8 +22,12 @@ constexpr double kFirstReach = 0.3, kLeastReach = 0.1, kMostReach = 1, kReachSd 
 constexpr int kAround = 8;
 constexpr double kAroundReach = 0.2;
 constexpr double kConverged = 0.02;
-/// Nats that another linearisation has to bring.
+/// Nats that another step has to bring.
 constexpr double kWorthwhile = 0.05;
+/// Information in a column of standard normal coefficient below which it changes nothing: its evidence by some hundredths of a nat.
+constexpr double kTelling = 0.05;
+/// How far, in reaches of its differences, columns of another point are trusted.
+constexpr double kFar = 2;
 
 }  // namespace
 
@@ -40,8 +45,11 @@ std::vector<Residuals> residuals(const std::vector<PredictedFlight>& flights, co
                                  int threads) {
   // candidates whose sensors agree share a log
   std::map<EffectValues, std::vector<std::size_t>> by_sensors;
-  for (std::size_t i = 0; i < candidates.size(); ++i)
-    by_sensors[sensor_effects(candidates[i].vehicle.effects)].push_back(i);
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    EffectValues sensors = sensor_effects(candidates[i].vehicle.effects);
+    sensors.insert(candidates[i].sensors.begin(), candidates[i].sensors.end());
+    by_sensors[sensors].push_back(i);
+  }
   std::vector<Residuals> list(candidates.size());
   const auto compare = [&](const std::vector<PredictedFlight>& seen, const std::vector<std::size_t>& which,
                            int at_once) {
@@ -88,14 +96,14 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
   }
   std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
   Linearised l{at, std::move(directions), std::move(rows[0]), {}, known};
-  for (std::size_t d = 0; d < spans.size(); ++d) {
+  l.columns.resize(known.size() + spans.size());
+  io::parallel_for(spans.size(), threads_, [&](std::size_t d) {
     Residuals &up = rows[1 + 2 * d], &down = rows[2 + 2 * d];
-    l.columns.emplace_back();
-    if (up.empty() || down.empty() || !(spans[d] > 0)) continue;
+    if (up.empty() || down.empty() || !(spans[d] > 0)) return;
     for (std::size_t f = 0; f < up.size(); ++f)
       for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / spans[d];
-    l.columns.back() = evidence_.basis_coefficients(up);
-  }
+    l.columns[known.size() + d] = evidence_.basis_coefficients(up);
+  });
   if (l.residual.empty()) return l;
   l.statistics = evidence_.statistics(l.residual);
   average(hypothesis, l);
@@ -123,13 +131,19 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
     candidates.push_back(hypothesis.candidate(there));
   }
   const std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
-  double n = 1;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows[i].empty()) continue;
-    SufficientStatistics there = evidence_.statistics(rows[i]);
+  std::vector<SufficientStatistics> around(rows.size());
+  io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
+    if (rows[i].empty()) return;
+    around[i] = evidence_.statistics(rows[i]);
+    BasisCoefficients back = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
     for (Index d = 0; d < k; ++d)
       if (shifts[i][d] != 0 && l.columns[static_cast<std::size_t>(d)].size() > 0)
-        evidence_.add(shifts[i][d], l.columns[static_cast<std::size_t>(d)], there);
+        back += shifts[i][d] * l.columns[static_cast<std::size_t>(d)];
+    evidence_.add(1, back, around[i]);
+  });
+  double n = 1;
+  for (const SufficientStatistics& there : around) {
+    if (there.sums.empty()) continue;
     for (std::size_t f = 0; f < there.sums.size(); ++f)
       for (std::size_t g = 0; g < there.sums[f].size(); ++g) l.statistics.sums[f][g] += there.sums[f][g];
     n += 1;
@@ -138,11 +152,26 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
     for (VectorXd& sum : flight) sum /= n;
 }
 
-Columns Fitter::columns_of(const Linearised& point) const {
+void Fitter::set_background(const std::vector<BasisCoefficients>& columns, const Fit& beside) {
+  background_.clear();
+  Columns all = columns_of(beside.point);
+  const auto first = static_cast<Index>(all.columns.size());
+  for (const BasisCoefficients& c : columns) all.add(c, 0);
+  const Reduced reduced = reduce(beside.point, all);
+  for (Index k = first; k < static_cast<Index>(all.columns.size()); ++k)
+    if (reduced.sums(k, k) > kTelling) background_.push_back(columns[static_cast<std::size_t>(k - first)]);
+}
+
+Columns Fitter::own_columns_of(const Linearised& point) {
   Columns c;
   for (std::size_t d = 0; d < point.columns.size(); ++d)
     if (point.columns[d].size() > 0)
       c.add(point.columns[d], -point.directions.axes.col(static_cast<Index>(d)).dot(point.at));
+  return c;
+}
+
+Columns Fitter::columns_of(const Linearised& point) const {
+  Columns c = own_columns_of(point);
   for (const BasisCoefficients& b : background_) c.add(b, 0);
   return c;
 }
@@ -222,14 +251,14 @@ Directions Fitter::principal(const Hypothesis& hypothesis, const Fit& fit) {
 Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int iterations) const {
   Fit result;
   result.point = linearise(hypothesis, hypothesis.bounded(std::move(start)), axes(hypothesis));
-  return improve(hypothesis, std::move(result), iterations, nullptr);
+  return improve(hypothesis, std::move(result), iterations, nullptr, true);
 }
 
 Fit Fitter::fit(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters, int iterations) const {
   Fit result;
   result.point = linearise(hypothesis, hypothesis.bounded(start), joint_directions(hypothesis, parameters),
                            known(hypothesis, parameters));
-  return improve(hypothesis, std::move(result), iterations, &parameters);
+  return improve(hypothesis, std::move(result), iterations, &parameters, true);
 }
 
 Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters,
@@ -248,44 +277,68 @@ Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters,
 }
 
 Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const {
-  Fit result;
-  result.point = linearise(hypothesis, before.point.at, principal(hypothesis, before));
-  return improve(hypothesis, std::move(result), iterations, nullptr);
+  Fit result = before;
+  result.point.statistics = evidence_.statistics(before.point.residual);
+  return improve(hypothesis, std::move(result), iterations, nullptr, false);
 }
 
-Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const {
+/// Steps by columns of a point that was passed, as long as they do not lead far from it; those of the last one are its own.
+Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters, bool own) const {
   if (fit.point.residual.empty()) return fit;  // comes apart
+  VectorXd linearised_at = fit.point.at;
+  const auto linearise_here = [&](const VectorXd& at) {
+    Linearised next = parameters == nullptr
+                          ? linearise(hypothesis, at, principal(hypothesis, fit))
+                          : linearise(hypothesis, at, fit.point.directions, known(hypothesis, *parameters));
+    if (next.residual.empty()) return false;
+    fit.point = std::move(next);
+    linearised_at = at;
+    own = true;
+    return true;
+  };
   for (int n = 1;; ++n) {
     const Linearised& l = fit.point;
     const Columns columns = columns_of(l);
     const Reduced reduced = reduce(l, columns);
     fit.posterior = solve(l, columns, reduced);
-    if (n >= iterations) return fit;
     const VectorXd step = l.directions.axes * fit.posterior.mean;
-    if (step.cwiseAbs().maxCoeff() < kConverged) return fit;
-    // shares of the step, and steps that go less far where little is known; all tried at once
-    constexpr double kShares[] = {1, 0.5, 0.25, 0.1, 0.03}, kDampings[] = {1, 10, 100};
-    std::vector<VectorXd> tries;
-    for (const double share : kShares) tries.push_back(hypothesis.bounded(l.at + share * step));
-    for (const double damping : kDampings)
-      tries.push_back(hypothesis.bounded(l.at + l.directions.axes * solve(l, columns, reduced, damping).mean));
-    std::vector<Candidate> candidates;
-    for (const VectorXd& at : tries) candidates.push_back(hypothesis.candidate(at));
-    const std::vector<Residuals> left = residuals(flights_, candidates, threads_);
-    const double before = cost(evidence_.statistics(l.residual), l.at);
-    std::size_t best = tries.size();
-    double best_cost = before;
-    for (std::size_t i = 0; i < tries.size(); ++i) {
-      if (left[i].empty()) continue;
-      const double c = cost(evidence_.statistics(left[i]), tries[i]);
-      if (c < best_cost) best = i, best_cost = c;
+    bool improved = n < iterations && step.cwiseAbs().maxCoeff() >= kConverged;
+    if (improved) {
+      // shares of the step, and steps that go less far where little is known; all tried at once
+      constexpr double kShares[] = {1, 0.5, 0.25, 0.1, 0.03}, kDampings[] = {1, 10, 100};
+      std::vector<VectorXd> tries;
+      for (const double share : kShares) tries.push_back(hypothesis.bounded(l.at + share * step));
+      for (const double damping : kDampings)
+        tries.push_back(hypothesis.bounded(l.at + l.directions.axes * solve(l, columns, reduced, damping).mean));
+      std::vector<Candidate> candidates;
+      for (const VectorXd& at : tries) candidates.push_back(hypothesis.candidate(at));
+      std::vector<Residuals> left = residuals(flights_, candidates, threads_);
+      left.push_back(l.residual);
+      tries.push_back(l.at);
+      std::vector<SufficientStatistics> statistics(left.size());
+      std::vector<double> costs(left.size(), std::numeric_limits<double>::infinity());
+      io::parallel_for(left.size(), threads_, [&](std::size_t i) {
+        if (left[i].empty()) return;
+        statistics[i] = evidence_.statistics(left[i]);
+        costs[i] = cost(statistics[i], tries[i]);
+      });
+      const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
+      improved = costs.back() - costs[best] >= kWorthwhile;
+      if (improved) {
+        const VectorXd away = l.directions.axes.transpose() * (tries[best] - linearised_at);
+        if (away.cwiseAbs().cwiseQuotient(l.directions.reach).maxCoeff() > kFar) {
+          if (!linearise_here(tries[best])) return fit;
+        } else {
+          fit.point.at = tries[best];
+          fit.point.residual = std::move(left[best]);
+          fit.point.statistics = std::move(statistics[best]);
+          own = false;
+        }
+      }
     }
-    if (best == tries.size() || before - best_cost < kWorthwhile) return fit;
-    Linearised next = parameters == nullptr
-                          ? linearise(hypothesis, tries[best], principal(hypothesis, fit))
-                          : linearise(hypothesis, tries[best], l.directions, known(hypothesis, *parameters));
-    if (next.residual.empty()) return fit;
-    fit.point = std::move(next);
+    if (improved) continue;
+    if (own || !linearise_here(fit.point.at)) return fit;
+    iterations = n + 1;  // what the new columns say
   }
 }
 

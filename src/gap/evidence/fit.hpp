@@ -49,10 +49,13 @@ class Fitter {
   Fitter(const std::vector<PredictedFlight>& flights, const Evidence& evidence, int threads)
       : flights_(flights), evidence_(evidence), threads_(threads) {}
 
-  /// Columns that may take what they can beside every hypothesis, with standard normal coefficients.
-  void set_background(std::vector<BasisCoefficients> columns) { background_ = std::move(columns); }
+  /// Columns that may take what they can beside every hypothesis, with standard normal coefficients; those of which the flights tell
+  /// nothing, beside a fit's, are left out.
+  void set_background(const std::vector<BasisCoefficients>& columns, const Fit& beside);
   std::vector<char> all_flights() const { return std::vector<char>(flights_.size(), 1); }
-  /// The columns of a point that do not come apart, then the background's.
+  /// The columns of a point that do not come apart.
+  static Columns own_columns_of(const Linearised& point);
+  /// Those, then the background's.
   Columns columns_of(const Linearised& point) const;
   /// What the equations of its effects get wrong of themselves: shares of all that the sizes of each change.
   BasisCoefficients form_error(const Hypothesis& hypothesis, const Linearised& point) const;
@@ -76,7 +79,8 @@ class Fitter {
   static Directions joint_directions(const Hypothesis& hypothesis, const Fit& parameters);
   static std::vector<BasisCoefficients> known(const Hypothesis& hypothesis, const Fit& parameters);
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
-  Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters) const;
+  /// `own`: whether the columns are those of the point itself.
+  Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters, bool own) const;
   void average(const Hypothesis& hypothesis, Linearised& l) const;
   Reduced reduce(const Linearised& point, const Columns& columns) const;
   /// Along all directions. `damping`: of the steps, as so much more precision around the point itself (Levenberg).

@@ -7,8 +7,8 @@
 namespace flappy::gap {
 namespace {
 
-/// How well a header's latency and bandwidth say when a sample was taken.
-constexpr double kImuLagSd_s = 1e-4;
+/// How well a header's latency and bandwidth say when a sample was taken, which may be an instant, a mean, or held.
+constexpr double kImuLagSd_s = 5e-4;
 /// Draws farther out are none of nature's.
 constexpr double kFarthest = 4;
 /// Half of 90 % of a normal distribution, in standard deviations; all of 90 % of one that has one side only.
@@ -37,7 +37,7 @@ Hypothesis::Hypothesis(const sim::Randomisation& uncertain, std::vector<std::str
   for (std::size_t d = 0; d < uncertain.draws(); ++d)
     unknowns_.push_back({"", uncertain.name(d), 0, 1, uncertain.is_uniform(d) ? -1.0 : -kFarthest,
                          uncertain.is_uniform(d) ? 1.0 : kFarthest, false});
-  unknowns_.push_back({"", "imu.latency_s", 0, kImuLagSd_s, -20 * kImuLagSd_s, 20 * kImuLagSd_s, false});
+  unknowns_.push_back({"", "imu.latency_s", 0, kImuLagSd_s, -kFarthest * kImuLagSd_s, kFarthest * kImuLagSd_s, false});
   for (const std::string& e : effects_)
     for (Unknown& u : unknowns_of(e)) unknowns_.push_back(std::move(u));
 }

@@ -1,6 +1,7 @@
 #include "gap/evidence/model_discrepancy.hpp"
 
-#include <cmath>
+#include <algorithm>
+#include <cstdio>
 
 #include "io/config.hpp"
 #include "model/effects/registry.hpp"
@@ -8,53 +9,115 @@
 namespace flappy::gap {
 namespace {
 
-/// The table of configs/gap/model_discrepancy.toml that holds a channel.
-std::string table_of(int channel) {
-  if (channel <= kForceZ) return channel_name(channel);
-  return channel < kPathX ? "drive" : channel < kTurnX ? "path" : "turn";
-}
+using enum BasisFunction;
+constexpr std::pair<BasisFunction, const char*> kKeys[] = {
+    {constant, "constant"},     {input, "input"},           {rate, "rate"},
+    {product, "product"},       {place, "place"},           {velocity_x, "velocity_x"},
+    {velocity_y, "velocity_y"}, {velocity_z, "velocity_z"}, {drag_x, "drag_x"},
+    {drag_y, "drag_y"},         {drag_z, "drag_z"}};
+
+constexpr const char* kHead =
+    R"(# How much models of one flapping wing are off before anything is known of a vehicle: the model discrepancy of Kennedy and O'Hagan
+# (2001), which an effect must exceed to be one. Read by flappy-gap diagnose, written by flappy-gap learn-discrepancy: learn it anew
+# from robots of your own that you trust.
+#
+# Learnt from )";
+constexpr const char* kFormError =
+    R"(# How well an entry's equation describes the effect of its name: standard deviation of every coefficient as a share of what the
+# entry's sizes change, for several entries each by its own. A choice: published laws of one cause differ by about so much.
+form_error = )";
+constexpr const char* kShares =
+    R"(# Standard deviation of a coefficient of the regime's basis, as a share of the channel's signal, by harmonic of the beat from 0 to 4:
+# the mean; what follows the inputs, the body's rates, products, the place (height, heading, time, nearness of surfaces); the velocity v
+# in B, and |v| v.
+)";
+constexpr const char* kSpread =
+    R"(# How much more or less than usual models of a robot are off: standard deviation of the log of its own factor, wide, for a robot may be
+# nearly the model; and how far its blocks (a kind of regime in a channel and harmonic) go their own ways about it, as degrees of
+# freedom of an inverse gamma law. Choices.
+)";
+constexpr const char* kSensors =
+    R"(# What laboratories declare of sensors is right to so much, whatever else is so: standard deviations. Choices.
+)";
+constexpr const char* kBackground =
+    R"(# Every vehicle has a little of every effect, or of something that looks like it: standard deviation of the coordinates of its sizes
+# (1: the catalogue's prior). Only more than that is an effect. `other`: of every entry that is not named.
+)";
 
 }  // namespace
+
+Regimes regimes_of(BasisFunction function) {
+  switch (function) {
+    case BasisFunction::constant:
+      return Regimes::always;
+    case BasisFunction::input:
+    case BasisFunction::rate:
+    case BasisFunction::product:
+      return Regimes::inputs;
+    case BasisFunction::place:
+      return Regimes::place;
+    default:
+      return Regimes::velocity;
+  }
+}
 
 double ModelDiscrepancy::background_sd(const std::string& effect) const {
   const auto at = background.find(effect);
   return at != background.end() ? at->second : background.at("other");
 }
 
+std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learnt) {
+  const auto number = [](double v) {
+    char text[32];
+    return std::string(text, static_cast<std::size_t>(std::snprintf(text, sizeof text, "%.4g", v)));
+  };
+  const auto sensor = [&](const char* id) {
+    return number(std::ranges::find(d.nuisances, id, &ModelDiscrepancy::Nuisance::id)->sd);
+  };
+  std::string text = kHead + learnt + ".\nschema = 1\n\n" + kFormError + number(d.form_error) + "\n\n" + kShares;
+  for (int channel = 0; channel < kChannels; ++channel) {
+    text += std::string("[share.") + channel_name(channel) + "]\n";
+    for (const auto& [function, key] : kKeys) {
+      text += std::string(key) + " = [";
+      for (int h = 0; h <= kHarmonics; ++h) text += (h > 0 ? ", " : "") + number(d.share(channel, h, function));
+      text += "]\n";
+    }
+    text += "\n";
+  }
+  text += std::string(kSpread) + "[spread]\nrobot_sd = " + number(d.spread.robot_sd) +
+          "\nblock_freedom = " + number(d.spread.block_freedom) + "\n\n" + kSensors +
+          "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") + "  # as it is mounted, about each axis\n" +
+          "imu_place_m = " + sensor("imu_place") + "  # along each axis\npower_latency_s = " + sensor("power_delay") +
+          "  # of a sample that is an instant, a mean, or held\n\n" + kBackground + "[background_sd]\n";
+  for (const auto& [effect, sd] : d.background) text += effect + " = " + number(sd) + "\n";
+  return text;
+}
+
 ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
-  using enum BasisFunction;
   const io::Config config = io::Config::load(path);
   const io::Table root = config.root();
   root.schema(1);
   ModelDiscrepancy d;
-  double sum = 0;
-  for (const std::vector<double>& row : root.rows("scales", 2, io::positive())) {
-    d.scales.push_back({row[0], row[1]});
-    sum += row[1];
-  }
-  if (!(std::abs(sum - 1) < 1e-9))
-    root.fail("scales", "probabilities do not add up to 1", "[factor, probability], ...");
+  const io::Table spread = root.table("spread");
+  d.spread = {spread.number("robot_sd", io::positive()), spread.number("block_freedom", io::positive())};
   d.form_error = root.number("form_error", io::non_negative());
 
-  const io::Table ratios = root.table("relative_to_input");
-  const std::pair<BasisFunction, double> relative[] = {{rate, ratios.number("rate", io::positive())},
-                                                       {product, ratios.number("product", io::positive())},
-                                                       {place, ratios.number("place", io::positive())}};
-  const std::pair<BasisFunction, const char*> given[] = {
-      {constant, "constant"},     {input, "input"},   {velocity_x, "velocity_x"}, {velocity_y, "velocity_y"},
-      {velocity_z, "velocity_z"}, {drag_x, "drag_x"}, {drag_y, "drag_y"},         {drag_z, "drag_z"}};
   for (int channel = 0; channel < kChannels; ++channel) {
-    const io::Table table = root.table("share").table(table_of(channel));
+    const io::Table table = root.table("share").table(channel_name(channel));
     auto& shares = d.shares[static_cast<std::size_t>(channel)];
-    for (const auto& [function, key] : given) {
+    for (const auto& [function, key] : kKeys) {
       const std::vector<double> by_harmonic = table.numbers(key, kHarmonics + 1, io::positive());
       for (std::size_t h = 0; h <= kHarmonics; ++h) shares[h][static_cast<std::size_t>(function)] = by_harmonic[h];
     }
-    for (auto& of : shares)
-      for (const auto& [function, ratio] : relative)
-        of[static_cast<std::size_t>(function)] = ratio * of[static_cast<std::size_t>(input)];
   }
 
+  const io::Table sensors = root.table("sensors");
+  const auto axes = [&](const char* id, const char* unit, double sd) {
+    for (const char* axis : {"x_", "y_", "z_"}) d.nuisances.push_back({id, std::string(axis) + unit, sd});
+  };
+  axes("imu_mounting", "rad", sensors.number("imu_rotation_rad", io::positive()));
+  axes("imu_place", "m", sensors.number("imu_place_m", io::positive()));
+  d.nuisances.push_back({"power_delay", "delay_s", sensors.number("power_latency_s", io::positive())});
   const io::Table background = root.table("background_sd");
   d.background["other"] = background.number("other", io::positive());
   for (const std::string& key : background.keys())

@@ -29,14 +29,25 @@ enum class BasisFunction {
   count
 };
 
+/// Functions that models get wrong together.
+enum class Regimes { always, inputs, velocity, place, count };
+Regimes regimes_of(BasisFunction function);
+
 struct ModelDiscrepancy {
-  /// How much more or less than usual models of a vehicle may be off, and how often that is so.
-  struct Scale {
-    double factor, probability;
-  };
-  std::vector<Scale> scales;
+  /// Of one robot models are off by more or less than usual, and so is each kind of regime in each channel and harmonic of it (a
+  /// block): log robot ~ N(0, robot_sd^2), and block^2 / robot^2 ~ inverse gamma of so many degrees of freedom, so that what is
+  /// left has heavy tails.
+  struct Spread {
+    double robot_sd, block_freedom;
+  } spread{};
   /// How well an entry's equation describes the effect of its name: sd of every coefficient as a share of its own.
   double form_error = 0;
+  /// What a sensor may be off by beyond its header, whatever the hypothesis: one standard deviation of each number.
+  struct Nuisance {
+    std::string id, value;  ///< of gap/replay/sensor_correction.hpp
+    double sd;
+  };
+  std::vector<Nuisance> nuisances;
   /// Sd of the coefficient of such a function in every model, as a share of the channel's signal.
   double share(int channel, int harmonic, BasisFunction function) const {
     return shares[static_cast<std::size_t>(channel)][static_cast<std::size_t>(harmonic)]
@@ -50,6 +61,8 @@ struct ModelDiscrepancy {
   std::map<std::string, double> background;  ///< by effect, and of "other"
 };
 
+/// As such a file; `learnt`: from what, for its head.
+std::string discrepancy_text(const ModelDiscrepancy& discrepancy, const std::string& learnt);
 ModelDiscrepancy read_model_discrepancy(
     const std::filesystem::path& path = io::config_path("gap/model_discrepancy.toml"));
 

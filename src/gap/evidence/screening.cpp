@@ -76,15 +76,13 @@ class Screening {
 
 }  // namespace
 
-std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const std::vector<std::string>& jointly_with,
-                                 const VectorXd& at, const std::vector<std::string>& withheld) {
+std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const VectorXd& at,
+                                 const std::vector<std::string>& withheld) {
   std::vector<SizeStep> steps;
   for (const model::EffectEntry& e : model::effects()) {
     const std::string id = e.info.id;
-    if (std::ranges::count(jointly_with, id) || std::ranges::count(withheld, id)) continue;
-    std::vector<std::string> set = jointly_with;
-    set.push_back(id);
-    const Hypothesis h(uncertain, set);
+    if (std::ranges::count(withheld, id)) continue;
+    const Hypothesis h(uncertain, {id});
     const Index first = at.size();
     VectorXd here = h.start();
     here.head(first) = at;

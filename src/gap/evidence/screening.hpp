@@ -13,9 +13,9 @@ struct SizeStep {
 };
 inline constexpr double kSizeReach = 0.4;
 
-/// Of every entry of the catalogue but `withheld`, beside other effects at the given coordinates; shapes are in the middle.
-std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const std::vector<std::string>& jointly_with,
-                                 const Eigen::VectorXd& at, const std::vector<std::string>& withheld);
+/// Of every entry of the catalogue but `withheld`, at the given coordinates of the parameters; shapes are in the middle.
+std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
+                                 const std::vector<std::string>& withheld);
 
 /// What a size changes for a unit of its coordinate.
 struct SizeColumn {

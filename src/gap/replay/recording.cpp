@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "flightlog/readings.hpp"
 #include "io/statistics.hpp"
 #include "sim/replay.hpp"
 
@@ -41,7 +42,7 @@ Recording::Recording(const std::filesystem::path& folder, flightlog::FlightLog f
     : name(folder.filename().empty() ? folder.parent_path().filename().string() : folder.filename().string()),
       least_z_m(flight_log.header.ambient.ground_z_m + nominal.extent.below_m + kLeastClearance_m),
       density_ratio(flight_log.header.ambient.air_density_kg_m3 / nominal.air_density_kg_m3),
-      log(std::move(flight_log)),
+      log(flightlog::on_its_clocks(std::move(flight_log))),
       smoother(log, folder),
       begin_s(std::max(smoother.begin_s(), log.command.t_s.front()) + kMargin_s),
       last_s(std::min(smoother.end_s(), log.command.t_s.back()) - kMargin_s) {

@@ -24,6 +24,10 @@ constexpr double kSameStep = 1e-3;
 /// What two good streams may disagree by for reasons that no entry knows, times the share that models get wrong.
 constexpr double kStreamSignal_m_s2 = 1, kStreamSignal_rad_s = 1;
 
+/// Of a second difference of positions over three beats, on the accelerations of the beats around.
+constexpr std::size_t kHalfKernel = 2;
+constexpr double kKernel[] = {1.0 / 9, 2.0 / 9, 3.0 / 9, 2.0 / 9, 1.0 / 9};
+
 /// Voltages of steps, some steps later.
 class ShiftedVoltage {
  public:
@@ -138,12 +142,38 @@ void PredictedFlight::compare_streams() {
   const std::vector<StreamRow> streams = stream_rows(recording_);
   put_streams(streams, measured_);
   for (std::size_t j = 0; j < streams.size(); ++j) compared_.push_back(streams[j].valid && imu_.covers(j) ? 1 : 0);
+  path_m_s2_ = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(streams.size()));
+  for (std::size_t j = 0; j < streams.size(); ++j) {
+    bool whole = compared_[j] != 0 && j >= kHalfKernel && j + kHalfKernel < streams.size();
+    for (std::size_t i = 0; whole && i <= 2 * kHalfKernel; ++i) whole = imu_.covers(j + i - kHalfKernel);
+    smoothed_.push_back(whole ? 1 : 0);
+    path_m_s2_.col(static_cast<Eigen::Index>(j)) = streams[j].path_m_s2;
+    attitude_.emplace_back(imu_.covers(j)
+                               ? recording_.smoother.at(recording_.regimes[j].t_s).attitude.toRotationMatrix()
+                               : Eigen::Matrix3d::Identity());
+  }
+  smooth_forces(measured_, path_m_s2_);
   // the size of what moved, for that of what models get wrong of it: as the torso's forces and rates
   for (std::size_t j = 0; j < recording_.beats; ++j)
     for (std::size_t i = 0; i < 3; ++i) {
       signal_[j * kRowsPerBeat + (kPathX + i) * kCoefficients] = kStreamSignal_m_s2;
       signal_[j * kRowsPerBeat + (kTurnX + i) * kCoefficients] = kStreamSignal_rad_s;
     }
+}
+
+/// Mean forces as a second difference of positions has them, in W and back in B; and what motion capture adds to them.
+void PredictedFlight::smooth_forces(Rows& rows, const Eigen::Matrix3Xd& more_m_s2) const {
+  const auto row = [&](std::size_t j, std::size_t i) { return j * kRowsPerBeat + (kForceX + i) * kCoefficients; };
+  std::vector<Eigen::Vector3d> force(recording_.beats);
+  for (std::size_t j = 0; j < recording_.beats; ++j)
+    force[j] = attitude_[j] * Eigen::Vector3d(rows[row(j, 0)], rows[row(j, 1)], rows[row(j, 2)]);
+  for (std::size_t j = 0; j < recording_.beats; ++j) {
+    if (!smoothed_[j]) continue;
+    Eigen::Vector3d sum = more_m_s2.col(static_cast<Eigen::Index>(j));
+    for (std::size_t i = 0; i <= 2 * kHalfKernel; ++i) sum += kKernel[i] * force[j + i - kHalfKernel];
+    const Eigen::Vector3d body = attitude_[j].transpose() * sum;
+    for (std::size_t i = 0; i < 3; ++i) rows[row(j, i)] = body[static_cast<Eigen::Index>(i)];
+  }
 }
 
 /// Of samples [interval][channel].
@@ -186,13 +216,19 @@ Rows PredictedFlight::declared_noise(std::uint64_t seed) const {
                                  h.power->current_noise_A * normal(random)});
     put_power(power, rows);
   }
-  put_streams(stream_noise(recording_, seed), rows);
+  // mean forces have the noise of motion capture alone, which that of the comparison bounds
+  const std::vector<StreamRow> streams = stream_noise(recording_, seed);
+  put_streams(streams, rows);
+  for (std::size_t j = 0; j < recording_.beats; ++j)
+    for (std::size_t i = 0; i < 3; ++i)
+      rows[j * kRowsPerBeat + (kForceX + i) * kCoefficients] = streams[j].path_m_s2[static_cast<Eigen::Index>(i)];
   return rows;
 }
 
 bool PredictedFlight::covers(std::size_t beat, int channel) const {
   if (channel >= kPathX) return compared_[beat] != 0;
   if (channel >= kBattery) return imu_.covers(beat) && beat < power_.beats() && power_.covers(beat);
+  if (channel >= kForceX && channel <= kForceZ) return smoothed_[beat] != 0;
   if (channel >= kStrokeLeft) return has_wings_ && imu_.covers(beat) && wings_.covers(beat);
   return imu_.covers(beat);
 }
@@ -271,6 +307,7 @@ std::vector<Rows> PredictedFlight::predict(const std::vector<const Candidate*>& 
     Rows& rows = result[lane];
     rows.resize(r.beats * kRowsPerBeat);
     put_channels(together, r.beats, kSignals, kVehicles, lane, 0, rows);
+    smooth_forces(rows, Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(r.beats)));
     if (r.log.power) put_channels(metered_together, r.beats, kMetered, kVehicles, lane, kBattery, rows);
   }
   return result;

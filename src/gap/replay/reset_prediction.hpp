@@ -2,6 +2,9 @@
 // they flown a recorded flight. The voltages are the recorded ones, and the torso is reset to the recorded motion at every
 // interval of the IMU; wings and motors are the vehicle's own. So every interval tests the forces and torques of that moment
 // alone, and a whole flight costs its own length once. A vehicle's numbers depend on no other's.
+//
+// The mean force of a beat is that of motion capture: an accelerometer folds what shakes faster than it samples into it, and a second
+// difference of positions over three beats, which weighs the beats in between as 1 2 3 2 1, does not. A prediction is weighed alike.
 #pragma once
 
 #include <string>
@@ -9,6 +12,7 @@
 
 #include "gap/replay/beat_rows.hpp"
 #include "gap/replay/recording.hpp"
+#include "gap/replay/sensor_correction.hpp"
 
 namespace flappy::gap {
 
@@ -47,6 +51,8 @@ struct Candidate {
   model::Vehicle vehicle;
   /// By which the sensors are later, against the voltages, than the header says.
   double lag_s = 0;
+  /// What its sensors are off by beyond the headers (gap/replay/sensor_correction.hpp).
+  EffectValues sensors;
 };
 
 /// A recording that vehicles predict, with what its own sensors showed, as rows.
@@ -79,11 +85,14 @@ class PredictedFlight {
   void lay_power(std::size_t first_beat);
   void put_power(const std::vector<double>& samples, Rows& rows) const;
   void compare_streams();
+  void smooth_forces(Rows& rows, const Eigen::Matrix3Xd& more_m_s2) const;
 
   Recording recording_;
 
   BeatProjection imu_, wings_, power_;
-  std::vector<char> compared_;  ///< beats
+  std::vector<char> compared_, smoothed_;  ///< beats
+  Eigen::Matrix3Xd path_m_s2_;             ///< of each beat, W
+  std::vector<Eigen::Matrix3d> attitude_;  ///< of each beat
   bool has_wings_ = false;
   std::vector<std::size_t> power_sample_, power_step_;  ///< of power.csv on the grid; the step that begins with it
   std::vector<double> power_late_;                      ///< or so many steps later

@@ -41,6 +41,16 @@ void undo_misalignment(const Values& v, flightlog::ImuStream& imu) {
   for (std::size_t i = 0; i < imu.t_s.size(); ++i) force.put(i, back * force.at(i));
 }
 
+void undo_mounting(const Values& v, flightlog::ImuStream& imu) {
+  const Quaterniond back = flightlog::exponential(-vector(v, "x_rad", "y_rad", "z_rad"));
+  const Columns force{imu.accel_x_m_s2, imu.accel_y_m_s2, imu.accel_z_m_s2};
+  const Columns gyro{imu.gyro_x_rad_s, imu.gyro_y_rad_s, imu.gyro_z_rad_s};
+  for (std::size_t i = 0; i < imu.t_s.size(); ++i) {
+    force.put(i, back * force.at(i));
+    gyro.put(i, back * gyro.at(i));
+  }
+}
+
 void undo_rectification(const Values& v, double flapping_Hz, flightlog::ImuStream& imu) {
   const double gain = v.at("gain_s2_m");
   const Columns force{imu.accel_x_m_s2, imu.accel_y_m_s2, imu.accel_z_m_s2};
@@ -95,6 +105,12 @@ flightlog::FlightLog without(const EffectValues& effects, flightlog::FlightLog l
   if (const Values* v = given("gyro_bias")) undo_gyro_bias(*v, log.imu);
   if (const Values* v = given("vibration_rectification")) undo_rectification(*v, log.header.flapping_Hz, log.imu);
   if (const Values* v = given("accelerometer_misalignment")) undo_misalignment(*v, log.imu);
+  if (const Values* v = given("imu_mounting")) undo_mounting(*v, log.imu);
+  if (const Values* v = given("imu_place")) {
+    const Vector3d off = vector(*v, "x_m", "y_m", "z_m");
+    for (std::size_t i = 0; i < 3; ++i) log.header.imu.position_m[i] += off[static_cast<Eigen::Index>(i)];
+  }
+  if (const Values* v = given("power_delay"); v && log.header.power) log.header.power->latency_s += v->at("delay_s");
   if (const Values* v = given("mocap_delay")) log.header.mocap.latency_s += v->at("delay_s");
   if (const Values* v = given("mocap_tilt")) {
     const Quaterniond back = flightlog::exponential(-vector(*v, "x_rad", "y_rad", nullptr));

@@ -7,6 +7,12 @@
 //   mocap_tilt                  world turned back about x and y
 //   marker_offset               seen point - R offset
 //   mocap_delay                 poses earlier by what the header does not say
+//
+// So are departures of laboratories from their headers, which no catalogue has, for they are small and everywhere:
+//
+//   imu_mounting                gyro and force turned back by a small rotation vector
+//   imu_place                   the IMU sits elsewhere in B
+//   power_delay                 currents earlier by what the header does not say
 #pragma once
 
 #include <map>
@@ -17,7 +23,6 @@
 namespace flappy::gap {
 
 using EffectValues = std::map<std::string, std::map<std::string, double>>;
-
 /// The effects of sensors among `effects`.
 EffectValues sensor_effects(const EffectValues& effects);
 

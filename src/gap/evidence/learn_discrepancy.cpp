@@ -1,0 +1,167 @@
+#include "gap/evidence/learn_discrepancy.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "flappy/vehicle_file.hpp"
+#include "flightlog/check/data_faults.hpp"
+#include "io/config.hpp"
+#include "io/files.hpp"
+#include "io/parallel.hpp"
+#include "io/program.hpp"
+#include "io/progress.hpp"
+#include "model/effects/registry.hpp"
+
+namespace flappy::gap {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Index;
+
+constexpr int kIterations = 16;
+/// Coefficients that the mean of like channels counts for.
+constexpr double kShrink = 6;
+/// Below these nothing was learnt, but that the robots were few.
+constexpr double kLeastShare = 2e-4, kLeastSize = 0.01;
+constexpr std::size_t kKinds = static_cast<std::size_t>(BasisFunction::count);
+
+struct Moment {
+  double sum = 0, count = 0;
+  double root() const { return count > 0 ? std::sqrt(sum / count) : 0; }
+};
+using Shares = std::array<std::array<std::array<Moment, kKinds>, kHarmonics + 1>, kChannels>;
+
+/// What every robot says of the variances, given those that are thought.
+void expect(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDiscrepancy& now, Shares& shares,
+            std::map<std::string, Moment>& sizes) {
+  for (const std::unique_ptr<RobotFit>& robot : robots) {
+    robot->set_discrepancy(now);
+    const Evidence& evidence = robot->evidence();
+    const Linearised& at = robot->parameters().point;
+    Columns c = robot->fitter().own_columns_of(at);
+    for (const BasisCoefficients& n : robot->nuisances()) c.add(n, 0);
+    const std::size_t first = c.columns.size();
+    std::vector<BasisCoefficients> scaled;
+    for (const SizeColumn& s : robot->sizes()) scaled.push_back(now.background_sd(s.effect) * s.change);
+    for (const BasisCoefficients& s : scaled) c.add(s, 0);
+    const Weighed w =
+        evidence.weigh(at.statistics, c.columns, c.mean(), robot->fitter().all_flights(), {}, Scales{}, {}, 1);
+    for (std::size_t k = 0; k < scaled.size(); ++k) {
+      const auto i = static_cast<Index>(first + k);
+      const std::string& effect = robot->sizes()[k].effect;
+      Moment& m = sizes[effect];
+      m.sum += std::pow(now.background_sd(effect), 2) *
+               (w.posterior.mean[i] * w.posterior.mean[i] + w.posterior.covariance(i, i));
+      m.count += 1;
+    }
+    for (int g = 0; g < kGroups; ++g)
+      for (int i = 0; i < evidence.basis().size(); ++i) {
+        if (w.squares(g, i) == 0) continue;  // nothing was seen
+        const int channel = g / kCoefficients, harmonic = (g % kCoefficients + 1) / 2;
+        const BasisFunction kind = evidence.basis().kind(i);
+        Moment& m = shares[static_cast<std::size_t>(channel)][static_cast<std::size_t>(harmonic)]
+                          [static_cast<std::size_t>(kind)];
+        m.sum += w.squares(g, i) * std::pow(now.share(channel, harmonic, kind), 2);
+        m.count += 1;
+      }
+  }
+}
+
+/// Channels whose figures are alike.
+constexpr std::array<std::pair<int, int>, 7> kAlike = {{{kTorqueX, kTorqueZ},
+                                                        {kForceX, kForceZ},
+                                                        {kStrokeLeft, kStrokeRight},
+                                                        {kBattery, kBattery},
+                                                        {kCurrentLeft, kCurrentRight},
+                                                        {kPathX, kPathZ},
+                                                        {kTurnX, kTurnZ}}};
+
+void shrink(Shares& shares) {
+  for (const auto& [first, last] : kAlike)
+    for (std::size_t h = 0; h <= kHarmonics; ++h)
+      for (std::size_t k = 0; k < kKinds; ++k) {
+        Moment all;
+        for (int c = first; c <= last; ++c) {
+          all.sum += shares[static_cast<std::size_t>(c)][h][k].sum;
+          all.count += shares[static_cast<std::size_t>(c)][h][k].count;
+        }
+        if (all.count == 0) continue;
+        for (int c = first; c <= last; ++c) {
+          Moment& m = shares[static_cast<std::size_t>(c)][h][k];
+          m.sum += kShrink * all.sum / all.count;
+          m.count += kShrink;
+        }
+      }
+}
+
+void take(const Shares& shares, const std::map<std::string, Moment>& sizes, ModelDiscrepancy& d) {
+  for (std::size_t c = 0; c < kChannels; ++c)
+    for (std::size_t h = 0; h <= kHarmonics; ++h)
+      for (std::size_t k = 0; k < kKinds; ++k)
+        if (shares[c][h][k].count > 0) d.shares[c][h][k] = std::max(shares[c][h][k].root(), kLeastShare);
+  for (const auto& [effect, m] : sizes) d.background[effect] = std::max(m.root(), kLeastSize);
+}
+
+/// Flights below a folder; the folder itself where it is one.
+std::vector<fs::path> flights_of(const fs::path& robot) {
+  if (fs::exists(robot / "flight.toml")) return {robot};
+  std::vector<fs::path> flights;
+  std::error_code error;
+  for (const fs::directory_entry& e : fs::directory_iterator(robot, error))
+    if (fs::exists(e.path() / "flight.toml")) flights.push_back(e.path());
+  std::ranges::sort(flights);
+  if (flights.empty()) throw io::InputError(robot.string() + ": no flight; accepted: a folder of flight logs");
+  return flights;
+}
+
+}  // namespace
+
+ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDiscrepancy& start,
+                                   int threads) {
+  ModelDiscrepancy now = start;
+  io::ProgressLine line("learning");
+  for (std::size_t i = 0; i < robots.size() && !io::interrupted(); ++i) {
+    line.show(static_cast<double>(i) / static_cast<double>(robots.size()), "fitting robot " + std::to_string(i + 1));
+    robots[i]->fit_parameters();
+    robots[i]->refit_beside_background();
+  }
+  if (io::interrupted()) throw io::InputError("stopped: nothing was learnt; accepted: all robots");
+  for (int n = 1; n <= kIterations; ++n) {
+    Shares shares{};
+    std::map<std::string, Moment> sizes;
+    expect(robots, now, shares, sizes);
+    if (n == kIterations) shrink(shares);
+    take(shares, sizes, now);
+  }
+  static_cast<void>(threads);
+  return now;
+}
+
+void run_learn_discrepancy(const LearnCommand& command) {
+  io::check_output(command.out);
+  const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kPredictionStep_s);
+  const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors).root());
+  const ModelDiscrepancy start = read_model_discrepancy(command.discrepancy);
+  std::vector<std::vector<PredictedFlight>> flights;
+  for (const std::string& robot : command.robots) {
+    flights.emplace_back();
+    for (const fs::path& folder : flights_of(robot)) {
+      flightlog::FlightLog log = flightlog::read_flight_log(folder);
+      if (const auto faults = data_faults(log, folder); !faults.empty())
+        throw io::InputError(faults.front().file + ":" + std::to_string(faults.front().line) + ": " +
+                             faults.front().what + "; accepted: flights that flappy-gap check finds no fault in");
+      flights.back().emplace_back(Recording(folder, std::move(log), vehicle));
+    }
+  }
+  std::vector<std::unique_ptr<RobotFit>> robots;
+  for (const std::vector<PredictedFlight>& f : flights)
+    robots.push_back(std::make_unique<RobotFit>(f, uncertain, start, std::vector<std::string>(), command.threads));
+  io::stop_on_interrupt();
+  const ModelDiscrepancy learnt = learn_discrepancy(robots, start, command.threads);
+  io::write_atomically(command.out,
+                       discrepancy_text(learnt, std::to_string(robots.size()) + " robots, commit " + io::commit()));
+  std::printf("%s: learnt from %zu robots\n", command.out.c_str(), robots.size());
+}
+
+}  // namespace flappy::gap

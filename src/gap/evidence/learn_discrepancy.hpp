@@ -1,0 +1,26 @@
+// What models get wrong, learnt from robots that somebody trusts: flights of which all is known that the vehicle's file says.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "gap/evidence/robot_fit.hpp"
+
+namespace flappy::gap {
+
+/// The variances of delta's coefficients by channel, harmonic and kind of function, and of every entry's sizes, that make the
+/// residuals of all robots most probable: expectation-maximisation, from `start` on, whose other figures stay. Each robot is fitted;
+/// what is found is taken towards the mean of like channels, for single ones hold few coefficients.
+ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDiscrepancy& start,
+                                   int threads);
+
+struct LearnCommand {
+  std::string vehicle, priors, discrepancy, out;
+  std::vector<std::string> robots;  ///< folders, each with the flights of one robot
+  int threads = 0;
+};
+/// flappy-gap learn-discrepancy.
+void run_learn_discrepancy(const LearnCommand& command);
+
+}  // namespace flappy::gap

@@ -1,0 +1,88 @@
+#include "gap/evidence/robot_fit.hpp"
+
+#include "io/parallel.hpp"
+
+namespace flappy::gap {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+RobotFit::RobotFit(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
+                   const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads)
+    : flights_(flights),
+      uncertain_(uncertain),
+      withheld_(std::move(withheld)),
+      threads_(io::thread_count(threads)),
+      evidence_(flights, discrepancy, threads_),
+      fitter_(flights, evidence_, threads_),
+      plain_(uncertain, {}) {}
+
+void RobotFit::fit_parameters() {
+  const Directions none{MatrixXd(plain_.size(), 0), VectorXd(0)};
+  nominal_ = fitter_.linearise(plain_, plain_.start(), none);
+  evidence_.learn_weights(nominal_.residual);
+  parameters_ = fitter_.fit(plain_, plain_.start(), 4);
+  evidence_.learn_noise(parameters_.point.residual);
+  parameters_.point.statistics = evidence_.statistics(parameters_.point.residual);
+  learn_scales();
+  parameters_ = fitter_.refit(plain_, parameters_, 6);
+  nominal_.statistics = evidence_.statistics(nominal_.residual);
+}
+
+void RobotFit::refit_beside_background() {
+  find_sizes(withheld_);
+  find_nuisances();
+  std::vector<BasisCoefficients> background = nuisances_;
+  for (const SizeColumn& c : sizes_) background.push_back(evidence_.discrepancy().background_sd(c.effect) * c.change);
+  fitter_.set_background(background, parameters_);
+  learn_scales();
+  parameters_ = fitter_.refit(plain_, parameters_, 4);
+  learn_scales();
+}
+
+Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, std::optional<double> freeing_nats) const {
+  const Columns c = fitter_.columns_of(at);
+  return evidence_.weigh(at.statistics, c.columns, c.mean(), fitter_.all_flights(), fitter_.form_error(hypothesis, at),
+                         evidence_.scales(), freeing_nats);
+}
+
+/// Of a residual `steps` steps away from that of the parameters, for one step.
+BasisCoefficients RobotFit::change(Residuals there, double steps) const {
+  for (std::size_t f = 0; f < there.size(); ++f)
+    for (std::size_t k = 0; k < there[f].size(); ++k)
+      there[f][k] = (parameters_.point.residual[f][k] - there[f][k]) / steps;
+  return evidence_.basis_coefficients(there);
+}
+
+void RobotFit::find_sizes(const std::vector<std::string>& withheld) {
+  std::vector<SizeColumn> columns;
+  std::vector<Candidate> candidates;
+  for (SizeStep& s : size_steps(uncertain_, parameters_.point.at, withheld)) {
+    columns.push_back({s.effect, s.unknown, {}});
+    candidates.push_back(std::move(s.candidate));
+  }
+  std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
+  io::parallel_for(columns.size(), threads_, [&](std::size_t i) {
+    if (!rows[i].empty()) columns[i].change = change(std::move(rows[i]), kSizeReach);
+  });
+  std::erase_if(columns, [](const SizeColumn& c) { return c.change.size() == 0; });  // it comes apart
+  sizes_ = std::move(columns);
+}
+
+void RobotFit::find_nuisances() {
+  const std::vector<ModelDiscrepancy::Nuisance>& all = evidence_.discrepancy().nuisances;
+  std::vector<Candidate> candidates;
+  for (const ModelDiscrepancy::Nuisance& n : all) {
+    Candidate c = plain_.candidate(parameters_.point.at);
+    for (const ModelDiscrepancy::Nuisance& other : all)
+      if (other.id == n.id) c.sensors[n.id][other.value] = other.value == n.value ? n.sd : 0;
+    candidates.push_back(std::move(c));
+  }
+  std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
+  nuisances_.assign(all.size(), BasisCoefficients::Zero(kGroups, evidence_.basis().size()));
+  io::parallel_for(all.size(), threads_, [&](std::size_t i) {
+    if (!rows[i].empty()) nuisances_[i] = change(std::move(rows[i]), 1);
+  });
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,54 @@
+// A robot's flights with its vehicle's parameters fitted to them, and what is learnt on the way: its noise, how far models of it are
+// off, what its sensors and small effects do beside every hypothesis. Every further question starts here.
+#pragma once
+
+#include "gap/evidence/screening.hpp"
+
+namespace flappy::gap {
+
+class RobotFit {
+ public:
+  /// `withheld`: entries that the catalogue is to lack. `flights` and `uncertain` are kept.
+  RobotFit(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
+           const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
+
+  /// Parameters, noise, and how far models of this robot are off.
+  void fit_parameters();
+  /// The same beside what sensors may have and every vehicle has a little of, which is found first.
+  void refit_beside_background();
+
+  void set_discrepancy(const ModelDiscrepancy& discrepancy) { evidence_.set_discrepancy(discrepancy); }
+  const Evidence& evidence() const { return evidence_; }
+  const Fitter& fitter() const { return fitter_; }
+  const Hypothesis& plain() const { return plain_; }
+  const Fit& parameters() const { return parameters_; }
+  /// The vehicle's file, weighed by the same noise.
+  const Linearised& nominal() const { return nominal_; }
+  /// What every size of the catalogue changes.
+  const std::vector<SizeColumn>& sizes() const { return sizes_; }
+  /// What each number that a header may have wrong changes, for one standard deviation; as ModelDiscrepancy::nuisances.
+  const std::vector<BasisCoefficients>& nuisances() const { return nuisances_; }
+
+  /// A hypothesis, with scales of its own.
+  Weighed weigh(const Hypothesis& hypothesis, const Linearised& at, std::optional<double> freeing_nats = {}) const;
+
+ private:
+  void learn_scales() { evidence_.set_scales(weigh(plain_, parameters_.point).scales); }
+  void find_sizes(const std::vector<std::string>& withheld);
+  void find_nuisances();
+  BasisCoefficients change(Residuals there, double steps) const;
+
+  const std::vector<PredictedFlight>& flights_;
+  const sim::Randomisation& uncertain_;
+  std::vector<std::string> withheld_;
+  int threads_;
+  Evidence evidence_;
+  Fitter fitter_;
+  Hypothesis plain_;
+  Linearised nominal_;
+  Fit parameters_;
+  std::vector<SizeColumn> sizes_;
+  std::vector<BasisCoefficients> nuisances_;
+};
+
+}  // namespace flappy::gap

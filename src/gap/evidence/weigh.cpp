@@ -1,0 +1,171 @@
+// How far models of this robot are off, found from its flights: a scale of each block of the discrepancy.
+//
+// Given the scales, theta and delta are normal (evidence.hpp). In units of its sd, d = s D, a group's delta is z:
+//   z | theta ~ N(H^-1 d (right - normal change theta), H^-1)      H = 1 + d normal d
+// so that the expected squares of delta in a block follow, and with n coefficients in it the scale that makes them most probable,
+//   s^2 = (sum E[delta^2] / D^2 + nu f^2) / (n + nu),
+// f being the robot's own (Dempster, Laird, Rubin 1977: the log evidence, with what is thought of the scales, never falls). The
+// evidence is taken where it is largest: the width of that maximum is the same for every hypothesis, to first order.
+#include <cmath>
+
+#include "gap/evidence/evidence.hpp"
+#include "io/parallel.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Nats that another iteration has to bring.
+constexpr double kSettled = 0.1;
+/// A block that is free is so many times larger than the robot's others, at least.
+constexpr double kLeastFree = 2;
+
+/// One group, with all columns.
+struct Sums {
+  MatrixXd normal, change, all;  ///< basis x basis; basis x columns; normal (change), and the residual's sum
+  VectorXd base;                 ///< sd of delta at scale 1
+  double squares = 0;            ///< of the residual
+};
+
+/// What a group says under given scales.
+struct Half {
+  VectorXd sd, own;
+  Eigen::LLT<MatrixXd> llt;
+  MatrixXd half;  ///< L^-1 d all
+};
+
+double log_prior(double scale, double robot, double freedom) {
+  const double ratio = robot / scale;
+  return freedom / 2 * (2 * std::log(ratio) + 1 - ratio * ratio);
+}
+
+}  // namespace
+
+int Evidence::block_of(int group, BasisFunction function) {
+  const int harmonic = (group % kCoefficients + 1) / 2;
+  return (group / kCoefficients * (kHarmonics + 1) + harmonic) * kClasses + static_cast<int>(regimes_of(function));
+}
+
+Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
+                        const VectorXd& prior_mean, const std::vector<char>& use, const BasisCoefficients& own_sd,
+                        const Scales& start, std::optional<double> freeing_nats, int iterations) const {
+  const Index q = basis_.size(), k = static_cast<Index>(columns.size());
+  const double nu = discrepancy_.spread.block_freedom;
+  std::vector<int> seen;
+  for (int g = 0; g < kGroups; ++g)
+    for (std::size_t f = 0; f < use.size(); ++f)
+      if (use[f] && normal_[f][static_cast<std::size_t>(g)](0, 0) > 0) {
+        seen.push_back(g);
+        break;
+      }
+  std::vector<Sums> sums(seen.size());
+  std::vector<int> counts(kBlocks, 0);
+  for (const int g : seen)
+    for (int i = 0; i < basis_.size(); ++i) ++counts[static_cast<std::size_t>(block_of(g, basis_.kind(i)))];
+  io::parallel_for(seen.size(), threads_, [&](std::size_t n) {
+    Sums& s = sums[n];
+    auto [normal, right] = sums_of(residual, use, seen[n]);
+    s.normal = std::move(normal);
+    s.change.resize(q, k);
+    for (Index i = 0; i < k; ++i) s.change.col(i) = columns[static_cast<std::size_t>(i)]->row(seen[n]).transpose();
+    s.all.resize(q, k + 1);
+    s.all.leftCols(k).noalias() = s.normal * s.change;
+    s.all.col(k) = right;
+    s.base = base_sd(seen[n]);
+    s.squares = squares_of(s.normal, right);
+  });
+  MatrixXd whole = MatrixXd::Zero(k + 1, k + 1);
+  for (const Sums& s : sums) {
+    whole.topLeftCorner(k, k).noalias() += s.change.transpose() * s.all.leftCols(k);
+    whole.row(k).head(k) += s.all.col(k).transpose() * s.change;
+    whole(k, k) += s.squares;
+  }
+
+  Weighed best;
+  best.scales = start;
+  if (best.scales.blocks.empty()) best.scales.blocks.assign(kBlocks, 1);
+  if (best.scales.free.empty()) best.scales.free.assign(kBlocks, 0);
+  best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
+  Scales now = best.scales;
+  std::vector<Half> halves(seen.size());
+  std::vector<int> chosen(static_cast<std::size_t>(k));
+  for (Index i = 0; i < k; ++i) chosen[static_cast<std::size_t>(i)] = static_cast<int>(i);
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    io::parallel_for(seen.size(), threads_, [&](std::size_t n) {
+      const Sums& s = sums[n];
+      Half& h = halves[n];
+      h.own = own_sd.size() > 0 ? VectorXd(own_sd.row(seen[n]).transpose()) : VectorXd::Zero(q);
+      h.sd.resize(q);
+      for (Index i = 0; i < q; ++i) {
+        const int block = block_of(seen[n], basis_.kind(static_cast<int>(i)));
+        h.sd[i] = std::hypot(now.blocks[static_cast<std::size_t>(block)] * s.base[i], h.own[i]);
+      }
+      MatrixXd precision = h.sd.asDiagonal() * s.normal * h.sd.asDiagonal();
+      precision.diagonal().array() += 1;
+      h.llt.compute(precision);
+      h.half = h.llt.matrixL().solve(h.sd.asDiagonal() * s.all);
+    });
+    Reduced reduced{whole, 0};
+    for (const Half& h : halves) {
+      reduced.sums.selfadjointView<Eigen::Lower>().rankUpdate(h.half.transpose(), -1);
+      reduced.log_scale -= h.llt.matrixLLT().diagonal().array().log().sum();
+    }
+    reduced.sums = MatrixXd(reduced.sums.selfadjointView<Eigen::Lower>());
+    Weighed w{posterior(reduced, chosen, prior_mean), now, BasisCoefficients::Zero(kGroups, q),
+              BasisCoefficients::Zero(kGroups, q)};
+    double thought = -0.5 * std::pow(std::log(now.robot) / discrepancy_.spread.robot_sd, 2);
+    for (std::size_t b = 0; b < kBlocks; ++b)
+      if (counts[b] > 0) thought += now.free[b] ? -*freeing_nats : log_prior(now.blocks[b], now.robot, nu);
+    w.posterior.log_evidence += thought;
+    const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
+
+    // expected squares of delta, in units of D
+    std::vector<VectorXd> squares(seen.size());
+    const MatrixXd spread = w.posterior.covariance.llt().matrixL();
+    io::parallel_for(seen.size(), threads_, [&](std::size_t n) {
+      const Half& h = halves[n];
+      const VectorXd z = h.llt.matrixU().solve(h.half.col(k) - h.half.leftCols(k) * w.posterior.mean);
+      const MatrixXd inverse = h.llt.matrixU().solve(MatrixXd::Identity(q, q));
+      const MatrixXd moved = h.llt.matrixU().solve(h.half.leftCols(k) * spread);
+      squares[n].resize(q);
+      for (Index i = 0; i < q; ++i) {
+        const double d = h.sd[i], shared = d > 0 ? 1 - std::pow(h.own[i] / d, 2) : 0;  // of the discrepancy's own
+        const double square = d * d * (z[i] * z[i] + inverse.row(i).squaredNorm() + moved.row(i).squaredNorm());
+        const double own = shared * shared * square + shared * h.own[i] * h.own[i];
+        squares[n][i] = sums[n].base[i] > 0 ? own / (sums[n].base[i] * sums[n].base[i]) : 0;
+        w.delta(seen[n], i) = z[i];
+        w.squares(seen[n], i) = squares[n][i];
+      }
+    });
+    if (gain > 0) best = std::move(w);
+    if (gain < kSettled) break;
+    std::vector<double> total(kBlocks, 0);
+    for (std::size_t n = 0; n < seen.size(); ++n)
+      for (Index i = 0; i < q; ++i)
+        total[static_cast<std::size_t>(block_of(seen[n], basis_.kind(static_cast<int>(i))))] += squares[n][i];
+    double inverses = 0, bound = 0;
+    for (std::size_t b = 0; b < kBlocks; ++b) {
+      if (counts[b] == 0) continue;
+      const double n = counts[b], f2 = now.robot * now.robot;
+      const double usual2 = (total[b] + nu * f2) / (n + nu);
+      now.blocks[b] = std::sqrt(usual2);
+      now.free[b] = 0;
+      if (freeing_nats) {
+        const double free2 = std::max(total[b] / n, kLeastFree * kLeastFree * f2);
+        const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };
+        if (objective(free2) - *freeing_nats > objective(usual2) + log_prior(std::sqrt(usual2), now.robot, nu)) {
+          now.blocks[b] = std::sqrt(free2);
+          now.free[b] = 1;
+        }
+      }
+      if (!now.free[b]) inverses += 1 / (now.blocks[b] * now.blocks[b]), bound += 1;
+    }
+    if (bound > 0) now.robot = std::sqrt(bound / inverses);
+  }
+  return best;
+}
+
+}  // namespace flappy::gap
