@@ -5,6 +5,8 @@
 
 #include "benchmark/detectability.hpp"
 #include "benchmark/detectability_table.hpp"
+#include "benchmark/families.hpp"
+#include "benchmark/family_detectability.hpp"
 #include "benchmark/make.hpp"
 #include "benchmark/score_bench.hpp"
 #include "escapes.hpp"
@@ -17,6 +19,33 @@ namespace flappy::blind {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+struct FamilyOptions {
+  std::string family;  ///< empty: A as its own options have it
+  bool hover = false, own_figures = false, conventions = false;
+};
+
+/// As fly_case, of a family's robot.
+Json fly_family(const RobotOptions& o, const FamilyOptions& f) {
+  const Family& family = benchmark::family_named(f.family);
+  if (o.randomise != "none")
+    throw io::InputError("--randomise: draws robots without --family; accepted: --own-figures");
+  Assignment a;
+  a.vehicle_file = o.vehicle;
+  for (const BlindEffect& e : effects_of(o.effects)) a.effects.emplace_back(e.id, e.size);
+  a.hover = f.hover, a.own_figures = f.own_figures, a.conventions = f.conventions;
+  a.power = o.power, a.wings = o.wings;
+  const benchmark::FlownRobot robot = benchmark::fly_drawn(family, a, o.seed);
+  for (std::size_t draw = 0; draw < robot.lost.size(); ++draw)
+    std::printf("draw %zu: %s; the next draw\n", draw, robot.lost[draw].c_str());
+  Json folders = Json::array();
+  for (std::size_t k = 0; k < Family::kFlights; ++k) {
+    folders.push_back((std::filesystem::path(o.out) / ("flight_" + std::to_string(k + 1))).string());
+    flightlog::write_flight_log(folders.back().get<std::string>(), robot.flights[k].log);
+    std::printf("%s: %g s\n", folders.back().get<std::string>().c_str(), Family::kFlight_s);
+  }
+  return {{"family", f.family}, {"seed", o.seed}, {"draw", robot.draw}, {"crashes", robot.lost}, {"flights", folders}};
+}
 
 Json fly_case(const RobotOptions& o, Programme programme) {
   const Robots robots(o);
@@ -50,6 +79,9 @@ int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-blind", "A robot of another making, for a diagnosis to be tried on.", {});
   io::Command list = program.app().command("effects", "lists what may be wrong with it");
+  blind::FamilyOptions of;
+  constexpr const char* kFamily = "a, b or c (docs/blind.md); none: a as its own options have it";
+  list.option("--family", of.family, kFamily);
   io::Command fly = program.app().command("fly", "flies three times and writes the logs");
   blind::RobotOptions robot;
   std::string programme = "rich";
@@ -57,6 +89,10 @@ int main(int argc, char** argv) {
   fly.option("--programme", programme, "rich: excitation, a path, turns; hover: calm")
       .one_of({"rich", "hover"})
       .shows_default();
+  fly.option("--family", of.family, kFamily);
+  fly.flag("--hover", of.hover, "as --programme hover");
+  fly.flag("--own-figures", of.own_figures, "of a family: every figure of every body drawn apart");
+  fly.flag("--conventions", of.conventions, "of a family: sensors and declarations drawn as laboratories have them");
   fly.option("--out", robot.out, "folder for flight_1, flight_2, flight_3").required();
   io::Command escape = program.app().command("escape", "flies a policy's manoeuvre many times over");
   blind::EscapeOptions escapes{.robot = {}, .policy = {}, .config = io::config_path("fly/escape.toml")};
@@ -70,7 +106,9 @@ int main(int argc, char** argv) {
   escape.option("--out", escapes.robot.out, "folder for the logs: escape_1, escape_2, ...");
   io::Command detectability = program.app().command("detectability", "finds how large effects have to be to be found");
   benchmark::DetectabilityCommand command;
-  detectability.option("--vehicle", command.vehicle, "the vehicle as declared").required();
+  detectability.option("--family", command.family,
+                       "a, b or c, by what effects change; none: a, as a diagnosis sees it");
+  detectability.option("--vehicle", command.vehicle, "the vehicle as declared").shows_default();
   detectability.option("--randomise", command.randomise, "what robots are drawn from").shows_default();
   detectability.option("--priors", command.priors, "what is uncertain of them").shows_default();
   detectability.option("--vehicles", command.vehicles, "how many").range(1, 1000).shows_default();
@@ -116,10 +154,21 @@ int main(int argc, char** argv) {
       scored.ranks = program.ranks("priors: " + io::sha256(io::read_text(scored.priors)) + "\n");
       const nlohmann::ordered_json scores = benchmark::score_bench(scored);
       if (!scores.is_null()) program.write_json(scores);
-    } else if (list.given())
+    } else if (list.given() && !of.family.empty())
+      for (const blind::FamilyEffect& e : benchmark::family_named(of.family).effects())
+        std::printf("%-30s %s\n", e.id.c_str(), e.typical.c_str());
+    else if (list.given())
       for (const std::string& name : blind::effect_names()) std::printf("%s\n", name.c_str());
     else if (escape.given()) program.write_json(blind::fly_escapes(escapes));
-    else if (detectability.given()) program.write_json(benchmark::run_detectability(command));
-    else program.write_json(blind::fly_case(robot, programme == "rich" ? Programme::rich : Programme::hover));
+    else if (detectability.given())
+      program.write_json(command.family.empty() ? benchmark::run_detectability(command)
+                                                : benchmark::run_family_detectability(command));
+    else {
+      of.hover = of.hover || programme == "hover";
+      if (of.family.empty() && (of.own_figures || of.conventions))
+        throw io::InputError("--own-figures, --conventions: are of a family; accepted: with --family");
+      program.write_json(of.family.empty() ? blind::fly_case(robot, of.hover ? Programme::hover : Programme::rich)
+                                           : blind::fly_family(robot, of));
+    }
   });
 }
