@@ -9,6 +9,7 @@
 #include "benchmark/family_detectability.hpp"
 #include "benchmark/make.hpp"
 #include "benchmark/score_bench.hpp"
+#include "blind/family_a.hpp"
 #include "escapes.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
@@ -121,18 +122,20 @@ int main(int argc, char** argv) {
   io::Command make = program.app().command("make", "flies the cases of a benchmark and seals what they are");
   benchmark::MakeCommand made;
   std::string set;
+  make.option("--family", made.family, "of whose robots: a, b or c").shows_default();
   make.option("--out", made.out, "folder for the cases").required();
   make.option("--set", set, "development or reported: which seeds").one_of({"development", "reported"}).required();
   make.option("--part", made.plan.parts, "these parts alone")
       .one_of(std::vector<std::string>(std::begin(benchmark::kParts), std::end(benchmark::kParts)));
   make.option("--cases", made.plan.at_most, "of each part at most").range(1, 1000);
   make.option("--vehicle", made.vehicle, "the robot as declared").shows_default();
-  make.option("--randomise", made.randomise, "what robots are drawn from").shows_default();
-  make.option("--detectable", made.detectable, "what is detectable of every effect").shows_default();
+  make.option("--randomise", made.randomise, "what robots of the part parameters are drawn from").shows_default();
+  make.option("--detectable", made.detectable, "what is detectable of every effect; none: the family's own table");
   make.option("--threads", made.threads, "0: one for each processor").range(0, 1024);
   io::Command score = program.app().command("score", "diagnoses every case, then opens the labels and compares");
   benchmark::ScoreCommand scored;
-  score.option("folder", scored.folder, "of flappy-blind make").required();
+  score.option("folders", scored.folders, "of flappy-blind make").required();
+  score.option("--out", scored.out, "folder for score.md and score.csv; none: the first of those");
   score.option("--vehicle", scored.vehicle, "the robot as declared, where it is elsewhere now");
   score.option("--priors", scored.priors, "what is uncertain of the vehicle").shows_default();
   score.option("--threads", scored.threads, "cases at a time; 0: one for each processor").range(0, 1024);
@@ -145,9 +148,10 @@ int main(int argc, char** argv) {
       made.plan.reported = set == "reported";
       const sim::Randomisation uncertain =
           sim::read_randomisation(model::read_vehicle(made.vehicle), io::Config::load(scored.priors, {}).root());
-      made.true_values = [&](const blind::Case& c, const std::vector<blind::BlindEffect>& effects) {
-        return benchmark::true_values(c, effects, uncertain, 1);
-      };
+      if (made.family == "a")
+        made.true_values = [&](const blind::Assignment& a, const std::vector<blind::BlindEffect>& effects) {
+          return benchmark::true_values(blind::case_of(a), effects, uncertain, 1);
+        };
       made.ranks = program.ranks("work: make\n");
       if (!benchmark::make_bench(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
     } else if (score.given()) {
