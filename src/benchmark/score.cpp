@@ -252,16 +252,15 @@ double standard_error(const ScoreValue& a, const ScoreValue& b) {
 std::map<std::string, std::vector<std::string>> unbeaten_lines(const std::vector<ScoreLine>& lines) {
   std::map<std::string, std::vector<std::string>> unbeaten;
   for (const char* name : kBaselines) {
-    bool any = false, alarms = false;
+    std::optional<bool> alarms;  // none: nobody knows
     std::vector<std::string> keys;
     for (const ScoreLine& l : lines) {
       const auto b = l.baselines.find(name);
       if (b == l.baselines.end() || !b->second.value || !l.score.value) continue;
-      any = true;
-      if (l.key.starts_with("false_alarm")) alarms = alarms || *b->second.value > kFalseAlarms;
+      if (l.key.starts_with("false_alarm")) alarms = alarms.value_or(false) || *b->second.value > kFalseAlarms;
       else if (!(*l.score.value - *b->second.value > standard_error(l.score, b->second))) keys.push_back(l.key);
     }
-    if (any && !alarms) unbeaten[name] = std::move(keys);
+    if (alarms && !*alarms) unbeaten[name] = std::move(keys);
   }
   return unbeaten;
 }

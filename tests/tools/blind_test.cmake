@@ -78,6 +78,9 @@ expect_refused("${SOURCE}/configs/fly/hover.toml: is nothing that this robot can
 expect_refused("oracle: has another name now; accepted: detectability" oracle --vehicle ${vehicle})
 
 # Before hours of work, not after.
+expect_refused("--family d: no such family; accepted: a, b or c" make --family d --set development --out ${WORK}/c)
+expect_refused("flappy-blind: --part: nonsense not in {singles,singles_current,redeclared,typical,none,parameters,own_figures,conventions,withheld,outside,pairs,hover}; see flappy-blind --help"
+  make --set development --part nonsense --out ${WORK}/c)
 expect_refused("${WORK}/gone/sizes.toml: cannot be written: No such file or directory"
   detectability --vehicle ${vehicle} --randomise ${SOURCE}/configs/randomisation/published.toml --priors ${SOURCE}/configs/gap/priors.toml
   --out ${WORK}/gone/sizes.toml)
