@@ -10,8 +10,10 @@
 namespace flappy::benchmark {
 
 struct DetectabilityCommand {
-  std::string vehicle, randomise = io::config_path("randomisation/published.toml"),
-                       priors = io::config_path("gap/priors.toml"), out;
+  std::string family;  ///< empty: A, as a diagnosis sees it; else by family_detectability.hpp
+  std::string vehicle = io::config_path("vehicles/hummingbird_nominal.toml"),
+              randomise = io::config_path("randomisation/published.toml"), priors = io::config_path("gap/priors.toml"),
+              out;
   int vehicles = 8;
   std::uint64_t seed = 2001;  ///< of the first
   int threads = 0;            ///< 0: one for each processor

@@ -6,6 +6,7 @@
 #include "benchmark/records.hpp"
 #include "benchmark/work.hpp"
 #include "blind/sampled_robot.hpp"
+#include "flappy/vehicle_file.hpp"
 #include "io/append_file.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"
@@ -20,11 +21,11 @@ class Maker {
  public:
   explicit Maker(const MakeCommand& command)
       : command_(command),
+        family_(family_named(command.family)),
         sealed_(command.out / "sealed"),
-        detectability_(read_detectability(command.detectable)),
-        plan_(plan_cases(detectability_, command.plan)),
+        detectability_(read_detectability(table_of(command), family_)),
+        plan_(plan_cases(family_, detectability_, command.plan)),
         declared_(blind::declared_case(command.vehicle)),
-        as_declared_(declared_.vehicle),
         sampled_(sim::read_randomisation(declared_.vehicle, io::Config::load(command.randomise).root())) {}
 
   bool run() {
@@ -51,12 +52,17 @@ class Maker {
   }
 
  private:
+  static fs::path table_of(const MakeCommand& command) {
+    if (!command.detectable.empty()) return command.detectable;
+    return io::config_path(command.family == "a" ? "gap/detectable.toml"
+                                                 : "gap/detectable/" + command.family + ".toml");
+  }
   fs::path label_file(const PlannedCase& p) const { return sealed_ / (number_text(p.number) + ".json"); }
   fs::path case_folder(const PlannedCase& p) const { return command_.out / "cases" / number_text(p.number); }
 
   /// Half a benchmark goes on with the same plan only.
   void agree_with_what_is_there() const {
-    Json plan = Json::array();
+    Json plan = {command_.family};
     for (const PlannedCase& p : plan_) plan.push_back(to_json(p));
     const std::string text = plan.dump() + declared_.vehicle_sha256 + io::sha256(io::read_text(command_.randomise));
     const fs::path file = sealed_ / "plan.sha256";
@@ -67,47 +73,75 @@ class Maker {
   }
 
   void make(const PlannedCase& p) const {
-    blind::Case c = declared_;
-    c.sizes = blind::Sizes(p.effects);
-    c.programme = p.hover ? blind::Programme::hover : blind::Programme::rich;
-    c.power = p.power;
-    Json label;
+    blind::Assignment a;
+    a.vehicle_file = command_.vehicle;
+    for (const blind::BlindEffect& e : p.effects) a.effects.emplace_back(e.id, e.size);
+    a.hover = p.hover, a.power = p.power;
+    a.own_figures = p.own_figures, a.conventions = p.conventions;
+    // what its own file says of a robot of the published randomisation stays with it
+    const fs::path drawn = sealed_ / ("vehicle_" + number_text(p.number));
+    const auto prepare = [&](blind::Assignment& now) {
+      if (!p.published) return;
+      now.vehicle_file = drawn / command_.vehicle.filename();
+      io::make_folder(drawn);
+      io::write_atomically(now.vehicle_file,
+                           model::vehicle_text(sampled_.sample({now.seed, 0, 0, sim::Stream::vehicle})));
+    };
+    Label label{p, 0, {}, {}, {}};
+    for (const blind::FamilyEffect& e : family_.effects())
+      if (std::ranges::count(p.effects, e.id, &blind::BlindEffect::id) > 0) {
+        label.channels.insert(label.channels.end(), e.channels.begin(), e.channels.end());
+        label.regimes.insert(label.regimes.end(), e.regimes.begin(), e.regimes.end());
+      }
+    Json json;
     try {
       fs::remove_all(case_folder(p));  // half of it may be there
       io::make_folder(case_folder(p));
-      const blind::SampledRobot flown = blind::fly_sampled(c, p.randomised ? sampled_ : as_declared_, p.seed);
-      for (std::size_t k = 0; k < flown.flights.size(); ++k)
-        flightlog::write_flight_log(case_folder(p) / ("flight_" + std::to_string(k + 1)), flown.flights[k].log);
-      label = to_json(Label{p, flown.draw, true_values(p, flown.flown)});
+      FlownRobot flown = fly_drawn(family_, a, p.seed, prepare);
+      for (std::size_t k = 0; k < flown.flights.size(); ++k) {
+        flightlog::FlightLog& log = flown.flights[k].log;
+        if (p.published) {
+          log.header.vehicle_sha256 = declared_.vehicle_sha256;
+          log.header.ambient.air_density_kg_m3 = declared_.declared_density_kg_m3;
+        }
+        flightlog::write_flight_log(case_folder(p) / ("flight_" + std::to_string(k + 1)), log);
+      }
+      label.draw = flown.draw;
+      label.true_values = true_values(p, flown.assignment);
+      json = to_json(label);
     } catch (const blind::NeverFlies&) {
-      label = to_json(Label{p, 0, {}});
-      label["never_flies"] = true;
+      json = to_json(label);
+      json["never_flies"] = true;
     }
-    io::write_atomically(label_file(p), label.dump(1) + "\n");
+    fs::remove_all(drawn);
+    io::write_atomically(label_file(p), json.dump(1) + "\n");
   }
 
-  std::map<std::string, double> true_values(const PlannedCase& p, const blind::Case& flown) const {
+  std::map<std::string, double> true_values(const PlannedCase& p, const blind::Assignment& flown) const {
     std::map<std::string, double> known;
-    if (!command_.true_values || (p.part != "singles" && p.part != "typical")) return known;
+    if (!command_.true_values || p.part != "singles") return known;
     for (const auto& [name, value] : command_.true_values(flown, p.effects))
       if (value) known[name] = *value;
     return known;
   }
 
   void seal() const {
-    Manifest m{command_.plan.reported ? "reported" : "development",
+    Manifest m{command_.family,
+               command_.plan.reported ? "reported" : "development",
                command_.vehicle.string(),
                declared_.vehicle_sha256,
                {},
                io::commit(),
                {}};
     Json cases = Json::array(), never = Json::array(), undetectable = Json::array();
+    std::size_t lost = 0;
     for (const PlannedCase& p : plan_) {
       Json label = read_json(label_file(p));
       if (label.contains("never_flies")) {
         never.push_back(std::move(label));
         continue;
       }
+      lost += label.at("draw").get<std::size_t>();
       cases.push_back(std::move(label));
       PublicCase c{p.number, p.withheld, {}};
       for (const fs::directory_entry& e : fs::recursive_directory_iterator(case_folder(p)))
@@ -125,16 +159,19 @@ class Maker {
     io::write_atomically(sealed_ / "labels.json", labels);
     io::write_atomically(command_.out / "manifest.json", to_json(m).dump(1) + "\n");
     for (const PlannedCase& p : plan_) fs::remove(label_file(p));
-    std::printf("%s: %zu cases, %zu that never fly, %zu effects undetectable\n", command_.out.c_str(), m.cases.size(),
-                never.size(), undetectable.size());
+    std::printf(
+        "%s: %zu cases of family %s, %zu robots that crashed drawn again, %zu that never fly, %zu effects "
+        "undetectable\n",
+        command_.out.c_str(), m.cases.size(), command_.family.c_str(), lost, never.size(), undetectable.size());
   }
 
   const MakeCommand& command_;
+  const blind::Family& family_;
   fs::path sealed_;
   std::map<std::string, Detectability> detectability_;
   std::vector<PlannedCase> plan_;
   blind::Case declared_;
-  sim::Randomisation as_declared_, sampled_;
+  sim::Randomisation sampled_;
 };
 
 }  // namespace

@@ -7,23 +7,24 @@
 #include <optional>
 #include <string>
 
+#include "benchmark/families.hpp"
 #include "benchmark/plan.hpp"
-#include "blind/flights.hpp"
 #include "io/installation.hpp"
 #include "io/ranks.hpp"
 
 namespace flappy::benchmark {
 
 struct MakeCommand {
+  std::string family = "a";
   std::filesystem::path out, vehicle = io::config_path("vehicles/hummingbird_nominal.toml"),
                              randomise = io::config_path("randomisation/published.toml"),
-                             detectable = io::config_path("gap/detectable.toml");
+                             detectable;  ///< the latter: empty for the family's own
   PlanOptions plan;
   int threads = 0;  ///< 0: one for each processor
   io::Ranks* ranks = nullptr;
   /// What of the catalogue's parameters comes nearest to the effects of a case, by "effect.parameter"; null: nothing does.
   /// Asked of the parts whose intervals are scored; without it none is.
-  std::function<std::map<std::string, std::optional<double>>(const blind::Case&,
+  std::function<std::map<std::string, std::optional<double>>(const blind::Assignment&,
                                                              const std::vector<blind::BlindEffect>&)>
       true_values;
 };

@@ -3,36 +3,48 @@
 #include <algorithm>
 #include <random>
 
+#include "benchmark/families.hpp"
 #include "io/config.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::benchmark {
 namespace {
 
-/// First seeds. Robots flown by hand and for the table of detectable sizes have seeds below; a part has 1,000.
-constexpr std::uint64_t kDevelopment = 10001, kReported = 700001, kSeedsOfAPart = 1000;
-constexpr std::size_t kSingles = 5, kNone = 40, kParameters = 40, kWithheld = 30, kOutside = 30, kPairs = 40,
-                      kHover = 6, kTypical = 2;
+/// Robots flown by hand and for the tables of detectable sizes have seeds below; 700001 to 799999 are spent.
+constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 5'000'000, kSeedsOfAPart = 10'000;
+/// Of each part, as many effects of each kind; of those with few effects so many in all.
+constexpr std::size_t kAtLeast = 100;
 constexpr double kOverDetectable = 2, kLargest = 4;
 /// Of effects outside the catalogue of which the table says nothing.
 constexpr double kOutsideSize = 2;
-/// What hover alone does not show.
+/// What hover alone does not show, where the table does not say.
 constexpr const char* kHidden[] = {"ground_effect", "ceiling_effect", "body_drag", "tether", "marker_offset"};
+
+using Ids = std::vector<std::string>;
+
+std::uint64_t number_of(const blind::Family& family) {
+  return static_cast<std::uint64_t>(std::ranges::find(kFamilies, family.name()) - std::begin(kFamilies)) + 1;
+}
 
 class Planner {
  public:
-  Planner(const std::map<std::string, Detectability>& detectability, const PlanOptions& options)
-      : of_(detectability), options_(options), random_(options.reported ? kReported : kDevelopment) {
-    for (std::size_t k = 0; k < model::effects().size(); ++k) {  // in the blind robot's order
-      const std::string& id = blind::effect_names()[k];
-      catalogue_.push_back(id);
-      if (!of_.at(id).undetectable) detectable_.push_back(id);
-    }
-    for (std::size_t k = catalogue_.size(); k < blind::kBlindEffects; ++k) {
-      const std::string& id = blind::effect_names()[k];
-      const auto known = of_.find(id);
-      if (known == of_.end()) outside_.push_back({id, kOutsideSize});
-      else if (!known->second.undetectable) outside_.push_back(at_twice(id));
+  Planner(const blind::Family& family, const std::map<std::string, Detectability>& detectability,
+          const PlanOptions& options)
+      : of_(detectability),
+        options_(options),
+        first_seed_(number_of(family) * kSeedsOfAFamily + (options.reported ? kReported : 0)),
+        random_(first_seed_) {
+    for (const blind::FamilyEffect& e : family.effects()) {
+      const auto known = of_.find(e.id);
+      if (known == of_.end()) {
+        outside_.push_back(e.id);
+        continue;
+      }
+      const Detectability& d = known->second;
+      if (in_catalogue(e) && d.hidden) hidden_.push_back(e.id);
+      if (d.undetectable) continue;
+      (in_catalogue(e) ? detectable_ : outside_).push_back(e.id);
+      if (in_catalogue(e) && d.detectable <= 1) typical_.push_back(e.id);
     }
     if (outside_.empty())
       throw io::InputError(
@@ -43,43 +55,57 @@ class Planner {
   }
 
   std::vector<PlannedCase> run() {
-    const std::size_t singles = detectable_.size() * kSingles;
+    const std::size_t singles = rounds(detectable_, kAtLeast);
     part("singles", singles, [&](std::size_t k, PlannedCase& c) { single(k, c); });
     part("singles_current", singles, [&](std::size_t k, PlannedCase& c) {
       single(k, c);
       c.power = true;
       c.seed = seed_of("singles", k);  // the same robots
     });
-    part("none", kNone, [](std::size_t, PlannedCase& c) { c.randomised = false; });
-    part("parameters", kParameters, [](std::size_t, PlannedCase&) {});
-    part("withheld", kWithheld + kOutside, [&](std::size_t k, PlannedCase& c) {
-      if (k < kWithheld) {
-        single(k, c);
-        c.withheld = model::whole_group(c.effects.front().id);
-      } else {
-        c.effects = {outside_[(k - kWithheld) % outside_.size()]};
-      }
+    part("redeclared", kAtLeast, [&](std::size_t k, PlannedCase& c) {
+      single(k, c);
+      c.seed = seed_of("singles", k);
+      c.conventions = false;
     });
-    part("pairs", kPairs, [&](std::size_t, PlannedCase& c) { pair(c); });
-    part("hover", kHover * std::size(kHidden), [&](std::size_t k, PlannedCase& c) {
-      c.effects = {at_twice(kHidden[k % std::size(kHidden)])};
-      c.hover = true;
-    });
-    part("typical", kTypical * catalogue_.size(), [&](std::size_t k, PlannedCase& c) {
-      const std::string& id = catalogue_[k % catalogue_.size()];
+    part("typical", rounds(typical_, kAtLeast), [&](std::size_t k, PlannedCase& c) {
+      const std::string& id = typical_[k % typical_.size()];
       c.effects = {{id, 1}};
       c.inseparable = of_.at(id).inseparable_at_typical;
+    });
+    const auto harmless = [&](const char* name, bool published, bool own_figures, bool conventions) {
+      part(name, kAtLeast, [&](std::size_t, PlannedCase& c) {
+        c.published = published, c.own_figures = own_figures, c.conventions = conventions;
+      });
+    };
+    harmless("none", false, false, false);
+    harmless("parameters", true, false, false);
+    harmless("own_figures", false, true, false);
+    harmless("conventions", false, false, true);
+    part("withheld", rounds(detectable_, kAtLeast / 2), [&](std::size_t k, PlannedCase& c) {
+      single(k, c);
+      c.withheld = model::whole_group(c.effects.front().id);
+    });
+    part("outside", rounds(outside_, kAtLeast / 2),
+         [&](std::size_t k, PlannedCase& c) { c.effects = {at_twice(outside_[k % outside_.size()])}; });
+    part("pairs", kAtLeast, [&](std::size_t, PlannedCase& c) { pair(c); });
+    part("hover", rounds(hidden_, kAtLeast), [&](std::size_t k, PlannedCase& c) {
+      c.effects = {at_twice(hidden_[k % hidden_.size()])};
+      c.hover = true;
     });
     number();
     return std::move(cases_);
   }
 
  private:
+  /// The same number of each, at least so many in all.
+  static std::size_t rounds(const Ids& ids, std::size_t at_least) {
+    return ids.empty() ? 0 : (at_least + ids.size() - 1) / ids.size() * ids.size();
+  }
   static std::uint64_t index_of(const std::string& part) {
     return static_cast<std::uint64_t>(std::ranges::find(kParts, part) - std::begin(kParts));
   }
   std::uint64_t seed_of(const std::string& part, std::size_t k) const {
-    return (options_.reported ? kReported : kDevelopment) + kSeedsOfAPart * index_of(part) + k;
+    return first_seed_ + kSeedsOfAPart * index_of(part) + k;
   }
 
   template <class Fill>
@@ -90,14 +116,16 @@ class Planner {
       PlannedCase c;
       c.part = name;
       c.seed = seed_of(name, k);
+      c.own_figures = c.conventions = true;
       fill(k, c);
       cases_.push_back(std::move(c));
     }
   }
 
   blind::BlindEffect at_twice(const std::string& id) const {
-    const Detectability& d = of_.at(id);
-    return {id, d.undetectable ? 1 : kOverDetectable * d.detectable};
+    const auto d = of_.find(id);
+    if (d == of_.end()) return {id, kOutsideSize};
+    return {id, d->second.undetectable ? 1 : kOverDetectable * d->second.detectable};
   }
 
   void single(std::size_t k, PlannedCase& c) const {
@@ -108,8 +136,8 @@ class Planner {
 
   void pair(PlannedCase& c) {
     const std::string& first = detectable_[below(detectable_.size())];
-    const std::vector<std::string> group = model::whole_group(first);
-    std::vector<std::string> others = detectable_;
+    const Ids group = model::whole_group(first);
+    Ids others = detectable_;
     std::erase_if(others, [&](const std::string& id) { return std::ranges::count(group, id) > 0; });
     if (others.empty())
       throw io::InputError("--detectable: all are of one group; accepted: a table of flappy-blind detectability");
@@ -119,36 +147,40 @@ class Planner {
   std::size_t below(std::size_t n) { return static_cast<std::size_t>(random_() % n); }
 
   void number() {
-    random_.seed(options_.reported ? kReported : kDevelopment);
+    random_.seed(first_seed_);
     for (std::size_t i = cases_.size(); i > 1; --i) std::swap(cases_[i - 1], cases_[below(i)]);
     for (std::size_t i = 0; i < cases_.size(); ++i) cases_[i].number = i + 1;
   }
 
   const std::map<std::string, Detectability>& of_;
   const PlanOptions& options_;
-  std::vector<std::string> catalogue_, detectable_;
-  std::vector<blind::BlindEffect> outside_;
+  std::uint64_t first_seed_;
+  Ids detectable_, typical_, outside_, hidden_;
   std::mt19937_64 random_;
   std::vector<PlannedCase> cases_;
 };
 
 }  // namespace
 
-std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file) {
+std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file,
+                                                        const blind::Family& family) {
   const io::Config config = io::Config::load(file);
   const io::Table root = config.root();
   root.schema(1);
   std::map<std::string, Detectability> all;
-  for (const std::string& id : blind::effect_names()) {
-    if (model::effect_index(id.c_str()) < 0 && !root.has(id)) continue;
-    const io::Table t = root.table(id);
+  for (const blind::FamilyEffect& e : family.effects()) {
+    if (!in_catalogue(e) && !root.has(e.id)) continue;
+    const io::Table t = root.table(e.id);
     Detectability d;
     d.undetectable = t.boolean_or("undetectable", false);
     if (!d.undetectable || t.has("detectable")) d.detectable = t.number("detectable", io::positive(kLargest));
     if (!d.undetectable && kOverDetectable * d.detectable > kLargest)
       t.fail("detectable", "twice that is beyond size 4", "undetectable = true");
+    d.hidden = std::ranges::count(kHidden, e.id) > 0;
+    if (t.has("hover"))
+      d.hidden = !d.undetectable && t.number("hover", io::positive(1e3)) > kOverDetectable * d.detectable;
     const auto rivals = [&](const char* key) {
-      std::vector<std::string> list = t.strings(key);
+      Ids list = t.strings(key);
       for (const std::string& rival : list)
         if (model::effect_index(rival.c_str()) < 0)
           t.fail(key, "no effect \"" + rival + "\"", "identifiers of docs/effects.md");
@@ -157,22 +189,23 @@ std::map<std::string, Detectability> read_detectability(const std::filesystem::p
     d.inseparable = rivals("inseparable");
     if (t.has("inseparable_at_typical")) d.inseparable_at_typical = rivals("inseparable_at_typical");
     else
-      for (const model::EffectEntry& e : model::effects())
-        if (e.info.id != id) d.inseparable_at_typical.emplace_back(e.info.id);
+      for (const model::EffectEntry& entry : model::effects())
+        if (entry.info.id != e.id) d.inseparable_at_typical.emplace_back(entry.info.id);
     // for the reader of the file
     t.number_or("gain_at_typical", 0);
     t.number_or("misfit", 0);
     if (const auto values = t.optional_table("catalogue"))
       for (const std::string& key : values->keys()) values->number(key);
-    all[id] = std::move(d);
+    all[e.id] = std::move(d);
   }
   root.finish();
   return all;
 }
 
-std::vector<PlannedCase> plan_cases(const std::map<std::string, Detectability>& detectability,
+std::vector<PlannedCase> plan_cases(const blind::Family& family,
+                                    const std::map<std::string, Detectability>& detectability,
                                     const PlanOptions& options) {
-  return Planner(detectability, options).run();
+  return Planner(family, detectability, options).run();
 }
 
 }  // namespace flappy::benchmark

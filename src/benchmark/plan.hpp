@@ -9,19 +9,21 @@
 
 #include "benchmark/score.hpp"
 #include "blind/effects.hpp"
+#include "blind/family.hpp"
 
 namespace flappy::benchmark {
 
-/// What flappy-blind detectability found of an effect, in the blind robot's sizes.
+/// What flappy-blind detectability found of an effect, in its family's sizes.
 struct Detectability {
   double detectable = 0;
   bool undetectable = false;  ///< twice the size is beyond what can be, or beyond the prior
+  bool hidden = false;        ///< hover does not show twice the size
   /// Rivals that it cannot be told from at twice the size, and at the typical one.
   std::vector<std::string> inseparable, inseparable_at_typical;
 };
 
-/// Of every effect of the catalogue, and of those outside that the table has. InputError where one is missing.
-std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file);
+/// Of every effect of a family that the catalogue has, and of those outside that the table has. InputError where one is missing.
+std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file, const blind::Family& family);
 
 /// One robot and its flights, as only the maker knows them.
 struct PlannedCase {
@@ -30,9 +32,10 @@ struct PlannedCase {
   std::vector<blind::BlindEffect> effects;
   std::uint64_t seed = 0;
   bool hover = false, power = false;
-  bool randomised = true;
-  std::vector<std::string> inseparable;  ///< rivals that these flights do not tell from the truth
-  std::vector<std::string> withheld;     ///< from the catalogue
+  bool own_figures = false, conventions = false;  ///< as in blind::Assignment
+  bool published = false;                         ///< its vehicle is drawn from the published randomisation
+  std::vector<std::string> inseparable;           ///< rivals that these flights do not tell from the truth
+  std::vector<std::string> withheld;              ///< from the catalogue
 };
 
 struct PlanOptions {
@@ -41,7 +44,9 @@ struct PlanOptions {
   std::size_t at_most = 0;         ///< cases of each part; 0: all
 };
 
-std::vector<PlannedCase> plan_cases(const std::map<std::string, Detectability>& detectability,
+/// Seeds of b begin at 20,000,000 for development and at 25,000,000 for what is reported, those of a and c likewise.
+std::vector<PlannedCase> plan_cases(const blind::Family& family,
+                                    const std::map<std::string, Detectability>& detectability,
                                     const PlanOptions& options);
 
 }  // namespace flappy::benchmark

@@ -43,7 +43,8 @@ Json to_json(const Manifest& m) {
   Json cases = Json::array();
   for (const PublicCase& c : m.cases)
     cases.push_back({{"number", c.number}, {"withheld", c.withheld}, {"files", c.files}});
-  return {{"schema", 1},
+  return {{"schema", 2},
+          {"family", m.family},
           {"set", m.set},
           {"vehicle", m.vehicle},
           {"vehicle_sha256", m.vehicle_sha256},
@@ -56,12 +57,17 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "manifest.json";
   const Json json = read_json(file);
   try {
-    if (const Json& schema = json.at("schema"); schema != 1)
+    if (const Json& schema = json.at("schema"); schema != 2)
       throw io::InputError(file.string() + ": schema " +
-                           io::other_schema(schema.get<std::int64_t>(), 1, json.value("commit", "")) +
-                           "; accepted: schema 1");
-    Manifest m{json.at("set"),           json.at("vehicle"), json.at("vehicle_sha256"),
-               json.at("labels_sha256"), json.at("commit"),  {}};
+                           io::other_schema(schema.get<std::int64_t>(), 2, json.value("commit", "")) +
+                           "; accepted: schema 2");
+    Manifest m{json.at("family"),
+               json.at("set"),
+               json.at("vehicle"),
+               json.at("vehicle_sha256"),
+               json.at("labels_sha256"),
+               json.at("commit"),
+               {}};
     for (const Json& c : json.at("cases"))
       m.cases.push_back({c.at("number"), c.at("withheld"), c.at("files").get<std::map<std::string, std::string>>()});
     return m;
@@ -71,7 +77,7 @@ Manifest read_manifest(const std::filesystem::path& folder) {
 }
 
 CaseTruth Label::truth() const {
-  CaseTruth t{planned.part, {}, planned.inseparable.empty(), true_values};
+  CaseTruth t{planned.part, {}, planned.inseparable.empty(), true_values, channels, regimes, planned.seed, draw};
   for (const blind::BlindEffect& e : planned.effects) t.effects.push_back(e.id);
   return t;
 }
@@ -79,14 +85,24 @@ CaseTruth Label::truth() const {
 Json to_json(const PlannedCase& p) {
   Json effects = Json::array();
   for (const blind::BlindEffect& e : p.effects) effects.push_back({{"id", e.id}, {"size", e.size}});
-  return {{"number", p.number},    {"part", p.part},   {"effects", effects},         {"seed", p.seed},
-          {"hover", p.hover},      {"power", p.power}, {"randomised", p.randomised}, {"inseparable", p.inseparable},
+  return {{"number", p.number},
+          {"part", p.part},
+          {"effects", effects},
+          {"seed", p.seed},
+          {"hover", p.hover},
+          {"power", p.power},
+          {"own_figures", p.own_figures},
+          {"conventions", p.conventions},
+          {"published", p.published},
+          {"inseparable", p.inseparable},
           {"withheld", p.withheld}};
 }
 
 Json to_json(const Label& label) {
   Json json = to_json(label.planned);
   json["draw"] = label.draw;
+  json["channels"] = label.channels;
+  json["regimes"] = label.regimes;
   json["true_values"] = label.true_values;
   return json;
 }
@@ -100,10 +116,14 @@ Label label_from(const Json& json) {
   p.seed = json.at("seed");
   p.hover = json.at("hover");
   p.power = json.at("power");
-  p.randomised = json.at("randomised");
+  p.own_figures = json.at("own_figures");
+  p.conventions = json.at("conventions");
+  p.published = json.at("published");
   p.inseparable = json.at("inseparable").get<Names>();
   p.withheld = json.at("withheld").get<Names>();
   l.draw = json.at("draw");
+  l.channels = json.at("channels").get<Names>();
+  l.regimes = json.at("regimes").get<Names>();
   l.true_values = json.at("true_values").get<std::map<std::string, double>>();
   return l;
 }
@@ -127,6 +147,9 @@ Json to_json(const Prediction& p) {
           {"unknown", p.unknown},
           {"gap", {{"nominal", optional(p.nominal)}, {"refit", optional(p.refit)}, {"noise_floor", optional(p.floor)}}},
           {"next", p.next},
+          {"where", p.where ? Json{{"channel", p.where->channel}, {"regime", p.where->regime}} : Json(nullptr)},
+          {"after_next",
+           p.after_next ? Json{{"kind", p.after_next->kind}, {"effects", p.after_next->effects}} : Json(nullptr)},
           {"baselines", baselines}};
 }
 
@@ -150,6 +173,8 @@ Prediction prediction_from(const Json& json) {
   p.refit = optional_from(gap.at("refit"));
   p.floor = optional_from(gap.at("noise_floor"));
   p.next = json.at("next").get<Names>();
+  if (const Json& w = json.at("where"); !w.is_null()) p.where = {w.at("channel"), w.at("regime")};
+  if (const Json& a = json.at("after_next"); !a.is_null()) p.after_next = {a.at("kind"), a.at("effects").get<Names>()};
   for (const auto& [name, b] : json.at("baselines").items())
     p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
   return p;

@@ -30,7 +30,7 @@ struct PublicCase {
 };
 
 struct Manifest {
-  std::string set, vehicle, vehicle_sha256, labels_sha256, commit;
+  std::string family, set, vehicle, vehicle_sha256, labels_sha256, commit;
   std::vector<PublicCase> cases;
 };
 Json to_json(const Manifest& manifest);
@@ -38,8 +38,9 @@ Manifest read_manifest(const std::filesystem::path& folder);
 
 struct Label {
   PlannedCase planned;
-  std::uint64_t draw = 0;                     ///< of the robots of its seed, the first that did not crash
-  std::map<std::string, double> true_values;  ///< by "effect.parameter"
+  std::uint64_t draw = 0;                      ///< of the robots of its seed, the first that did not crash
+  std::vector<std::string> channels, regimes;  ///< of its effects, as blind::FamilyEffect has them
+  std::map<std::string, double> true_values;   ///< by "effect.parameter"
   CaseTruth truth() const;
 };
 Json to_json(const PlannedCase& planned);

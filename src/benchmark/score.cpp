@@ -16,9 +16,7 @@ using model::group_of;
 using Names = std::vector<std::string>;
 using Cases = std::vector<const ScoredCase*>;
 
-constexpr double kConfident = 0.9, kSureOfGain = 2;
-/// Of rich flights with motion capture and IMU, each robot once: what claims are judged by.
-constexpr const char* kClaiming[] = {"singles", "none", "parameters", "withheld", "pairs"};
+constexpr double kConfident = 0.8, kSureOfGain = 2, kFalseAlarms = 0.05;
 
 bool same(Names a, Names b) {
   std::ranges::sort(a);
@@ -30,26 +28,28 @@ bool holds(const Names& all, const Names& some) {
   return std::ranges::all_of(some, [&](const std::string& s) { return std::ranges::count(all, s) > 0; });
 }
 
-bool names_effects(const Prediction& p) { return p.kind == "effect" || p.kind == "group"; }
+/// Says which effects there are: these alone, or these and something more.
+bool names_set(const std::string& kind) { return kind == "effect" || kind == "remainder"; }
+bool names_effects(const Prediction& p) { return names_set(p.kind) || p.kind == "group"; }
 
 bool group_holds(const ScoredCase& c) {
   return c.prediction.kind == "group" && holds(c.prediction.effects, c.truth.effects);
 }
 
 bool named_alone(const ScoredCase& c) {
-  return c.prediction.kind == "effect" && same(c.prediction.effects, c.truth.effects);
+  return names_set(c.prediction.kind) && same(c.prediction.effects, c.truth.effects);
 }
 
 bool right_group(const ScoredCase& c) {
   const Names& named = c.prediction.effects;
-  return group_holds(c) || (c.prediction.kind == "effect" && named.size() == 1 &&
+  return group_holds(c) || (names_set(c.prediction.kind) && named.size() == 1 &&
                             group_of(named.front()) == group_of(c.truth.effects.front()));
 }
 
 /// Whether the truth is one of the three most probable answers.
 bool among_three(const ScoredCase& c) {
   const Prediction& p = c.prediction;
-  if (group_holds(c)) return true;
+  if (group_holds(c) || (p.kind == "remainder" && named_alone(c))) return true;
   for (const FittedSet& s : p.sets) {
     if (!same(s.effects, c.truth.effects)) continue;
     const double mine = s.probability;
@@ -83,7 +83,7 @@ void count_covered(const ScoredCase& c, std::size_t& covered, std::size_t& all) 
 
 /// What a verdict says is at work; of a group, its most probable member.
 Names at_work(const Prediction& p) {
-  if (p.kind == "effect") return p.effects;
+  if (names_set(p.kind)) return p.effects;
   if (p.kind != "group") return {};
   const auto most = std::ranges::find_if(p.sets, [&](const FittedSet& s) { return holds(p.effects, s.effects); });
   return most == p.sets.end() ? Names() : most->effects;
@@ -176,30 +176,17 @@ ScoreLine line(std::string key, std::string what, Bar bar, double must, double a
   return l;
 }
 
-std::vector<Claim> claims_of(const Cases& cases) {
+ScoreLine calibration_line(const std::vector<ScoredCase>& cases) {
   std::vector<Claim> claims;
-  for (const ScoredCase* c : cases) claims.push_back({c->prediction.probability, right(c->truth, c->prediction)});
-  return claims;
-}
-
-ScoreLine calibration_line(const Cases& cases, double& calibrated_95) {
-  const std::vector<Claim> claims = claims_of(cases);
-  const ScoreValue s = resampled(claims.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
-    std::vector<Claim> some;
-    for (const std::size_t i : which) some.push_back(claims[i]);
-    return calibration_error(std::move(some));
-  });
-  calibrated_95 = claims.empty() ? 0 : calibrated_error_95(claims);
-  return line("ece",
-              "calibration error of the top answer's probability; aim: 95th percentile of a calibrated predictor",
-              Bar::at_most, 0.08, calibrated_95, s);
+  for (const ScoredCase& c : cases) claims.push_back({c.prediction.probability, right(c.truth, c.prediction)});
+  return line("ece", "calibration error (ECE) over all parts", Bar::at_most, 0.06, 0.03, calibration_score(claims));
 }
 
 ScoreLine closure_line(const Cases& cases) {
   std::vector<double> values;
   for (const ScoredCase* c : cases)
     if (const auto v = closure(*c)) values.push_back(*v);
-  return line("closure_median", "closure, median", Bar::at_least, 0.80, 0.95,
+  return line("closure_median", "how far: closure beside the truth's, median", Bar::at_least, 0.80, 0.95,
               resampled(values.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
                 std::vector<double> some;
                 for (const std::size_t i : which) some.push_back(values[i]);
@@ -210,20 +197,39 @@ ScoreLine closure_line(const Cases& cases) {
 ScoreLine coverage_line(const Cases& cases) {
   std::size_t covered = 0, all = 0;
   for (const ScoredCase* c : cases) count_covered(*c, covered, all);
-  return line("interval_coverage", "90 % intervals of size that hold the true one", Bar::within, 0.80, 0.88,
-              proportion(covered, all), {}, 0.97, 0.92);
-}
-
-void add_naming(std::vector<ScoreLine>& lines, const Cases& cases) {
-  lines.push_back(line("group_top1", "right group first", Bar::at_least, 0.90, 0.97, share(cases, right_group),
-                       of_baselines(cases, baseline_group)));
-  lines.push_back(line("top3", "right effect among three", Bar::at_least, 0.93, 0.99, share(cases, among_three),
-                       of_baselines(cases, baseline_among_three)));
+  return line("interval_coverage", "90 % intervals of size that hold the true one", Bar::within, 0.82, 0.87,
+              proportion(covered, all), {}, 0.97, 0.93);
 }
 
 ScoreLine first_line(const char* key, const char* what, double must, double aim, const Cases& cases) {
   const Cases judged = separable(cases);
   return line(key, what, Bar::at_least, must, aim, share(judged, named_alone), of_baselines(judged, baseline_first));
+}
+
+/// Each case with the one of `singles` whose robot it is, where both drew the same.
+ScoreLine redeclared_line(const Cases& cases, const Cases& singles) {
+  std::map<std::pair<std::uint64_t, std::uint64_t>, const Prediction*> by_robot;
+  for (const ScoredCase* c : singles) by_robot[{c->truth.seed, c->truth.draw}] = &c->prediction;
+  std::size_t unchanged = 0, count = 0;
+  for (const ScoredCase* c : cases) {
+    const auto single = by_robot.find({c->truth.seed, c->truth.draw});
+    if (single == by_robot.end()) continue;
+    ++count;
+    unchanged += single->second->kind == c->prediction.kind && same(single->second->effects, c->prediction.effects);
+  }
+  return line("redeclared_same", "verdict unchanged when only the declarations change", Bar::at_least, 0.90, 0.98,
+              proportion(unchanged, count));
+}
+
+bool described(const ScoredCase& c) {
+  const std::optional<Where>& w = c.prediction.where;
+  return w && std::ranges::count(c.truth.channels, w->channel) > 0 &&
+         std::ranges::count(c.truth.regimes, w->regime) > 0;
+}
+
+bool next_brings_truth(const ScoredCase& c) {
+  const std::optional<Verdict>& v = c.prediction.after_next;
+  return v && names_set(v->kind) && same(v->effects, c.truth.effects);
 }
 
 ScoreLine pairs_line(const Cases& cases) {
@@ -235,16 +241,37 @@ ScoreLine pairs_line(const Cases& cases) {
   }
   std::map<std::string, ScoreValue> baselines;
   for (const auto& [name, list] : others) baselines[name] = f1_score(list);
-  return line("pairs_f1", "pairs: F1 of names", Bar::at_least, 0.65, 0.88, f1_score(own), std::move(baselines));
+  return line("pairs_f1", "pairs: F1 of names", Bar::at_least, 0.75, 0.92, f1_score(own), std::move(baselines));
+}
+
+/// Of the difference of two figures, from their intervals as if of different cases: too much rather than too little.
+double standard_error(const ScoreValue& a, const ScoreValue& b) {
+  return std::hypot(a.high - a.low, b.high - b.low) / (2 * io::kNormal975);
+}
+
+std::map<std::string, std::vector<std::string>> unbeaten_lines(const std::vector<ScoreLine>& lines) {
+  std::map<std::string, std::vector<std::string>> unbeaten;
+  for (const char* name : kBaselines) {
+    std::optional<bool> alarms;  // none: nobody knows
+    std::vector<std::string> keys;
+    for (const ScoreLine& l : lines) {
+      const auto b = l.baselines.find(name);
+      if (b == l.baselines.end() || !b->second.value || !l.score.value) continue;
+      if (l.key.starts_with("false_alarm")) alarms = alarms.value_or(false) || *b->second.value > kFalseAlarms;
+      else if (!(*l.score.value - *b->second.value > standard_error(l.score, b->second))) keys.push_back(l.key);
+    }
+    if (alarms && !*alarms) unbeaten[name] = std::move(keys);
+  }
+  return unbeaten;
 }
 
 }  // namespace
 
 bool right(const CaseTruth& t, const Prediction& p) {
-  if (t.part == "none") return p.kind == "none" || p.kind == "parameters";
-  if (t.part == "parameters") return p.kind == "parameters";
-  if (t.part == "withheld") return p.kind == "unknown";
-  return (p.kind == "effect" && same(p.effects, t.effects)) || (p.kind == "group" && holds(p.effects, t.effects));
+  if (t.part == "none" || t.part == "conventions") return p.kind == "none" || p.kind == "parameters";
+  if (t.part == "parameters" || t.part == "own_figures") return p.kind == "parameters";
+  if (t.part == "withheld" || t.part == "outside") return p.kind == "unknown";
+  return (names_set(p.kind) && same(p.effects, t.effects)) || (p.kind == "group" && holds(p.effects, t.effects));
 }
 
 std::optional<double> closure(const ScoredCase& c) {
@@ -264,48 +291,54 @@ std::optional<double> closure(const ScoredCase& c) {
 }
 
 bool needs_true_fit(const ScoredCase& c) {
-  if (c.truth.part != "singles" && c.truth.part != "typical") return false;
+  if (c.truth.part != "singles") return false;
   const FittedSet* truth = fitted(c.prediction, c.truth.effects);
   return c.prediction.kind != "data" && (truth == nullptr || !truth->left);
 }
 
 Scores score(const std::vector<ScoredCase>& cases) {
   Scores s;
-  const Cases singles = of_parts(cases, {"singles"}), harmless = of_parts(cases, {"none", "parameters"}),
-              withheld = of_parts(cases, {"withheld"}), hover = of_parts(cases, {"hover"});
-  s.main.push_back(first_line("top1_mocap_imu", "right effect first, mocap and IMU", 0.80, 0.92, singles));
-  s.main.push_back(first_line("top1_current", "right effect first, current logged too", 0.85, 0.95,
-                              of_parts(cases, {"singles_current"})));
-  add_naming(s.main, singles);
-  s.main.push_back(line("false_alarm", "false alarm on none and on parameters only", Bar::at_most, 0.05, 0.02,
-                        share(harmless, false_alarm),
-                        of_baselines(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
-  s.main.push_back(line("withheld_unknown", "effect withheld or outside the catalogue: \"unknown\"", Bar::at_least,
-                        0.60, 0.85,
-                        share(withheld, [](const ScoredCase& c) { return c.prediction.kind == "unknown"; })));
-  s.main.push_back(line("withheld_confidently_wrong", "withheld: a wrong name at more than 0.9", Bar::at_most, 0.15,
-                        0.03, share(withheld, [](const ScoredCase& c) {
-                          return names_effects(c.prediction) && c.prediction.probability > kConfident;
-                        })));
-  s.main.push_back(
-      calibration_line(of_parts(cases, {std::begin(kClaiming), std::end(kClaiming)}), s.ece_calibrated_95));
-  s.main.push_back(closure_line(singles));
-  s.main.push_back(coverage_line(singles));
-  s.main.push_back(pairs_line(of_parts(cases, {"pairs"})));
-  s.main.push_back(line("hover_abstain", "hover only: abstains where not identifiable", Bar::at_least, 0.80, 0.80,
-                        share(hover, [](const ScoredCase& c) { return abstains(c.prediction); })));
-  s.main.push_back(line("hover_proposes", "and proposes a manoeuvre that tells the truth from a rival", Bar::at_least,
-                        0, 0.80, share(hover, [](const ScoredCase& c) {
-                          return abstains(c.prediction) && holds(c.prediction.next, c.truth.effects);
-                        })));
-  s.main.back().must = "-";
-  s.main.back().meets_must.reset();
-  const Cases typical = of_parts(cases, {"typical"});
-  s.typical.push_back(first_line("top1_mocap_imu", "right effect first, mocap and IMU", 0.80, 0.92, typical));
-  add_naming(s.typical, typical);
-  s.typical.push_back(calibration_line(typical, s.typical_ece_calibrated_95));
-  s.typical.push_back(closure_line(typical));
-  s.typical.push_back(coverage_line(typical));
+  std::vector<ScoreLine>& l = s.lines;
+  const Cases singles = of_parts(cases, {"singles"}), strange = of_parts(cases, {"withheld", "outside"}),
+              hover = of_parts(cases, {"hover"});
+  l.push_back(first_line("top1_mocap_imu", "right effect first, mocap and IMU", 0.85, 0.95, singles));
+  l.push_back(first_line("top1_current", "right effect first, current logged too", 0.88, 0.97,
+                         of_parts(cases, {"singles_current"})));
+  l.push_back(line("group_top1", "right group first", Bar::at_least, 0.92, 0.98, share(singles, right_group),
+                   of_baselines(singles, baseline_group)));
+  l.push_back(line("top3", "right effect among three", Bar::at_least, 0.95, 0.99, share(singles, among_three),
+                   of_baselines(singles, baseline_among_three)));
+  l.push_back(
+      first_line("top1_typical", "right effect first at typical size", 0.80, 0.93, of_parts(cases, {"typical"})));
+  for (const auto& [part, what] : {std::pair{"none", "false alarm: none"},
+                                   {"parameters", "false alarm: parameters"},
+                                   {"own_figures", "false alarm: own figures"},
+                                   {"conventions", "false alarm: other conventions"}}) {
+    const Cases harmless = of_parts(cases, {part});
+    l.push_back(line(std::string("false_alarm_") + part, what, Bar::at_most, kFalseAlarms, 0.02,
+                     share(harmless, false_alarm),
+                     of_baselines(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
+  }
+  l.push_back(redeclared_line(of_parts(cases, {"redeclared"}), singles));
+  l.push_back(line("unknown", "withheld or outside: \"unknown\"", Bar::at_least, 0.75, 0.90,
+                   share(strange, [](const ScoredCase& c) { return c.prediction.kind == "unknown"; })));
+  l.push_back(line("unknown_wrong", "withheld or outside: a wrong name above 0.8", Bar::at_most, 0.05, 0.02,
+                   share(strange, [](const ScoredCase& c) {
+                     return names_effects(c.prediction) && c.prediction.probability > kConfident;
+                   })));
+  Cases unknown = strange;
+  std::erase_if(unknown, [](const ScoredCase* c) { return c->prediction.kind != "unknown"; });
+  l.push_back(line("unknown_where", "unknown: where it acts is described as sealed", Bar::at_least, 0.80, 0.95,
+                   share(unknown, described)));
+  l.push_back(calibration_line(cases));
+  l.push_back(coverage_line(singles));
+  l.push_back(closure_line(singles));
+  l.push_back(pairs_line(of_parts(cases, {"pairs"})));
+  l.push_back(line("hover_abstain", "hover only: abstains", Bar::at_least, 0.85, 0.95,
+                   share(hover, [](const ScoredCase& c) { return abstains(c.prediction); })));
+  l.push_back(line("hover_next", "hover only: the proposed flight, flown, brings the truth to first place",
+                   Bar::at_least, 0.60, 0.85, share(hover, next_brings_truth)));
+  s.unbeaten = unbeaten_lines(l);
   return s;
 }
 

@@ -1,6 +1,7 @@
 // How good the diagnoses of a blind benchmark were: what was predicted against what was so.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
@@ -12,13 +13,26 @@ namespace flappy::benchmark {
 
 /// What was so.
 struct CaseTruth {
-  std::string part;                           ///< of kParts
-  std::vector<std::string> effects;           ///< that the robot had
-  bool separable = true;                      ///< whether flappy-blind detectability could tell it from every rival
-  std::map<std::string, double> true_values;  ///< by "effect.parameter", where the catalogue's form has one
+  std::string part;                            ///< of kParts
+  std::vector<std::string> effects;            ///< that the robot had
+  bool separable = true;                       ///< whether flappy-blind detectability could tell it from every rival
+  std::map<std::string, double> true_values;   ///< by "effect.parameter", where the catalogue's form has one
+  std::vector<std::string> channels, regimes;  ///< where they act, as blind::FamilyEffect has it
+  std::uint64_t seed = 0, draw = 0;            ///< of the robot
 };
-inline constexpr const char* kParts[] = {"singles",  "singles_current", "none",  "parameters",
-                                         "withheld", "pairs",           "hover", "typical"};
+/// What their robots are:
+///   singles, singles_current  one effect at twice its detectable size; the latter with currents
+///   redeclared                the robots of singles, declared exactly
+///   typical                   one effect at size 1, of those that are detectable there
+///   none, parameters, own_figures, conventions
+///                             no effect: as the file has it; of the published randomisation; every figure apart; other declarations
+///   withheld, outside         an effect whose group the catalogue lacks; one that no catalogue has
+///   pairs                     two of different groups
+///   hover                     what hover alone does not show
+/// All with effects have figures of their own and the conventions of some laboratory.
+inline constexpr const char* kParts[] = {"singles",  "singles_current", "redeclared",  "typical",
+                                         "none",     "parameters",      "own_figures", "conventions",
+                                         "withheld", "outside",         "pairs",       "hover"};
 
 struct ScoredCase {
   CaseTruth truth;
@@ -36,8 +50,10 @@ struct ScoreLine {
 };
 
 struct Scores {
-  std::vector<ScoreLine> main, typical;
-  double ece_calibrated_95 = 0, typical_ece_calibrated_95 = 0;
+  std::vector<ScoreLine> lines;
+  /// Lines that a baseline within the bar of false alarms is not beaten on by more than a standard error of the difference, by its
+  /// name; none: beaten on all. Without those beyond the bar.
+  std::map<std::string, std::vector<std::string>> unbeaten;
 };
 
 Scores score(const std::vector<ScoredCase>& cases);

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <memory>
 #include <set>
 
 #include "benchmark/records.hpp"
@@ -22,27 +23,28 @@ namespace fs = std::filesystem;
 }
 
 /// Made when the labels are opened: no prediction is accepted any more.
-fs::path true_fits(const ScoreCommand& command) { return command.folder / "true_fits"; }
+fs::path true_fits(const fs::path& folder) { return folder / "true_fits"; }
 
 // ---- phase 1: nothing below reads what is sealed
 
 class Predictions {
  public:
-  Predictions(const ScoreCommand& command, const Manifest& manifest)
+  Predictions(const ScoreCommand& command, const fs::path& folder, const Manifest& manifest)
       : command_(command),
+        folder_(folder),
         manifest_(manifest),
         vehicle_(command.vehicle.empty() ? fs::path(manifest.vehicle) : command.vehicle),
-        sums_(command.folder / "predictions.sha256") {}
+        sums_(folder / "predictions.sha256") {}
 
   void check_inputs() const {
     if (io::sha256(io::read_text(vehicle_)) != manifest_.vehicle_sha256)
       refuse(vehicle_, "is not the vehicle declared");
     for (const PublicCase& c : manifest_.cases) {
       for (const auto& [file, sha256] : c.files)
-        if (io::sha256(io::read_text(command_.folder / file)) != sha256) refuse(command_.folder / file, "has changed");
-      for (const fs::path& flight : c.flights(command_.folder))
+        if (io::sha256(io::read_text(folder_ / file)) != sha256) refuse(folder_ / file, "has changed");
+      for (const fs::path& flight : c.flights(folder_))
         for (const fs::directory_entry& e : fs::directory_iterator(flight))
-          if (!c.files.contains(e.path().lexically_relative(command_.folder).string())) refuse(e.path(), "is new");
+          if (!c.files.contains(e.path().lexically_relative(folder_).string())) refuse(e.path(), "is new");
     }
   }
 
@@ -52,8 +54,8 @@ class Predictions {
       check();
       return true;
     }
-    if (fs::exists(true_fits(command_))) refuse(sums_, "is missing, though labels were opened");
-    io::make_folder(command_.folder / "predictions");
+    if (fs::exists(true_fits(folder_))) refuse(sums_, "is missing, though labels were opened");
+    io::make_folder(folder_ / "predictions");
     std::vector<const PublicCase*> open;
     for (const PublicCase& c : manifest_.cases)
       if (!fs::exists(file_of(c.number))) open.push_back(&c);
@@ -74,7 +76,7 @@ class Predictions {
   Json read(std::size_t number) const { return read_json(file_of(number)); }
 
   Question question(const PublicCase& c, const std::vector<std::string>& withheld) const {
-    return {c.flights(command_.folder), vehicle_, command_.priors, withheld, true, command_.experiments};
+    return {c.flights(folder_), vehicle_, command_.priors, withheld, true, command_.experiments};
   }
 
  private:
@@ -84,7 +86,7 @@ class Predictions {
     io::write_atomically(sums_, sums);
   }
   static std::string name_of(std::size_t number) { return "predictions/" + number_text(number) + ".json"; }
-  fs::path file_of(std::size_t number) const { return command_.folder / name_of(number); }
+  fs::path file_of(std::size_t number) const { return folder_ / name_of(number); }
   std::string sum_of(std::size_t number) const { return io::sha256(io::read_text(file_of(number))); }
 
   void check() const {
@@ -95,34 +97,67 @@ class Predictions {
   }
 
   const ScoreCommand& command_;
+  const fs::path& folder_;
   const Manifest& manifest_;
   fs::path vehicle_, sums_;
 };
 
 // ---- phase 2: the labels
 
+/// A folder of flappy-blind make.
+struct Bench {
+  Bench(const ScoreCommand& command, const fs::path& at)
+      : folder(at), manifest(read_manifest(at)), predictions(command, folder, manifest) {
+    if (io::writes(command.ranks)) lock.emplace(folder);
+  }
+  Bench(const Bench&) = delete;
+  Bench& operator=(const Bench&) = delete;
+
+  void open() {
+    const fs::path sealed = folder / "sealed" / "labels.json";
+    if (io::sha256(io::read_text(sealed)) != manifest.labels_sha256) refuse(sealed, "has changed");
+    io::make_folder(true_fits(folder));
+    truths = read_json(sealed);
+    for (const Json& json : truths.at("cases")) {
+      Label l = label_from(json);
+      labels.emplace(l.planned.number, std::move(l));
+    }
+    for (const PublicCase& c : manifest.cases)
+      cases.push_back({labels.at(c.number).truth(), prediction_from(predictions.read(c.number)), {}});
+  }
+
+  fs::path folder;
+  Manifest manifest;
+  std::optional<io::FolderLock> lock;
+  Predictions predictions;
+  Json truths;
+  std::map<std::size_t, Label> labels;
+  std::vector<ScoredCase> cases;  ///< as in the manifest
+};
+
 /// With the true effects alone in the catalogue: where a diagnosis did not fit them, its closure has no measure.
-bool fit_truths(const ScoreCommand& command, const Manifest& manifest, const Predictions& predictions,
-                const std::map<std::size_t, Label>& labels, std::vector<ScoredCase>& cases) {
+bool fit_truths(const ScoreCommand& command, Bench& bench) {
   std::vector<std::size_t> open;
-  const auto file_of = [&](std::size_t number) { return true_fits(command) / (number_text(number) + ".json"); };
-  for (std::size_t i = 0; i < cases.size(); ++i)
-    if (needs_true_fit(cases[i]) && !fs::exists(file_of(manifest.cases[i].number))) open.push_back(i);
+  const auto file_of = [&](std::size_t i) {
+    return true_fits(bench.folder) / (number_text(bench.manifest.cases[i].number) + ".json");
+  };
+  for (std::size_t i = 0; i < bench.cases.size(); ++i)
+    if (needs_true_fit(bench.cases[i]) && !fs::exists(file_of(i))) open.push_back(i);
   const bool all =
       work_through("fitting true effects", open.size(), command.threads, command.ranks, [&](std::size_t k) {
-        const PublicCase& c = manifest.cases[open[k]];
+        const PublicCase& c = bench.manifest.cases[open[k]];
         std::vector<std::string> others;
         for (const model::EffectEntry& e : model::effects())
-          if (std::ranges::count(labels.at(c.number).truth().effects, std::string(e.info.id)) == 0)
+          if (std::ranges::count(bench.cases[open[k]].truth.effects, std::string(e.info.id)) == 0)
             others.emplace_back(e.info.id);
-        Question q = predictions.question(c, others);
+        Question q = bench.predictions.question(c, others);
         q.baselines = false;
         q.experiments.clear();
-        io::write_atomically(file_of(c.number), to_json(command.predictor(q)).dump(1) + "\n");
+        io::write_atomically(file_of(open[k]), to_json(command.predictor(q)).dump(1) + "\n");
       });
   if (!all) return false;
-  for (std::size_t i = 0; i < cases.size(); ++i)
-    if (needs_true_fit(cases[i])) cases[i].true_fit = prediction_from(read_json(file_of(manifest.cases[i].number)));
+  for (std::size_t i = 0; i < bench.cases.size(); ++i)
+    if (needs_true_fit(bench.cases[i])) bench.cases[i].true_fit = prediction_from(read_json(file_of(i)));
   return true;
 }
 
@@ -137,11 +172,11 @@ std::string figure(const std::optional<double>& value) {
 
 std::string interval(const ScoreValue& s) { return s.value ? figure(s.low) + " to " + figure(s.high) : "-"; }
 
-std::string table(const std::string& title, const std::vector<ScoreLine>& lines) {
+std::string table(const std::string& title, const Scores& scores) {
   std::string text = "| " + title +
-                     " | must | aim | measured | 95 % interval | count | largest residual | best RMSE | STLSQ |\n"
-                     "|---|---|---|---|---|---|---|---|---|\n";
-  for (const ScoreLine& l : lines) {
+                     " | must | aim | measured | 95 % interval | count | largest residual | best RMSE | STLSQ | "
+                     "black box |\n|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const ScoreLine& l : scores.lines) {
     text += "| " + l.what + " | " + l.must + " | " + l.aim + " | " + figure(l.score.value) +
             (l.meets_must && !*l.meets_must ? " (missed)" : "") + " | " + interval(l.score) + " | " +
             std::to_string(l.score.count);
@@ -151,6 +186,9 @@ std::string table(const std::string& title, const std::vector<ScoreLine>& lines)
     }
     text += " |\n";
   }
+  for (const auto& [name, keys] : scores.unbeaten)
+    text += "\nBaseline " + name + ", within the bar of false alarms: " +
+            (keys.empty() ? "beaten on every row" : "not beaten by a standard error on " + io::joined(keys)) + ".\n";
   return text;
 }
 
@@ -162,28 +200,40 @@ void add(Json& json, const std::string& key, const ScoreValue& s) {
   json[key + "_count"] = s.count;
 }
 
-Json lines_json(const std::vector<ScoreLine>& lines) {
-  Json json = Json::object();
-  for (const ScoreLine& l : lines) add(json, l.key, l.score);
+Json scores_json(const Scores& scores, std::size_t cases) {
+  Json json = {{"cases", cases}};
+  for (const ScoreLine& l : scores.lines) add(json, l.key, l.score);
+  json["baselines"] = Json::object();
+  for (const char* name : kBaselines) {
+    Json own = Json::object();
+    for (const ScoreLine& l : scores.lines)
+      if (const auto b = l.baselines.find(name); b != l.baselines.end()) add(own, l.key, b->second);
+    if (const auto u = scores.unbeaten.find(name); u != scores.unbeaten.end()) own["unbeaten"] = u->second;
+    json["baselines"][name] = std::move(own);
+  }
   return json;
 }
 
 /// One line for each case, for whoever wants to know which ones went wrong.
-std::string case_list(const Manifest& manifest, const std::map<std::size_t, Label>& labels,
-                      const std::vector<ScoredCase>& cases, const Predictions& predictions) {
-  std::string text = "case,part,effects,sizes,separable,verdict,named,probability,right,closure,seconds\n";
-  for (std::size_t i = 0; i < cases.size(); ++i) {
-    const ScoredCase& c = cases[i];
-    const std::size_t number = manifest.cases[i].number;
+std::string case_lines(const Bench& bench) {
+  std::string text;
+  for (std::size_t i = 0; i < bench.cases.size(); ++i) {
+    const ScoredCase& c = bench.cases[i];
+    const Prediction& p = c.prediction;
+    const Label& label = bench.labels.at(bench.manifest.cases[i].number);
+    const std::size_t number = label.planned.number;
+    const Json prediction = bench.predictions.read(number);
     std::string sizes;
-    for (const blind::BlindEffect& e : labels.at(number).planned.effects)
+    for (const blind::BlindEffect& e : label.planned.effects)
       sizes += (sizes.empty() ? "" : "+") + io::shortest_digits(e.size);
     const std::optional<double> closed = c.truth.part == "singles" ? closure(c) : std::nullopt;
     text += std::to_string(number) + "," + c.truth.part + "," + io::joined(c.truth.effects, "+") + "," + sizes + "," +
-            (c.truth.separable ? "1" : "0") + "," + c.prediction.kind + "," + io::joined(c.prediction.effects, "+") +
-            "," + figure(c.prediction.probability) + "," + (right(c.truth, c.prediction) ? "1" : "0") + "," +
-            (closed ? figure(closed) : "") + "," +
-            io::shortest_digits(predictions.read(number).at("seconds").get<double>()) + "\n";
+            (c.truth.separable ? "1" : "0") + "," + p.kind + "," + io::joined(p.effects, "+") + "," +
+            figure(p.probability) + "," + (right(c.truth, p) ? "1" : "0") + "," + (closed ? figure(closed) : "") + "," +
+            io::shortest_digits(prediction.at("seconds").get<double>()) + "," + (p.where ? p.where->channel : "") +
+            "," + (p.where ? p.where->regime : "") + "," + std::to_string(c.truth.seed) + "," +
+            std::to_string(c.truth.draw) + "," + bench.manifest.family + "," + bench.manifest.set + "," +
+            prediction.at("commit").get<std::string>() + "\n";
   }
   return text;
 }
@@ -191,67 +241,68 @@ std::string case_list(const Manifest& manifest, const std::map<std::size_t, Labe
 }  // namespace
 
 Json score_bench(const ScoreCommand& command) {
-  std::optional<io::FolderLock> lock;
-  if (io::writes(command.ranks)) lock.emplace(command.folder);
-  const Manifest manifest = read_manifest(command.folder);
-  const Predictions predictions(command, manifest);
-  predictions.check_inputs();
-  if (!predictions.make()) {
-    std::printf("stopped; what is predicted stays: the same command goes on\n");
-    return nullptr;
+  std::vector<std::unique_ptr<Bench>> benches;
+  for (const fs::path& folder : command.folders) {
+    benches.push_back(std::make_unique<Bench>(command, folder));
+    benches.back()->predictions.check_inputs();
+  }
+  for (const auto& b : benches)
+    if (!b->predictions.make()) {
+      std::printf("stopped; what is predicted stays: the same command goes on\n");
+      return nullptr;
+    }
+  for (const auto& b : benches) {
+    b->open();
+    if (!fit_truths(command, *b)) {
+      std::printf("stopped; predictions are sealed: the same command goes on\n");
+      return nullptr;
+    }
   }
 
-  const fs::path sealed = command.folder / "sealed" / "labels.json";
-  if (io::sha256(io::read_text(sealed)) != manifest.labels_sha256) refuse(sealed, "has changed");
-  io::make_folder(true_fits(command));
-  const Json truths = read_json(sealed);
-  std::map<std::size_t, Label> labels;
-  for (const Json& json : truths.at("cases")) {
-    Label l = label_from(json);
-    labels.emplace(l.planned.number, std::move(l));
+  std::map<std::string, std::vector<ScoredCase>> by_family;
+  std::vector<ScoredCase> all;
+  std::set<std::string> sets, commits, undetectable;
+  std::size_t never = 0, drawn_again = 0;
+  std::string lines =
+      "case,part,effects,sizes,separable,verdict,named,probability,right,closure,seconds,channel,regime,seed,draw,"
+      "family,set,commit\n";
+  for (const auto& b : benches) {
+    std::vector<ScoredCase>& own = by_family[b->manifest.family];
+    own.insert(own.end(), b->cases.begin(), b->cases.end());
+    all.insert(all.end(), b->cases.begin(), b->cases.end());
+    sets.insert(b->manifest.set);
+    for (const Json& id : b->truths.at("undetectable"))
+      undetectable.insert((by_family.size() > 1 ? b->manifest.family + ": " : "") + id.get<std::string>());
+    never += b->truths.at("never_fly").size();
+    for (const ScoredCase& c : b->cases) drawn_again += c.truth.draw;
+    for (const PublicCase& c : b->manifest.cases) commits.insert(b->predictions.read(c.number).at("commit"));
+    lines += case_lines(*b);
   }
-  std::vector<ScoredCase> cases;
-  std::set<std::string> commits;
-  for (const PublicCase& c : manifest.cases) {
-    const Json prediction = predictions.read(c.number);
-    commits.insert(prediction.at("commit"));
-    cases.push_back({labels.at(c.number).truth(), prediction_from(prediction), {}});
+  const Scores scores = score(all);
+  Json json = scores_json(scores, all.size());
+  std::string text;
+  json["families"] = Json::object();
+  for (const auto& [family, cases] : by_family) {
+    const Scores own = score(cases);
+    text += table("family " + family + ", 30 s of rich flight, twice the detectable size", own) + "\n";
+    json["families"][family] = scores_json(own, cases.size());
   }
-  if (!fit_truths(command, manifest, predictions, labels, cases)) {
-    std::printf("stopped; predictions are sealed: the same command goes on\n");
-    return nullptr;
-  }
-
-  const Scores scores = score(cases);
-  const auto undetectable = truths.at("undetectable").get<std::vector<std::string>>();
-  std::string text = table("on 30 s of flights with rich excitation, twice the detectable size", scores.main);
-  if (std::ranges::any_of(cases, [](const ScoredCase& c) { return c.truth.part == "typical"; }))
-    text += "\n" + table("the same at typical sizes", scores.typical);
-  text += "\n" + manifest.set + " seeds, " + std::to_string(cases.size()) + " cases, " +
-          std::to_string(truths.at("never_fly").size()) +
-          " robots that never fly left out. Undetectable, left out: " + std::to_string(undetectable.size()) +
-          (undetectable.empty() ? "" : " (" + io::joined(undetectable) + ")") + ".\n";
+  if (by_family.size() > 1) text += table("all families", scores) + "\n";
+  text += io::joined({sets.begin(), sets.end()}) + " seeds, " + std::to_string(all.size()) + " cases, " +
+          std::to_string(drawn_again) + " robots that crashed drawn again, " + std::to_string(never) +
+          " that never fly left out. Undetectable, left out: " + std::to_string(undetectable.size()) +
+          (undetectable.empty() ? "" : " (" + io::joined({undetectable.begin(), undetectable.end()}) + ")") + ".\n";
   if (commits.size() > 1) text += "Predicted by " + std::to_string(commits.size()) + " different versions.\n";
   std::fputs(text.c_str(), stdout);
   if (!io::writes(command.ranks)) return nullptr;
-  io::write_atomically(command.folder / "score.md", text);
-  io::write_atomically(command.folder / "score.csv", case_list(manifest, labels, cases, predictions));
-
-  Json json = {{"cases", cases.size()}};
-  json.update(lines_json(scores.main));
-  json["ece_calibrated_95"] = scores.ece_calibrated_95;
-  json["typical"] = lines_json(scores.typical);
-  json["typical"]["ece_calibrated_95"] = scores.typical_ece_calibrated_95;
-  json["baselines"] = Json::object();
-  for (const char* name : kBaselines) {
-    Json own = Json::object();
-    for (const ScoreLine& l : scores.main)
-      if (const auto b = l.baselines.find(name); b != l.baselines.end()) add(own, l.key, b->second);
-    json["baselines"][name] = std::move(own);
-  }
+  const fs::path out = command.out.empty() ? command.folders.front() : command.out;
+  io::make_folder(out);
+  io::write_atomically(out / "score.md", text);
+  io::write_atomically(out / "score.csv", lines);
   json["undetectable"] = undetectable;
-  json["never_fly"] = truths.at("never_fly").size();
-  json["set"] = manifest.set;
+  json["never_fly"] = never;
+  json["drawn_again"] = drawn_again;
+  json["set"] = sets;
   json["commits"] = commits;
   return json;
 }

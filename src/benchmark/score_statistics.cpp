@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "io/statistics.hpp"
@@ -23,15 +24,32 @@ class Draws {
   std::mt19937_64 engine_{1};
 };
 
-/// Of claims in the order of their probability.
-double error_of(const std::vector<Claim>& sorted) {
-  const std::size_t n = sorted.size(), bins = std::min(n, kBins);
+/// E |N(d, s)|.
+double folded_normal_mean(double d, double s) {
+  if (!(s > 0)) return std::abs(d);
+  const double z = d / s;
+  return s * std::sqrt(2 / std::numbers::pi) * std::exp(-z * z / 2) + d * std::erf(z / std::numbers::sqrt2);
+}
+
+/// Before 0 is the least.
+double unbiased_error(std::vector<Claim> claims) {
+  std::ranges::sort(claims, {}, &Claim::probability);
+  const std::size_t n = claims.size(), bins = std::min(n, kBins);
+  std::vector<double> right(n);  // share among claims of the same probability
+  for (std::size_t i = 0, end = 0; i < n; i = end) {
+    double sum = 0;
+    for (end = i; end < n && claims[end].probability == claims[i].probability; ++end) sum += claims[end].right ? 1 : 0;
+    std::fill(right.begin() + static_cast<std::ptrdiff_t>(i), right.begin() + static_cast<std::ptrdiff_t>(end),
+              sum / static_cast<double>(end - i));
+  }
   double error = 0;
   for (std::size_t b = 0; b < bins; ++b) {
-    double difference = 0;
-    for (std::size_t i = b * n / bins; i < (b + 1) * n / bins; ++i)
-      difference += sorted[i].probability - (sorted[i].right ? 1 : 0);
-    error += std::abs(difference);
+    const std::size_t from = b * n / bins, to = (b + 1) * n / bins;
+    const double count = static_cast<double>(to - from);
+    double stated = 0, share = 0;
+    for (std::size_t i = from; i < to; ++i) stated += claims[i].probability / count, share += right[i] / count;
+    const double d = stated - share, s = std::sqrt(std::max(0.0, share * (1 - share)) / count);
+    error += count * (2 * std::abs(d) - folded_normal_mean(d, s));
   }
   return n > 0 ? error / static_cast<double>(n) : 0;
 }
@@ -62,20 +80,22 @@ ScoreValue resampled(std::size_t count,
   return score;
 }
 
-double calibration_error(std::vector<Claim> claims) {
-  std::ranges::stable_sort(claims, {}, &Claim::probability);
-  return error_of(claims);
-}
+double calibration_error(const std::vector<Claim>& claims) { return std::max(0.0, unbiased_error(claims)); }
 
-double calibrated_error_95(std::vector<Claim> claims) {
-  std::ranges::stable_sort(claims, {}, &Claim::probability);
+ScoreValue calibration_score(const std::vector<Claim>& claims) {
+  if (claims.empty()) return {};
+  ScoreValue score{calibration_error(claims), 0, 0, claims.size()};
   Draws draws;
-  std::vector<double> errors;
+  std::vector<double> values;
+  std::vector<Claim> some(claims.size());
   for (std::size_t k = 0; k < kResamples; ++k) {
-    for (Claim& c : claims) c.right = draws.uniform() < c.probability;
-    errors.push_back(error_of(claims));
+    for (Claim& c : some) c = claims[draws.below(claims.size())];
+    values.push_back(unbiased_error(some));
   }
-  return io::quantile(errors, 0.95);
+  const double mean = io::mean(values);
+  score.low = std::max(0.0, *score.value + io::quantile(values, 0.025) - mean);
+  score.high = std::max(0.0, *score.value + io::quantile(values, 0.975) - mean);
+  return score;
 }
 
 }  // namespace flappy::benchmark

@@ -103,7 +103,7 @@ flightlog::FlightHeader header_of(const Case& c, const SensorSet& sensors, const
 
 Room flight_room() { return {}; }
 
-RobotFlight fly(const Case& c, std::size_t flight) {
+RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch) {
   const Plan plan(c.programme, flight, flight_room(), c.seed);
   RobotController pilot(c.vehicle.driver, c.seed, flight);
 
@@ -121,19 +121,20 @@ RobotFlight fly(const Case& c, std::size_t flight) {
     return aim;
   };
   double farthest_m = 0;
-  RobotFlight f = fly(c, flight, start, kFlight_s, kLeastUpright, [&](double t_s, double, const Torso& torso) {
+  const auto steer = [&](double t_s, double, const Torso& torso) {
     const Aim aim = aim_at(t_s);
     if (t_s >= 0) farthest_m = std::max(farthest_m, std::sqrt((torso.position_m - aim.position_m).squaredNorm()));
     return pilot.steer(torso, aim, plan.excitation(t_s));
-  });
+  };
+  RobotFlight f = fly(c, flight, start, kFlight_s, kLeastUpright, steer, watch);
   f.farthest_m = farthest_m;
   return f;
 }
 
 RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
-                const Steer& steer) {
+                const Steer& steer, const Watch& watch) {
   const Room room = flight_room();
-  const SensorSet sensors = sensors_of(c.seed, c.power, c.wings);
+  const SensorSet sensors = c.sensors ? *c.sensors : sensors_of(c.seed, c.power, c.wings);
   Robot robot(c.vehicle, room, c.sizes, c.seed, flight);
   RobotImu imu(sensors, c.sizes, c.seed, flight, kRobotStep_s);
   RobotMocap mocap(sensors, c.sizes, c.seed, flight);
@@ -197,6 +198,7 @@ RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double du
       w.right_stroke_rad.push_back(seen(robot.wing(1).stroke_rad));
       w.right_rotation_rad.push_back(seen(robot.wing(1).rotation_rad));
     }
+    if (watch) watch(robot, volts);
     robot.step(volts[0], volts[1]);
     if (!logged) continue;
     if (const auto s = imu.after_step(robot, t_s + kRobotStep_s)) add(f.log, *s);

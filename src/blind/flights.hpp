@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct Case {
   std::uint64_t seed = 0;
   Programme programme = Programme::rich;
   bool power = false, wings = false;
+  std::optional<SensorSet> sensors;  ///< where they are not those of the seed
 };
 
 struct RobotFlight {
@@ -32,8 +34,11 @@ struct RobotFlight {
 /// The room in which they fly.
 Room flight_room();
 
+/// Sees the robot before each step, from the first of the trimming on, and the volts of the step.
+using Watch = std::function<void(const Robot& robot, const std::array<double, 2>& volts)>;
+
 /// Flight 0, 1 or 2 of a case: it learns to trim, then the log begins. The same bytes for the same case.
-RobotFlight fly(const Case& c, std::size_t flight);
+RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch = {});
 
 /// Who steers: asked once each control period, from kTrim_s before the log begins; `t_s` is on the log's clock, `beat` the
 /// fraction of the beat in [0, 1).
@@ -42,6 +47,6 @@ using Steer = std::function<Inputs(double t_s, double beat, const Torso& torso)>
 /// A flight of `duration_s` from `start` on. It has crashed where it touches something, flies away, or its z axis comes
 /// below `least_upright` over the level (sine of the angle).
 RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
-                const Steer& steer);
+                const Steer& steer, const Watch& watch = {});
 
 }  // namespace flappy::blind

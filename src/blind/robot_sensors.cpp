@@ -20,6 +20,14 @@ double bandwidth_hz(double interval_s, double low_pass_hz) {
   return high;
 }
 
+void declare_imu(SensorSet& s) {
+  const double interval_s = 1 / s.imu.rate_hz;
+  s.imu.bandwidth_hz = std::round(bandwidth_hz(interval_s, s.imu_low_pass_hz) * 10) / 10;
+  // a reader models one low-pass of that bandwidth: what else is late, is latency
+  const double late_s = s.imu_transport_s + interval_s / 2 + 1 / (2 * kPi * s.imu_low_pass_hz);
+  s.imu.latency_s = std::round((late_s - 1 / (2 * kPi * s.imu.bandwidth_hz)) * 1e7) / 1e7;
+}
+
 SensorSet sensors_of(std::uint64_t seed, bool power, bool wings) {
   Random random(seed, 20);
   SensorSet s;
@@ -27,11 +35,7 @@ SensorSet sensors_of(std::uint64_t seed, bool power, bool wings) {
   s.imu.rate_hz = random.uniform() < 0.5 ? 500 : 1000;
   s.imu_low_pass_hz = 0.45 * s.imu.rate_hz;
   s.imu_transport_s = 1e-3;
-  const double interval_s = 1 / s.imu.rate_hz;
-  s.imu.bandwidth_hz = std::round(bandwidth_hz(interval_s, s.imu_low_pass_hz) * 10) / 10;
-  // a reader models one low-pass of that bandwidth: what else is late, is latency
-  const double late_s = s.imu_transport_s + interval_s / 2 + 1 / (2 * kPi * s.imu_low_pass_hz);
-  s.imu.latency_s = std::round((late_s - 1 / (2 * kPi * s.imu.bandwidth_hz)) * 1e7) / 1e7;
+  declare_imu(s);
   s.imu.position_m = {2e-3, -1e-3, -4e-3};
   s.imu.gyro_noise_rad_s = 0.05;
   s.imu.gyro_bias_sd_rad_s = {0.04, 0.04, 0.04};
@@ -63,8 +67,8 @@ RobotImu::RobotImu(const SensorSet& set, const Sizes& sizes, std::uint64_t seed,
 
 std::optional<RobotImu::Sample> RobotImu::after_step(const Robot& robot, double t_s) {
   const auto& at = set_.imu.position_m;
-  const Vector3d rate = robot.torso().rate_rad_s;
-  Vector3d force = robot.specific_force({at[0], at[1], at[2]});
+  Vector3d rate = robot.torso().rate_rad_s, force = robot.specific_force({at[0], at[1], at[2]});
+  if (!set_.imu_turned.isIdentity(0)) rate = set_.imu_turned * rate, force = set_.imu_turned * force;
   if (!begun_) gyro_ = rate, accel_ = slow_accel_ = force, begun_ = true;
   if (const double size = sizes_[Effect::vibration_rectification]; size > 0) {
     slow_accel_ += 2 * kPi * 8 * step_s_ * (force - slow_accel_);

@@ -16,7 +16,11 @@ struct SensorSet {
   std::optional<flightlog::PowerHeader> power;
   std::optional<flightlog::WingsHeader> wings;
   double imu_low_pass_hz = 0, imu_transport_s = 0;  ///< behind the header's bandwidth and latency
+  Matrix3d imu_turned = Matrix3d::Identity();       ///< from B to the IMU's own axes
 };
+
+/// Declares bandwidth and latency of an IMU of this rate, low-pass and transport.
+void declare_imu(SensorSet& set);
 
 /// The sensors of a robot: rates differ from robot to robot.
 SensorSet sensors_of(std::uint64_t seed, bool power, bool wings);

@@ -6,10 +6,12 @@
 #include <filesystem>
 #include <set>
 
+#include "benchmark/families.hpp"
 #include "benchmark/make.hpp"
 #include "benchmark/records.hpp"
 #include "benchmark/score_bench.hpp"
 #include "io/files.hpp"
+#include "io/sha256.hpp"
 #include "model/effects/registry.hpp"
 #include "refusal.hpp"
 
@@ -55,8 +57,8 @@ class Benchmark : public testing::Test {
     c.plan.parts = {part};
     c.plan.at_most = at_most;
     c.threads = 2;
-    c.true_values = [](const blind::Case& flown, const std::vector<blind::BlindEffect>& effects) {
-      EXPECT_TRUE(flown.sizes.has(blind::Effect::ground_effect) || flown.sizes.has(blind::Effect::ceiling_effect));
+    c.true_values = [](const blind::Assignment& flown, const std::vector<blind::BlindEffect>& effects) {
+      EXPECT_EQ(flown.effects.front().first, effects.front().id);
       return std::map<std::string, std::optional<double>>{{effects.front().id + ".gain", 0.1},
                                                           {effects.front().id + ".length_m", std::nullopt}};
     };
@@ -66,7 +68,7 @@ class Benchmark : public testing::Test {
   /// Says ground effect, whatever it is asked, unless it may not.
   ScoreCommand command() {
     ScoreCommand c;
-    c.folder = root_ / "bench";
+    c.folders = {root_ / "bench"};
     c.priors = kConfigs + "gap/priors.toml";
     c.threads = 2;
     c.predictor = [this](const Question& q) {
@@ -110,9 +112,8 @@ TEST_F(Benchmark, PredictsSealsAndScores) {
   EXPECT_EQ(json.at("interval_coverage_count"), 1);
   EXPECT_TRUE(json.at("top1_current").is_null());
   EXPECT_EQ(json.at("undetectable").dump(), R"(["outside_slosh","tether"])");
-  for (const char* key :
-       {"top1_mocap_imu", "top1_current", "group_top1", "top3", "false_alarm", "withheld_unknown",
-        "withheld_confidently_wrong", "ece", "closure_median", "interval_coverage", "pairs_f1", "hover_abstain"})
+  for (const char* key : {"top1_mocap_imu", "top1_current", "group_top1", "top3", "false_alarm_none", "unknown",
+                          "unknown_wrong", "ece", "closure_median", "interval_coverage", "pairs_f1", "hover_abstain"})
     for (const char* end : {"", "_low", "_high"}) EXPECT_TRUE(json.contains(std::string(key) + end)) << key << end;
   // once more: nothing is asked again
   EXPECT_EQ(score_bench(command()), json);
@@ -170,7 +171,7 @@ TEST_F(Benchmark, GoesOnWhereItWasStopped) {
   EXPECT_EQ(test::refusal([&] { score_bench(c); }), "stopped");
   EXPECT_FALSE(fs::exists(root_ / "bench" / "predictions.sha256"));
   c.predictor = whole;
-  EXPECT_EQ(score_bench(c).at("false_alarm"), 1.0);
+  EXPECT_EQ(score_bench(c).at("false_alarm_none"), 1.0);
   EXPECT_EQ(asked_, 2);
 }
 
@@ -198,9 +199,9 @@ TEST_F(Benchmark, TakesNoPredictionOnceLabelsAreOpen) {
 }
 
 TEST_F(Benchmark, PlansEveryPart) {
-  const auto of = read_detectability(root_ / "detectable.toml");
-  const std::vector<PlannedCase> plan = plan_cases(of, {});
-  std::size_t outside = 0;
+  const blind::Family& family = family_named("a");
+  const auto of = read_detectability(root_ / "detectable.toml", family);
+  const std::vector<PlannedCase> plan = plan_cases(family, of, {});
   std::map<std::string, std::size_t> count;
   std::set<std::size_t> numbers;
   std::map<std::uint64_t, std::vector<const PlannedCase*>> by_seed;
@@ -210,66 +211,153 @@ TEST_F(Benchmark, PlansEveryPart) {
     numbers.insert(c.number);
     by_seed[c.seed].push_back(&c);
     in_order += c.number > 1 && plan[c.number - 1].part == plan[c.number - 2].part;
-    EXPECT_GE(c.seed, 10001U);
-    EXPECT_LT(c.seed, 700001U);
+    EXPECT_GE(c.seed, 10'000'000U);
+    EXPECT_LT(c.seed, 15'000'000U);
     for (const blind::BlindEffect& e : c.effects) {
       if (c.part.starts_with("singles") || c.part == "pairs") EXPECT_DOUBLE_EQ(e.size, 0.4) << e.id;
       if (c.part == "typical") EXPECT_DOUBLE_EQ(e.size, 1) << e.id;
-      if (c.part != "hover" && c.part != "typical") EXPECT_NE(e.id, "tether") << "undetectable, in " << c.part;
+      if (c.part != "hover") EXPECT_NE(e.id, "tether") << "undetectable, in " << c.part;
+      EXPECT_EQ(e.id.starts_with("outside_"), c.part == "outside") << e.id;
     }
     if (c.part == "pairs") {
       ASSERT_EQ(c.effects.size(), 2U);
       EXPECT_NE(model::group_of(c.effects[0].id), model::group_of(c.effects[1].id));
     }
-    EXPECT_EQ(c.effects.empty(), c.part == "none" || c.part == "parameters");
+    const bool harmless =
+        c.part == "none" || c.part == "parameters" || c.part == "own_figures" || c.part == "conventions";
+    EXPECT_EQ(c.effects.empty(), harmless);
+    EXPECT_EQ(c.own_figures, !harmless || c.part == "own_figures") << c.part;
+    EXPECT_EQ(c.conventions, (!harmless && c.part != "redeclared") || c.part == "conventions") << c.part;
+    EXPECT_EQ(c.published, c.part == "parameters");
+    EXPECT_EQ(c.withheld.empty(), c.part != "withheld");
     const std::vector<std::string> rivals(c.effects.size() == 1 && c.effects[0].id == "wind" ? 1 : 0, "tether");
     if (c.part == "singles") EXPECT_EQ(c.inseparable, rivals);
     // nothing that gains too little at typical size is told from anything
     if (c.part == "typical") EXPECT_EQ(c.inseparable.size(), model::effects().size() - 1);
     if (c.part == "withheld" && c.effects[0].id == "wind")
       EXPECT_EQ(std::ranges::count(c.withheld, "tether"), 1) << "of its group";
-    if (c.part == "withheld" && c.withheld.empty()) {
-      EXPECT_TRUE(c.effects[0].id.starts_with("outside_"));
+    if (c.part == "outside") {
       EXPECT_NE(c.effects[0].id, "outside_slosh") << "undetectable";
       EXPECT_DOUBLE_EQ(c.effects[0].size, c.effects[0].id == "outside_vortex_ring" ? 3 : 2) << c.effects[0].id;
-      ++outside;
     }
-    EXPECT_EQ(c.randomised, c.part != "none");
     EXPECT_EQ(c.power, c.part == "singles_current");
     EXPECT_EQ(c.hover, c.part == "hover");
   }
-  const std::map<std::string, std::size_t> expected = {{"singles", 145},   {"singles_current", 145}, {"none", 40},
-                                                       {"parameters", 40}, {"withheld", 60},         {"pairs", 40},
-                                                       {"hover", 30},      {"typical", 60}};
+  // 29 effects in turn, 9 outside, 5 that hover hides
+  const std::map<std::string, std::size_t> expected = {
+      {"singles", 116},     {"singles_current", 116}, {"redeclared", 100}, {"typical", 116},
+      {"none", 100},        {"parameters", 100},      {"withheld", 58},    {"outside", 54},
+      {"own_figures", 100}, {"conventions", 100},     {"pairs", 100},      {"hover", 100}};
   EXPECT_EQ(count, expected);
-  EXPECT_EQ(outside, 30U);
   EXPECT_EQ(numbers.size(), plan.size());
   EXPECT_EQ(*numbers.rbegin(), plan.size());
   EXPECT_LT(in_order, plan.size() / 3) << "numbers follow parts";
-  // a robot flies once, but with and without current
-  for (const auto& [seed, cases] : by_seed)
-    EXPECT_EQ(cases.size(), cases[0]->part.starts_with("singles") ? 2U : 1U) << seed;
+  // a robot flies once, but with current, and as declared otherwise
+  for (const auto& [seed, cases] : by_seed) {
+    const std::size_t times = !cases[0]->part.starts_with("singles") && cases[0]->part != "redeclared" ? 1U
+                              : seed % 10'000 < 100                                                    ? 3U
+                                                                                                       : 2U;
+    EXPECT_EQ(cases.size(), times) << seed;
+    for (const PlannedCase* c : cases) {
+      ASSERT_EQ(c->effects.size(), cases[0]->effects.size());
+      if (!c->effects.empty()) EXPECT_EQ(c->effects[0].id, cases[0]->effects[0].id);
+    }
+  }
   PlanOptions reported;
   reported.reported = true;
-  for (const PlannedCase& c : plan_cases(of, reported)) EXPECT_GE(c.seed, 700001U);
+  for (const PlannedCase& c : plan_cases(family, of, reported))
+    EXPECT_TRUE(c.seed >= 15'000'000U && c.seed < 20'000'000U);
   // what a part holds does not depend on what else is made
   PlanOptions pairs;
   pairs.parts = {"pairs"};
   std::set<std::string> alone, among;
-  for (const PlannedCase& c : plan_cases(of, pairs)) alone.insert(c.effects[0].id + std::to_string(c.seed));
+  for (const PlannedCase& c : plan_cases(family, of, pairs)) alone.insert(c.effects[0].id + std::to_string(c.seed));
   for (const PlannedCase& c : plan)
     if (c.part == "pairs") among.insert(c.effects[0].id + std::to_string(c.seed));
   EXPECT_EQ(alone, among);
 }
 
+TEST_F(Benchmark, FamilyAHasTheCatalogue) {
+  std::set<std::string> own, catalogue;
+  for (const blind::FamilyEffect& e : family_named("a").effects())
+    if (in_catalogue(e)) own.insert(e.id);
+  for (const model::EffectEntry& e : model::effects()) catalogue.insert(std::string(e.info.id));
+  EXPECT_EQ(own, catalogue);
+}
+
+TEST_F(Benchmark, HoverHidesWhatTheTableSays) {
+  std::string text = detectability();
+  for (const auto& [id, hover] : {std::pair{"wind", "0.3"}, {"com_offset", "0.5"}, {"body_drag", "0.2"}}) {
+    const std::string at = "[" + std::string(id) + "]\n";
+    text.insert(text.find(at) + at.size(), "hover = " + std::string(hover) + "\n");
+  }
+  io::write_atomically(root_ / "detectable.toml", text);
+  const auto of = read_detectability(root_ / "detectable.toml", family_named("a"));
+  EXPECT_FALSE(of.at("wind").hidden) << "twice 0.2 shows in hover";
+  EXPECT_TRUE(of.at("com_offset").hidden);
+  EXPECT_FALSE(of.at("body_drag").hidden);
+  EXPECT_TRUE(of.at("tether").hidden) << "of a table that does not say";
+}
+
+TEST_F(Benchmark, SealsWhereEffectsActAndWhatTheFileDeclares) {
+  ASSERT_TRUE(make(1));
+  const Json labels = read_json(root_ / "bench/sealed/labels.json");
+  EXPECT_EQ(labels.at("cases")[0].at("regimes").dump(), R"(["height","place"])");
+  EXPECT_EQ(labels.at("cases")[0].at("channels").dump(), R"(["force_z","torque_y","current"])");
+  EXPECT_EQ(read_manifest(root_ / "bench").family, "a");
+  fs::remove_all(root_ / "bench");
+  // a robot of the published randomisation declares the file, and no file of its own stays
+  ASSERT_TRUE(make(1, "parameters"));
+  const auto drawn = flightlog::read_flight_log(root_ / "bench/cases/0001/flight_1").header;
+  const std::string declared = io::read_text(kConfigs + "vehicles/hummingbird_nominal.toml");
+  EXPECT_EQ(drawn.vehicle_sha256, io::sha256(declared));
+  EXPECT_EQ(std::distance(fs::directory_iterator(root_ / "bench/sealed"), {}), 2) << "the plan and the labels";
+}
+
+TEST_F(Benchmark, ScoresSeveralFoldersTogether) {
+  ASSERT_TRUE(make(1));
+  fs::rename(root_ / "bench", root_ / "first");
+  ASSERT_TRUE(make(1, "none"));
+  ScoreCommand c = command();
+  c.folders.push_back(root_ / "first");
+  c.out = root_ / "out";
+  const nlohmann::ordered_json json = score_bench(c);
+  EXPECT_EQ(json.at("cases"), 2);
+  EXPECT_EQ(json.at("top1_mocap_imu"), 1.0);
+  EXPECT_EQ(json.at("false_alarm_none"), 1.0);
+  EXPECT_EQ(json.at("families").at("a").at("cases"), 2);
+  const std::string list = io::read_text(root_ / "out/score.csv");
+  EXPECT_EQ(std::ranges::count(list, '\n'), 3);
+}
+
+TEST_F(Benchmark, RefusesWhatThereIsNot) {
+  EXPECT_EQ(test::refusal([] { family_named("d"); }), "--family d: no such family; accepted: a, b or c");
+#ifndef FLAPPY_FAMILIES
+  EXPECT_EQ(test::refusal([] { family_named("b"); }),
+            "--family b: this build has only a; accepted: a, or a build with -DFLAPPY_FAMILIES=ON");
+#else
+  EXPECT_EQ(family_named("b").name(), "b");
+#endif
+  blind::Assignment a;
+  a.vehicle_file = kConfigs + "vehicles/hummingbird_nominal.toml";
+  a.effects = {{"wnd", 1}};
+  EXPECT_EQ(test::refusal([&] { family_named("a").fly(a, 0); }),
+            "--effect wnd: no such effect; accepted: what `flappy-blind effects` lists; did you mean \"wind\"?");
+  a.effects = {};
+  EXPECT_EQ(test::refusal([&] { family_named("a").fly(a, 3); }),
+            "flight 3: there is none of this number; accepted: 0, 1 and 2");
+}
+
 TEST_F(Benchmark, RefusesATableOfSizesThatIsNone) {
   const fs::path file = root_ / "detectable.toml";
   io::write_atomically(file, detectability() + "[no_such_effect]\ndetectable = 1\n");
-  EXPECT_NE(test::refusal([&] { read_detectability(file); }).find("no_such_effect"), std::string::npos);
+  EXPECT_NE(test::refusal([&] { read_detectability(file, family_named("a")); }).find("no_such_effect"),
+            std::string::npos);
   std::string text = detectability();
   text.replace(text.find("detectable = 0.2"), 16, "detectable = 2.1");
   io::write_atomically(file, text);
-  EXPECT_NE(test::refusal([&] { read_detectability(file); }).find("twice that is beyond size 4"), std::string::npos);
+  EXPECT_NE(test::refusal([&] { read_detectability(file, family_named("a")); }).find("twice that is beyond size 4"),
+            std::string::npos);
 }
 
 }  // namespace

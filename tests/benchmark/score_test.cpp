@@ -41,7 +41,7 @@ const ScoreLine& line_of(const std::vector<ScoreLine>& lines, const std::string&
 }
 
 ScoreValue main_score(const std::vector<ScoredCase>& cases, const std::string& key) {
-  return line_of(score(cases).main, key).score;
+  return line_of(score(cases).lines, key).score;
 }
 
 TEST(Proportion, HasWilsonsInterval) {
@@ -70,27 +70,55 @@ TEST(Resampled, IntervalOfAMeanIsThatOfTheNormalLaw) {
   EXPECT_NEAR(s.high, 0.5 + 1.96 * 0.025, 0.006);
 }
 
-TEST(CalibrationError, CountsBinsOfEqualCount) {
-  // 20 claims, two in each bin, given in no order: all at 0.9 but the two lowest
+TEST(CalibrationError, TakesItsBiasAway) {
+  // 20 claims, two in each bin, given in no order: all at 0.9 but the two lowest. Shares are 0 and 1, which have no variance:
+  // lowest bin |0.4 - 0| x 2, nine bins |0.9 - 1| x 2: (0.8 + 1.8)/20
   std::vector<Claim> claims;
   for (int i = 0; i < 18; ++i) claims.push_back({0.9, true});
   claims.push_back({0.5, false});
   claims.push_back({0.3, false});
-  // lowest bin |0.4 - 0| x 2, nine bins |0.9 - 1| x 2: (0.8 + 1.8)/20
   EXPECT_NEAR(calibration_error(claims), 0.13, 1e-12);
-  // within a bin errors cancel: 0.8 claimed, 4 of 5 right
-  std::vector<Claim> fair;
-  for (int i = 0; i < 50; ++i) fair.push_back({0.8, i % 5 != 0});
-  EXPECT_NEAR(calibration_error(fair), 0, 1e-12);
+  // 50 claims of 0.7, of which 40 are right: d = -0.1 in each bin of five, s = sqrt(0.8 x 0.2/5) = 0.178885, z = -0.559017;
+  // E|N| = s sqrt(2/pi) exp(-z^2/2) + d erf(z/sqrt 2) = 0.142730 x 0.855345 + 0.1 x 0.423850 = 0.164469; 2 x 0.1 - 0.164469
+  std::vector<Claim> off;
+  for (int i = 0; i < 50; ++i) off.push_back({0.7, i % 5 != 0});
+  EXPECT_NEAR(calibration_error(off), 0.035531, 1e-5);
+  // calibrated to the last claim: less than nothing is left of it
+  for (Claim& c : off) c.probability = 0.8;
+  EXPECT_DOUBLE_EQ(calibration_error(off), 0);
   EXPECT_DOUBLE_EQ(calibration_error({}), 0);
 }
 
-TEST(CalibrationError, OfACalibratedPredictorIsThatOfChance) {
-  // One claim in each of 10 bins, p = 1/2: every bin is off by 1/2, whatever comes.
-  EXPECT_DOUBLE_EQ(calibrated_error_95(std::vector<Claim>(10, {0.5, false})), 0.5);
-  EXPECT_DOUBLE_EQ(calibrated_error_95(std::vector<Claim>(30, {1, false})), 0);
-  // 10 bins of 100 at 1/2: mean of ten |N(0, 0.05)|: 0.0399, sd 0.05 x 0.603/sqrt(10) = 0.0095, 95th percentile 0.0556
-  EXPECT_NEAR(calibrated_error_95(std::vector<Claim>(1000, {0.5, true})), 0.0556, 0.002);
+TEST(CalibrationError, IsTheSameForTiesInAnyOrder) {
+  std::vector<Claim> claims;
+  for (int i = 0; i < 37; ++i) claims.push_back({i < 23 ? 0.6 : 0.9, i % 3 != 0});
+  const double error = calibration_error(claims);
+  EXPECT_GT(error, 0);
+  std::ranges::reverse(claims);
+  EXPECT_DOUBLE_EQ(calibration_error(claims), error);
+  std::ranges::stable_sort(claims, {}, &Claim::right);
+  EXPECT_DOUBLE_EQ(calibration_error(claims), error);
+}
+
+TEST(CalibrationError, OfACalibratedPredictorIsNearNothing) {
+  // 1,000 claims, right as often as stated: shares have s = 0.05, so that plain bins are off by 0.80 s = 0.040, these by 0.47 s = 0.023
+  std::vector<Claim> claims;
+  std::uint64_t state = 3;
+  const auto draw = [&] {
+    state = state * 6364136223846793005U + 1442695040888963407U;
+    return static_cast<double>(state >> 11) * 0x1p-53;
+  };
+  for (int i = 0; i < 1000; ++i) {
+    const double p = 0.3 + 0.4 * draw();
+    claims.push_back({p, draw() < p});
+  }
+  EXPECT_LT(calibration_error(claims), 0.03);
+  const ScoreValue s = calibration_score(claims);
+  EXPECT_LE(s.low, *s.value);
+  EXPECT_GE(s.high, *s.value);
+  EXPECT_EQ(s.count, 1000U);
+  for (Claim& c : claims) c.probability += 0.2;
+  EXPECT_NEAR(calibration_error(claims), 0.2, 0.03);
 }
 
 TEST(Score, RightEffectFirstIsJudgedWhereRivalsAreSeparable) {
@@ -126,25 +154,53 @@ TEST(Score, AmongThreeCountsEveryAnswer) {
   EXPECT_DOUBLE_EQ(*main_score({c}, "top3").value, 0) << "unknown, wind, none, tether";
 }
 
-TEST(Score, FalseAlarmsAndWithheldTruths) {
-  const std::vector<ScoredCase> cases = {judged("none", {}, "none", {}, 0.9),
-                                         judged("none", {}, "parameters", {}, 0.9),
-                                         judged("parameters", {}, "parameters", {}, 0.9),
-                                         judged("parameters", {}, "unknown", {}, 0.9),
-                                         judged("parameters", {}, "effect", {"wind"}, 0.6),
-                                         judged("withheld", {"wind"}, "unknown", {}, 0.9),
-                                         judged("withheld", {"wind"}, "effect", {"body_drag"}, 0.89),
-                                         judged("withheld", {"wind"}, "group", {"body_drag", "com_offset"}, 0.95),
-                                         judged("withheld", {"wind"}, "parameters", {}, 0.95)};
-  EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm").value, 0.4);
-  EXPECT_DOUBLE_EQ(*main_score(cases, "withheld_unknown").value, 0.25);
-  EXPECT_DOUBLE_EQ(*main_score(cases, "withheld_confidently_wrong").value, 0.25);
-  const Scores s = score(cases);
-  EXPECT_FALSE(*line_of(s.main, "false_alarm").meets_must);
-  EXPECT_FALSE(*line_of(s.main, "withheld_unknown").meets_must);
-  // nine claims, a bin each: right are cases 0, 1, 2 and 5
-  const double error = (4 * (1 - 0.9) + 0.9 + 0.6 + 0.89 + 2 * 0.95) / 9;
-  EXPECT_NEAR(*main_score(cases, "ece").value, error, 1e-12);
+TEST(Score, FalseAlarmsAndUnknownTruths) {
+  std::vector<ScoredCase> cases = {judged("none", {}, "none", {}, 0.9),
+                                   judged("none", {}, "parameters", {}, 0.9),
+                                   judged("parameters", {}, "parameters", {}, 0.9),
+                                   judged("own_figures", {}, "unknown", {}, 0.9),
+                                   judged("conventions", {}, "remainder", {"wind"}, 0.6),
+                                   judged("withheld", {"wind"}, "unknown", {}, 0.9),
+                                   judged("withheld", {"wind"}, "effect", {"body_drag"}, 0.79),
+                                   judged("outside", {"outside_slosh"}, "group", {"body_drag", "com_offset"}, 0.85),
+                                   judged("outside", {"outside_slosh"}, "unknown", {}, 0.95)};
+  EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm_none").value, 0);
+  EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm_parameters").value, 0);
+  EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm_own_figures").value, 1);
+  EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm_conventions").value, 1);
+  EXPECT_DOUBLE_EQ(*main_score(cases, "unknown").value, 0.5);
+  EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_wrong").value, 0.25);
+  EXPECT_FALSE(*line_of(score(cases).lines, "unknown").meets_must);
+  std::string which;
+  for (const ScoredCase& c : cases) which += right(c.truth, c.prediction) ? '1' : '0';
+  EXPECT_EQ(which, "111001001");
+  // of the two called unknown, one is described
+  for (ScoredCase& c : cases) c.truth.channels = {"force_x", "torque_y"}, c.truth.regimes = {"heading"};
+  EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_where").value, 0);
+  cases[5].prediction.where = {"torque_y", "heading"};
+  cases[8].prediction.where = {"torque_y", "height"};
+  EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_where").value, 0.5);
+}
+
+TEST(Score, ARemainderBesideTheTruthIsRight) {
+  ScoredCase c = judged("singles", {"tether"}, "remainder", {"tether"}, 0.9);
+  for (const char* key : {"top1_mocap_imu", "group_top1", "top3"})
+    EXPECT_DOUBLE_EQ(*main_score({c}, key).value, 1) << key;
+  EXPECT_TRUE(right(c.truth, c.prediction));
+  c.prediction.effects = {"com_offset"};
+  for (const char* key : {"top1_mocap_imu", "group_top1", "top3"})
+    EXPECT_DOUBLE_EQ(*main_score({c}, key).value, 0) << key;
+}
+
+TEST(Score, RedeclaredRobotsAreHeldAgainstTheirSingles) {
+  std::vector<ScoredCase> cases = {
+      judged("singles", {"wind"}, "effect", {"wind"}, 0.9), judged("singles", {"wind"}, "effect", {"wind"}, 0.9),
+      judged("redeclared", {"wind"}, "effect", {"wind"}, 0.6), judged("redeclared", {"wind"}, "unknown", {}, 0.9),
+      judged("redeclared", {"wind"}, "unknown", {}, 0.9)};
+  for (std::size_t i = 0; i < cases.size(); ++i) cases[i].truth.seed = 7 + i % 2;
+  cases[2].truth.seed = 7, cases[3].truth.seed = 8, cases[4].truth.draw = 1;  // the last drew another robot
+  EXPECT_DOUBLE_EQ(*main_score(cases, "redeclared_same").value, 0.5);
+  EXPECT_EQ(main_score(cases, "redeclared_same").count, 2U);
 }
 
 TEST(Score, ClosureIsMeasuredAgainstTheTrueEffect) {
@@ -190,17 +246,17 @@ TEST(Score, IntervalsCountWhereTheVerdictNamesTheTruth) {
 
 TEST(Score, BarsHaveTheirSides) {
   ScoredCase c = judged("singles", {"wind"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9)});
-  EXPECT_TRUE(*line_of(score({c}).main, "group_top1").meets_must);
-  EXPECT_TRUE(*line_of(score({judged("none", {}, "none", {}, 0.9)}).main, "false_alarm").meets_must);
-  // of ten intervals nine hold the truth, then all: 0.80 to 0.97 is asked
+  EXPECT_TRUE(*line_of(score({c}).lines, "group_top1").meets_must);
+  EXPECT_TRUE(*line_of(score({judged("none", {}, "none", {}, 0.9)}).lines, "false_alarm_none").meets_must);
+  // of ten intervals nine hold the truth, then all: 0.82 to 0.97 is asked
   for (int i = 0; i < 10; ++i) {
     const std::string name = "wind." + std::to_string(i);
     c.prediction.sets[0].values[name] = {0.3, 0.2, 0.4};
     c.truth.true_values[name] = i == 0 ? 0.5 : 0.35;
   }
-  EXPECT_TRUE(*line_of(score({c}).main, "interval_coverage").meets_must);
+  EXPECT_TRUE(*line_of(score({c}).lines, "interval_coverage").meets_must);
   c.truth.true_values["wind.0"] = 0.35;
-  EXPECT_FALSE(*line_of(score({c}).main, "interval_coverage").meets_must);
+  EXPECT_FALSE(*line_of(score({c}).lines, "interval_coverage").meets_must);
 }
 
 TEST(Score, PairsAreScoredByTheirNames) {
@@ -221,13 +277,11 @@ TEST(Score, HoverAbstains) {
                                          judged("hover", {"tether"}, "effect", {"tether"}, 0.6),
                                          judged("hover", {"tether"}, "parameters", {}, 0.9)};
   EXPECT_DOUBLE_EQ(*main_score(cases, "hover_abstain").value, 0.5);
-  EXPECT_DOUBLE_EQ(*main_score(cases, "hover_proposes").value, 0);
-  std::vector<ScoredCase> proposing = cases;
-  proposing[0].prediction.next = {"wind", "tether"};
-  proposing[1].prediction.next = {"wind", "com_offset"};  // neither is the truth
-  proposing[2].prediction.next = {"wind", "tether"};      // does not abstain
-  EXPECT_DOUBLE_EQ(*main_score(proposing, "hover_proposes").value, 0.25);
-  EXPECT_FALSE(main_score(cases, "ece").value) << "hover is no rich excitation";
+  EXPECT_DOUBLE_EQ(*main_score(cases, "hover_next").value, 0);
+  std::vector<ScoredCase> flown = cases;
+  flown[0].prediction.after_next = {"effect", {"tether"}};
+  flown[1].prediction.after_next = {"effect", {"wind"}};
+  EXPECT_DOUBLE_EQ(*main_score(flown, "hover_next").value, 0.25);
 }
 
 TEST(Score, BaselinesStandInTheSameLines) {
@@ -236,11 +290,32 @@ TEST(Score, BaselinesStandInTheSameLines) {
   ScoredCase none = judged("none", {}, "none", {}, 0.9);
   none.prediction.baselines["stlsq"] = {{}, {}};
   const Scores s = score({c, none});
-  EXPECT_DOUBLE_EQ(*line_of(s.main, "top1_mocap_imu").baselines.at("stlsq").value, 0);
-  EXPECT_DOUBLE_EQ(*line_of(s.main, "group_top1").baselines.at("stlsq").value, 1);
-  EXPECT_DOUBLE_EQ(*line_of(s.main, "top3").baselines.at("stlsq").value, 1);
-  EXPECT_DOUBLE_EQ(*line_of(s.main, "false_alarm").baselines.at("stlsq").value, 0);
-  EXPECT_FALSE(line_of(s.main, "ece").baselines.contains("stlsq"));
+  EXPECT_DOUBLE_EQ(*line_of(s.lines, "top1_mocap_imu").baselines.at("stlsq").value, 0);
+  EXPECT_DOUBLE_EQ(*line_of(s.lines, "group_top1").baselines.at("stlsq").value, 1);
+  EXPECT_DOUBLE_EQ(*line_of(s.lines, "top3").baselines.at("stlsq").value, 1);
+  EXPECT_DOUBLE_EQ(*line_of(s.lines, "false_alarm_none").baselines.at("stlsq").value, 0);
+  EXPECT_FALSE(line_of(s.lines, "ece").baselines.contains("stlsq"));
+}
+
+TEST(Score, BaselinesWithinTheBarAreToBeBeatenByAStandardError) {
+  std::vector<ScoredCase> cases;
+  for (int i = 0; i < 100; ++i) {
+    ScoredCase c = judged("singles", {"tether"}, i < 90 ? "effect" : "unknown", {"tether"}, 0.9);
+    c.prediction.baselines["best_rmse"] = {{"tether"},
+                                           {i < 88 ? "tether" : "wind"}};  // 0.90 and 0.88, each with a sd of 0.03
+    c.prediction.baselines["stlsq"] = {{"tether"}, {i < 80 ? "tether" : "com_offset"}};
+    c.prediction.baselines["black_box"] = {{"tether"}, {"tether"}};
+    cases.push_back(std::move(c));
+    ScoredCase none = judged("none", {}, "none", {}, 0.9);
+    none.prediction.baselines["best_rmse"] = none.prediction.baselines["stlsq"] = {{}, {}};
+    none.prediction.baselines["black_box"] = {{i < 6 ? Names{"wind"} : Names{}}, {"wind"}};
+    cases.push_back(std::move(none));
+  }
+  const auto unbeaten = score(cases).unbeaten;
+  EXPECT_FALSE(unbeaten.contains("black_box")) << "six false alarms of 100";
+  EXPECT_FALSE(unbeaten.contains("largest_residual")) << "nobody asked it";
+  EXPECT_EQ(std::ranges::count(unbeaten.at("best_rmse"), "top1_mocap_imu"), 1);
+  EXPECT_EQ(std::ranges::count(unbeaten.at("stlsq"), "top1_mocap_imu"), 0);
 }
 
 // ---- sparse regression

@@ -42,7 +42,7 @@ ROOMS = {
     "server/sitl": ROLLOUT | {"server/dds", "server/telemetry"},
     "blind": FLIGHT | {"flightlog"},
     "blind/c": {"io", "blind", "flightlog"},
-    "benchmark": GAP | {"blind", "benchmark/predict"},
+    "benchmark": GAP | {"blind", "blind/c", "benchmark/predict"},
     "server/jobs": {"io"},
     "server/http": {"io", "server/jobs"},
     "benchmark/predict": GAP,  # answers the benchmark's questions, and knows nothing of who makes them

@@ -10,7 +10,7 @@ expect_equal("exit code of make, which says ${err}" "${code}" 0)
 run(score ${WORK}/bench --json ${WORK}/bench.json)
 expect_equal("exit code of score, which says ${err}" "${code}" 0)
 expect_keys(${WORK}/bench.json cases=NUMBER top1_mocap_imu=NUMBER group_top1=NUMBER top3=NUMBER
-  withheld_unknown=NUMBER withheld_confidently_wrong=NUMBER ece=NUMBER hover_abstain=NULL)
+  unknown=NUMBER unknown_wrong=NUMBER ece=NUMBER hover_abstain=NULL)
 file(STRINGS ${WORK}/bench/score.csv lines)
 set(verdicts "")
 foreach(line IN LISTS lines)

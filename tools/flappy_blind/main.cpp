@@ -5,8 +5,11 @@
 
 #include "benchmark/detectability.hpp"
 #include "benchmark/detectability_table.hpp"
+#include "benchmark/families.hpp"
+#include "benchmark/family_detectability.hpp"
 #include "benchmark/make.hpp"
 #include "benchmark/score_bench.hpp"
+#include "blind/family_a.hpp"
 #include "escapes.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
@@ -17,6 +20,33 @@ namespace flappy::blind {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+struct FamilyOptions {
+  std::string family;  ///< empty: A as its own options have it
+  bool hover = false, own_figures = false, conventions = false;
+};
+
+/// As fly_case, of a family's robot.
+Json fly_family(const RobotOptions& o, const FamilyOptions& f) {
+  const Family& family = benchmark::family_named(f.family);
+  if (o.randomise != "none")
+    throw io::InputError("--randomise: draws robots without --family; accepted: --own-figures");
+  Assignment a;
+  a.vehicle_file = o.vehicle;
+  for (const BlindEffect& e : effects_of(o.effects)) a.effects.emplace_back(e.id, e.size);
+  a.hover = f.hover, a.own_figures = f.own_figures, a.conventions = f.conventions;
+  a.power = o.power, a.wings = o.wings;
+  const benchmark::FlownRobot robot = benchmark::fly_drawn(family, a, o.seed);
+  for (std::size_t draw = 0; draw < robot.lost.size(); ++draw)
+    std::printf("draw %zu: %s; the next draw\n", draw, robot.lost[draw].c_str());
+  Json folders = Json::array();
+  for (std::size_t k = 0; k < Family::kFlights; ++k) {
+    folders.push_back((std::filesystem::path(o.out) / ("flight_" + std::to_string(k + 1))).string());
+    flightlog::write_flight_log(folders.back().get<std::string>(), robot.flights[k].log);
+    std::printf("%s: %g s\n", folders.back().get<std::string>().c_str(), Family::kFlight_s);
+  }
+  return {{"family", f.family}, {"seed", o.seed}, {"draw", robot.draw}, {"crashes", robot.lost}, {"flights", folders}};
+}
 
 Json fly_case(const RobotOptions& o, Programme programme) {
   const Robots robots(o);
@@ -50,6 +80,9 @@ int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-blind", "A robot of another making, for a diagnosis to be tried on.", {});
   io::Command list = program.app().command("effects", "lists what may be wrong with it");
+  blind::FamilyOptions of;
+  constexpr const char* kFamily = "a, b or c (docs/blind.md); none: a as its own options have it";
+  list.option("--family", of.family, kFamily);
   io::Command fly = program.app().command("fly", "flies three times and writes the logs");
   blind::RobotOptions robot;
   std::string programme = "rich";
@@ -57,6 +90,10 @@ int main(int argc, char** argv) {
   fly.option("--programme", programme, "rich: excitation, a path, turns; hover: calm")
       .one_of({"rich", "hover"})
       .shows_default();
+  fly.option("--family", of.family, kFamily);
+  fly.flag("--hover", of.hover, "as --programme hover");
+  fly.flag("--own-figures", of.own_figures, "of a family: every figure of every body drawn apart");
+  fly.flag("--conventions", of.conventions, "of a family: sensors and declarations drawn as laboratories have them");
   fly.option("--out", robot.out, "folder for flight_1, flight_2, flight_3").required();
   io::Command escape = program.app().command("escape", "flies a policy's manoeuvre many times over");
   blind::EscapeOptions escapes{.robot = {}, .policy = {}, .config = io::config_path("fly/escape.toml")};
@@ -70,7 +107,9 @@ int main(int argc, char** argv) {
   escape.option("--out", escapes.robot.out, "folder for the logs: escape_1, escape_2, ...");
   io::Command detectability = program.app().command("detectability", "finds how large effects have to be to be found");
   benchmark::DetectabilityCommand command;
-  detectability.option("--vehicle", command.vehicle, "the vehicle as declared").required();
+  detectability.option("--family", command.family,
+                       "a, b or c, by what effects change; none: a, as a diagnosis sees it");
+  detectability.option("--vehicle", command.vehicle, "the vehicle as declared").shows_default();
   detectability.option("--randomise", command.randomise, "what robots are drawn from").shows_default();
   detectability.option("--priors", command.priors, "what is uncertain of them").shows_default();
   detectability.option("--vehicles", command.vehicles, "how many").range(1, 1000).shows_default();
@@ -83,18 +122,20 @@ int main(int argc, char** argv) {
   io::Command make = program.app().command("make", "flies the cases of a benchmark and seals what they are");
   benchmark::MakeCommand made;
   std::string set;
+  make.option("--family", made.family, "of whose robots: a, b or c").shows_default();
   make.option("--out", made.out, "folder for the cases").required();
   make.option("--set", set, "development or reported: which seeds").one_of({"development", "reported"}).required();
   make.option("--part", made.plan.parts, "these parts alone")
       .one_of(std::vector<std::string>(std::begin(benchmark::kParts), std::end(benchmark::kParts)));
   make.option("--cases", made.plan.at_most, "of each part at most").range(1, 1000);
   make.option("--vehicle", made.vehicle, "the robot as declared").shows_default();
-  make.option("--randomise", made.randomise, "what robots are drawn from").shows_default();
-  make.option("--detectable", made.detectable, "what is detectable of every effect").shows_default();
+  make.option("--randomise", made.randomise, "what robots of the part parameters are drawn from").shows_default();
+  make.option("--detectable", made.detectable, "what is detectable of every effect; none: the family's own table");
   make.option("--threads", made.threads, "0: one for each processor").range(0, 1024);
   io::Command score = program.app().command("score", "diagnoses every case, then opens the labels and compares");
   benchmark::ScoreCommand scored;
-  score.option("folder", scored.folder, "of flappy-blind make").required();
+  score.option("folders", scored.folders, "of flappy-blind make").required();
+  score.option("--out", scored.out, "folder for score.md and score.csv; none: the first of those");
   score.option("--vehicle", scored.vehicle, "the robot as declared, where it is elsewhere now");
   score.option("--priors", scored.priors, "what is uncertain of the vehicle").shows_default();
   score.option("--threads", scored.threads, "cases at a time; 0: one for each processor").range(0, 1024);
@@ -107,19 +148,31 @@ int main(int argc, char** argv) {
       made.plan.reported = set == "reported";
       const sim::Randomisation uncertain =
           sim::read_randomisation(model::read_vehicle(made.vehicle), io::Config::load(scored.priors, {}).root());
-      made.true_values = [&](const blind::Case& c, const std::vector<blind::BlindEffect>& effects) {
-        return benchmark::true_values(c, effects, uncertain, 1);
-      };
+      if (made.family == "a")
+        made.true_values = [&](const blind::Assignment& a, const std::vector<blind::BlindEffect>& effects) {
+          return benchmark::true_values(blind::case_of(a), effects, uncertain, 1);
+        };
       made.ranks = program.ranks("work: make\n");
       if (!benchmark::make_bench(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
     } else if (score.given()) {
       scored.ranks = program.ranks("priors: " + io::sha256(io::read_text(scored.priors)) + "\n");
       const nlohmann::ordered_json scores = benchmark::score_bench(scored);
       if (!scores.is_null()) program.write_json(scores);
-    } else if (list.given())
+    } else if (list.given() && !of.family.empty())
+      for (const blind::FamilyEffect& e : benchmark::family_named(of.family).effects())
+        std::printf("%-30s %s\n", e.id.c_str(), e.typical.c_str());
+    else if (list.given())
       for (const std::string& name : blind::effect_names()) std::printf("%s\n", name.c_str());
     else if (escape.given()) program.write_json(blind::fly_escapes(escapes));
-    else if (detectability.given()) program.write_json(benchmark::run_detectability(command));
-    else program.write_json(blind::fly_case(robot, programme == "rich" ? Programme::rich : Programme::hover));
+    else if (detectability.given())
+      program.write_json(command.family.empty() ? benchmark::run_detectability(command)
+                                                : benchmark::run_family_detectability(command));
+    else {
+      of.hover = of.hover || programme == "hover";
+      if (of.family.empty() && (of.own_figures || of.conventions))
+        throw io::InputError("--own-figures, --conventions: are of a family; accepted: with --family");
+      program.write_json(of.family.empty() ? blind::fly_case(robot, of.hover ? Programme::hover : Programme::rich)
+                                           : blind::fly_family(robot, of));
+    }
   });
 }

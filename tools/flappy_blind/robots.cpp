@@ -9,6 +9,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+sim::Randomisation read_spread(const model::Vehicle& declared, const std::string& path) {
+  if (path == "none") return sim::Randomisation(declared);
+  return sim::read_randomisation(declared, io::Config::load(path).root());
+}
+
+}  // namespace
+
 std::vector<BlindEffect> effects_of(const std::vector<std::string>& texts) {
   std::vector<BlindEffect> effects;
   for (const std::string& text : texts) {
@@ -23,15 +30,8 @@ std::vector<BlindEffect> effects_of(const std::vector<std::string>& texts) {
   return effects;
 }
 
-sim::Randomisation read_spread(const model::Vehicle& declared, const std::string& path) {
-  if (path == "none") return sim::Randomisation(declared);
-  return sim::read_randomisation(declared, io::Config::load(path).root());
-}
-
-}  // namespace
-
 void add_robot_options(const io::Command& command, RobotOptions& o) {
-  command.option("--vehicle", o.vehicle, "the vehicle as declared").required();
+  command.option("--vehicle", o.vehicle, "the vehicle as declared").shows_default();
   command.option("--randomise", o.randomise, "[[randomise]] tables that the robot is drawn from, or none")
       .shows_default();
   command.option("--seed", o.seed, "of all that is drawn").range(std::uint64_t{0}, std::uint64_t{1} << 53).required();

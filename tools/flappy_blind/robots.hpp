@@ -5,16 +5,20 @@
 #include <vector>
 
 #include "blind/sampled_robot.hpp"
+#include "io/installation.hpp"
 #include "io/program.hpp"
 
 namespace flappy::blind {
 
 struct RobotOptions {
-  std::string vehicle, randomise = "none", out;
+  std::string vehicle = io::config_path("vehicles/hummingbird_nominal.toml"), randomise = "none", out;
   std::uint64_t seed = 0;
   std::vector<std::string> effects;
   bool power = false, wings = false, no_truth = false;
 };
+
+/// "ID=SIZE". InputError where there is no size.
+std::vector<BlindEffect> effects_of(const std::vector<std::string>& texts);
 
 void add_robot_options(const io::Command& command, RobotOptions& o);
 

@@ -29,9 +29,20 @@ struct Baseline {
   std::vector<std::string> ranking;  ///< all it can rank, the likeliest first
 };
 
+/// Where something acts: in which channel, and with what it grows, in the words of blind::FamilyEffect.
+struct Where {
+  std::string channel, regime;
+};
+
+struct Verdict {
+  std::string kind;
+  std::vector<std::string> effects;
+};
+
 /// What a diagnosis said of a case before its label was opened.
 struct Prediction {
-  std::string kind = "data";         ///< effect, group, parameters, none, unknown, data
+  std::string kind =
+      "data";  ///< effect, remainder (effects, and something more), group, parameters, none, unknown, data
   std::vector<std::string> effects;  ///< of an effect all that act together, of a group the rivals
   double probability = 0;            ///< of this verdict
   std::vector<FittedSet> sets;       ///< most probable first
@@ -40,11 +51,13 @@ struct Prediction {
   std::map<std::string, Baseline> baselines;    ///< by kBaselines
   /// Of a verdict that abstains: the two answers that the manoeuvre proposed tells apart, effects joined by +; or none.
   std::vector<std::string> next;
+  std::optional<Where> where;         ///< of an unknown cause
+  std::optional<Verdict> after_next;  ///< with the flight proposed, flown
 };
 /// Whether a verdict names no one answer as the likelier one: `group`, or less than one half.
 bool abstains(const Prediction& prediction);
 
-inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "stlsq"};
+inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "stlsq", "black_box"};
 
 struct Question {
   std::vector<std::filesystem::path> flights;  ///< folders of logs

@@ -10,7 +10,7 @@ namespace {
 
 class FamilyC final : public Family {
  public:
-  std::string name() const override { return "C"; }
+  std::string name() const override { return "c"; }
   const std::vector<FamilyEffect>& effects() const override { return effect_table(); }
   FamilyFlight fly(const Assignment& a, std::size_t flight) const override { return fly_one(a, flight).flight; }
   Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const override {

@@ -1,0 +1,59 @@
+// How large an effect of a family has to be, without any diagnosis: from what it changes along flights without it
+// (Family::contrast), against what is known of a vehicle at all.
+//
+// Masses, springs and wings as published, or as weighed, are some per cent off, and an IMU is declared to be some tenths of a millisecond
+// earlier or later than it is. So no model has forces and turning of a beat exactly, and what an effect changes has to stand out of
+// that; the sensors' noise is averaged to less than a thousandth of the beat in 30 s. In each channel and order of the beat (mean,
+// first, second harmonic) let d be the change at size s, x the signal of the flight, and R what the signal is measured by: then
+//   q(s) = rms of (d - a x - tau x' - c) / R
+// is what neither a factor a within kFigures, nor lateness tau within kLate_s, nor a constant c within kConstant R takes over, by least
+// squares. The rms is of the tenth of the beats that shows it most: 3 of 30 s, for some effects act near the ground, or the wall, alone.
+// R is the rms of the waveform of the three forces together, or of the three turning accelerations: a wing by itself shakes along all
+// axes, and what cancels between two wings is known no better than its parts. Only the mean force is the weight, and measured by that.
+// An effect is detectable at the size at which its largest q comes to kShare, with changes that grow as the size; beyond half the
+// largest size that robots have, it is undetectable.
+//
+// Effects that change neither force nor turning act on what a sensor says alone. Their size 1 is what data sheets and laboratories call
+// an error (FamilyEffect::typical), many times what 30 s of noise leaves of it: they count as detectable there.
+#pragma once
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "benchmark/detectability_table.hpp"
+#include "blind/family.hpp"
+
+namespace flappy::benchmark {
+
+inline constexpr double kShare = 0.015, kFigures = 0.1, kConstant = 0.05, kLate_s = 5e-4;
+
+/// A flight by beats: [beat][channel x 5 + coefficient], as Contrast has it; nothing where a beat lacks samples.
+using Beats = std::vector<std::optional<std::array<double, 30>>>;
+
+/// Specific force and turning acceleration of the beats that begin at `beat_s`, by the log's IMU.
+Beats beats_of(const flightlog::FlightLog& log, const std::vector<double>& beat_s);
+
+/// What an effect of size 1 changes along one flight, by the beats of the signal.
+struct Changed {
+  std::vector<std::array<double, 30>> change, signal;
+  double flapping_Hz = 0;
+  void add(const blind::Contrast& contrast, const Beats& of);  ///< of one more flight
+};
+
+/// Largest q, and where.
+struct Shown {
+  double share = 0;
+  std::size_t channel = 0, order = 0;
+};
+Shown shown(const Changed& changed, double size);
+
+/// Where q comes to kShare; infinite beyond `most`.
+double detectable_size(const Changed& changed, double most);
+
+/// flappy-blind detectability --family: prints and writes the sizes of every effect; the machine-readable result.
+nlohmann::ordered_json run_family_detectability(const DetectabilityCommand& command);
+
+}  // namespace flappy::benchmark
