@@ -138,6 +138,10 @@ int main(int argc, char** argv) {
   score.option("--out", scored.out, "folder for score.md and score.csv; none: the first of those");
   score.option("--vehicle", scored.vehicle, "the robot as declared, where it is elsewhere now");
   score.option("--priors", scored.priors, "what is uncertain of the vehicle").shows_default();
+  score
+      .option("--discrepancy", scored.discrepancy,
+              "what models get wrong; of a family: configs/gap/discrepancy/without_FAMILY.toml")
+      .shows_default();
   score.option("--threads", scored.threads, "cases at a time; 0: one for each processor").range(0, 1024);
   program.app().expect_commands(1, 1);
   program.takes_ranks();
@@ -155,7 +159,8 @@ int main(int argc, char** argv) {
       made.ranks = program.ranks("work: make\n");
       if (!benchmark::make_bench(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
     } else if (score.given()) {
-      scored.ranks = program.ranks("priors: " + io::sha256(io::read_text(scored.priors)) + "\n");
+      scored.ranks = program.ranks("priors: " + io::sha256(io::read_text(scored.priors)) +
+                                   ", discrepancy: " + io::sha256(io::read_text(scored.discrepancy)) + "\n");
       const nlohmann::ordered_json scores = benchmark::score_bench(scored);
       if (!scores.is_null()) program.write_json(scores);
     } else if (list.given() && !of.family.empty())

@@ -1,5 +1,7 @@
 #include "benchmark/predict/predict.hpp"
 
+#include <algorithm>
+
 #include "benchmark/predict/baselines.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "gap/diagnose/next_experiment.hpp"
@@ -23,10 +25,12 @@ Prediction predict(const Question& q) {
   gap::DiagnoseOptions options;
   options.threads = 1;
   options.withheld = q.withheld;
+  options.discrepancy = gap::read_model_discrepancy(q.discrepancy);
   const gap::Diagnosis d = diagnose(flights, uncertain, options);
   const gap::Report r = verdict_report_of(flights, uncertain, d);
   Prediction p;
-  p.kind = gap::kind_name(r.conclusion.kind);
+  p.kind = r.conclusion.remainder ? "remainder" : gap::kind_name(r.conclusion.kind);
+  if (!r.unexplained.empty()) p.where = Where{r.unexplained.front().channel, r.unexplained.front().regime};
   p.effects = r.conclusion.effects;
   p.probability = r.conclusion.probability;
   p.nominal = r.nominal;
@@ -38,6 +42,10 @@ Prediction predict(const Question& q) {
     if (c.kind == gap::ScoredHypothesis::Kind::unknown) p.unknown = c.probability;
     if (c.kind != gap::ScoredHypothesis::Kind::effect) continue;
     FittedSet set{c.effects, c.probability, {}, c.loss, c.gain_sd};
+    if (const auto same = std::ranges::find(p.sets, c.effects, &FittedSet::effects); same != p.sets.end()) {
+      same->probability += c.probability;  // with something more beside it
+      continue;
+    }
     for (const gap::SizeEstimate& s : c.sizes) set.values[s.name] = {s.value, s.low, s.high};
     p.sets.push_back(std::move(set));
   }

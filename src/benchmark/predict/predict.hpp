@@ -61,7 +61,7 @@ inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "s
 
 struct Question {
   std::vector<std::filesystem::path> flights;  ///< folders of logs
-  std::filesystem::path vehicle, priors;
+  std::filesystem::path vehicle, priors, discrepancy;
   std::vector<std::string> withheld;  ///< entries that the catalogue is to lack
   bool baselines = true;
   std::filesystem::path experiments;  ///< manoeuvres to propose one of, where the verdict abstains; empty: none

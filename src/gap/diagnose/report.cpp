@@ -38,6 +38,29 @@ const ScoredHypothesis* best_fitted(const Diagnosis& d) {
 
 Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
+/// What a function of the basis grows with.
+std::string regime_of(const std::string& function, BasisFunction kind) {
+  switch (kind) {
+    case BasisFunction::constant:
+      return "always";
+    case BasisFunction::rate:
+      return "rate";
+    case BasisFunction::input:
+      return function;
+    case BasisFunction::product:  // amplitude with something
+      return function.substr(function.find(' ') + 1).substr(0, 8) == "velocity"
+                 ? "velocity"
+                 : function.substr(function.find(' ') + 1);
+    case BasisFunction::place:
+      if (function == "near ground") return "height";
+      if (function == "near ceiling") return "ceiling";
+      if (function == "near wall") return "wall";
+      return function.ends_with("heading") ? "heading" : function;
+    default:
+      return "velocity";
+  }
+}
+
 }  // namespace
 
 std::vector<SizeEstimate> sizes_of(const ScoredHypothesis& hypothesis, const sim::Randomisation& uncertain) {
@@ -99,6 +122,7 @@ Report verdict_report_of(const std::vector<PredictedFlight>& flights, const sim:
     c.group = effect ? pool_name(a.effects) : kind_name(a.kind);
     c.probability = a.probability;
     c.log_evidence = a.log_evidence;
+    c.remainder = effect && !a.terms.empty();
     if (effect) c.sizes = sizes_of(a, uncertain);
     if (a.fitted()) {
       const Losses left = losses_of(around, a.left);
@@ -120,8 +144,8 @@ Report verdict_report_of(const std::vector<PredictedFlight>& flights, const sim:
           : concluded;
   const RegimeBasis basis(flights);
   for (const Term& t : freest.terms)
-    r.unexplained.push_back(
-        {channel_name(t.channel), std::to_string(t.harmonic), basis.name(t.function), t.times, t.gain});
+    r.unexplained.push_back({channel_name(t.channel), std::to_string(t.harmonic), basis.name(t.function),
+                             regime_of(basis.name(t.function), basis.kind(t.function)), t.times, t.gain});
   r.jointly_with = freest.jointly_with;
   if (concluded.kind == ScoredHypothesis::Kind::effect)
     r.moved = moved_by(concluded.fit, Hypothesis(uncertain, concluded.effects));
@@ -185,6 +209,7 @@ Json diagnosis_json(const Report& r) {
       parameters[s.name] = {{"value", s.value}, {"low", s.low}, {"high", s.high}, {"unit", s.unit}};
     candidates.push_back({{"effects", c.effects},
                           {"group", c.group},
+                          {"remainder", c.remainder},
                           {"probability", c.probability},
                           {"log_evidence", c.log_evidence},
                           {"parameters", parameters},
@@ -197,6 +222,7 @@ Json diagnosis_json(const Report& r) {
                {"verdict",
                 {{"kind", kind_name(r.conclusion.kind)},
                  {"effects", r.conclusion.effects},
+                 {"remainder", r.conclusion.remainder},
                  {"probability", r.conclusion.probability}}},
                {"where", where},
                {"candidates", candidates},

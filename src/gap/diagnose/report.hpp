@@ -28,7 +28,8 @@ std::vector<SizeEstimate> sizes_of(const ScoredHypothesis& hypothesis, const sim
 struct Reported {
   ScoredHypothesis::Kind kind = ScoredHypothesis::Kind::effect;
   std::vector<std::string> effects;
-  std::string group;  ///< of no effect: its kind
+  std::string group;       ///< of no effect: its kind
+  bool remainder = false;  ///< something more beside the effects
   double probability = 0, log_evidence = 0;
   std::vector<SizeEstimate> sizes;
   std::optional<double> loss;  ///< E, where it was fitted
@@ -44,9 +45,12 @@ struct Moved {
 
 /// A function of the regime that nothing of the catalogue explains.
 struct Unexplained {
-  std::string channel, harmonic, function;  ///< the first two may be "all"
-  double times = 0;                         ///< of what every model gets wrong
-  double gain = 0;                          ///< nats
+  std::string channel, harmonic, function;
+  std::string
+      regime;  ///< of the function: always, amplitude, difference, bias, split_cycle, velocity, rate, height, ceiling, wall,
+               ///< heading, time
+  double times = 0;  ///< of what models of this robot usually get wrong
+  double gain = 0;   ///< nats
 };
 
 struct Report {

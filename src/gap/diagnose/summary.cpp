@@ -19,17 +19,15 @@ std::string listed(const std::vector<std::string>& words, const char* last) {
 }
 
 std::string place_of(const Unexplained& u) {
-  if (u.harmonic == "all") return u.channel == "all" ? "all channels" : u.channel;
-  return (u.channel == "all" ? "all channels, " : u.channel + ", ") +
-         (u.harmonic == "0" ? "mean" : "harmonic " + u.harmonic);
+  return u.channel + ", " + (u.harmonic == "0" ? "mean of the beat" : "harmonic " + u.harmonic);
 }
 
 std::string verdict_line(const Conclusion& c) {
   const double p = c.probability;
   switch (c.kind) {
     case Conclusion::Kind::effect:
-      return flightlog::format("Missing in the model: %s (probability %.2f%s)", listed(c.effects, "and").c_str(), p,
-                               p < 0.5 ? ", no more than a guess" : "");
+      return flightlog::format("Missing in the model: %s%s (probability %.2f%s)", listed(c.effects, "and").c_str(),
+                               c.remainder ? ", and something more" : "", p, p < 0.5 ? ", no more than a guess" : "");
     case Conclusion::Kind::group:
       return flightlog::format("Missing in the model: one of %s, which these flights cannot tell apart (together %.2f)",
                                listed(c.effects, "or").c_str(), p);
@@ -90,7 +88,8 @@ const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
 }
 
 std::string name_of(const Reported& c) {
-  return c.kind == ScoredHypothesis::Kind::effect ? listed(c.effects, "and") : "(" + c.group + ")";
+  return c.kind == ScoredHypothesis::Kind::effect ? listed(c.effects, "and") + (c.remainder ? " and more" : "")
+                                                  : "(" + c.group + ")";
 }
 
 }  // namespace
@@ -125,14 +124,14 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
                                         s.unit.empty() ? "" : " ", s.unit.c_str()));
     }
   }
-  if (r.conclusion.kind == Conclusion::Kind::unknown && !r.unexplained.empty()) {
+  if ((r.conclusion.kind == Conclusion::Kind::unknown || r.conclusion.remainder) && !r.unexplained.empty()) {
     lines.push_back(r.jointly_with.empty()
                         ? "what is left depends on:"
                         : "what is left, with " + listed(r.jointly_with, "and") + " in force, depends on:");
     for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
-      lines.push_back(flightlog::format("  %s on %s, %.0f times what models usually get wrong (%.0f nats)",
-                                        place_of(r.unexplained[i]).c_str(), r.unexplained[i].function.c_str(),
-                                        r.unexplained[i].times, r.unexplained[i].gain));
+      lines.push_back(flightlog::format("  %s on %s (%s), %.1f times what models of this robot get wrong",
+                                        place_of(r.unexplained[i]).c_str(), r.unexplained[i].regime.c_str(),
+                                        r.unexplained[i].function.c_str(), r.unexplained[i].times));
   }
   std::string others;
   std::size_t shown = 0;
@@ -147,8 +146,8 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   lines.push_back(places.empty() ? "with parameters refitted nothing stands out of the noise"
                                  : "where the gap lies, with parameters refitted (rms, that of noise):");
   for (const GapLocation& p : places)
-    lines.push_back(flightlog::format("  %-12s %-34s %8.3g, noise %.3g %s (p %.1g)", channel_name(p.channel),
-                                      p.regime.c_str(), p.gap, p.noise_floor, channel_unit(p.channel), p.p_value));
+    lines.push_back(flightlog::format("  %-12s %-34s %8.3g, noise %.3g %s", channel_name(p.channel), p.regime.c_str(),
+                                      p.gap, p.noise_floor, channel_unit(p.channel)));
   const auto loss = [](const std::optional<double>& e) { return e ? flightlog::format("%.3g", *e) : std::string("-"); };
   lines.push_back("mean loss in flights held out: vehicle's file " + loss(r.nominal) + ", parameters refitted " +
                   loss(r.refit) + ", with the best effect " + loss(r.effect) + ", noise alone " + loss(r.noise_floor));

@@ -291,24 +291,6 @@ Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector
   return result;
 }
 
-BasisCoefficients Evidence::local_gains(const SufficientStatistics& residual, const std::vector<char>& use,
-                                        const BasisCoefficients& discrepancy_sd,
-                                        const BasisCoefficients& more_sd) const {
-  BasisCoefficients gains = BasisCoefficients::Zero(kGroups, basis_.size());
-  for (int g = 0; g < kGroups; ++g) {
-    const auto [normal, right] = sums_of(residual, use, g);
-    if (normal(0, 0) == 0) continue;
-    const WithoutDiscrepancy without(normal, discrepancy_sd.row(g).transpose());
-    // one more coefficient, beside those that were there
-    const VectorXd known = normal.diagonal() - without.half.colwise().squaredNorm().transpose();
-    const VectorXd left = right - without.half.transpose() * without.of(right);
-    const Eigen::ArrayXd more = more_sd.row(g).transpose().array();
-    const Eigen::ArrayXd information = more.square() * known.array(), score = more * left.array();
-    gains.row(g) = (0.5 * (score.square() / (1 + information) - information.log1p())).transpose();
-  }
-  return gains;
-}
-
 Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& columns, const VectorXd& prior_mean) {
   const Index k = static_cast<Index>(columns.size()), last = reduced.sums.rows() - 1;
   MatrixXd precision = reduced.sums(columns, columns);

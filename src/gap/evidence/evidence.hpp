@@ -59,8 +59,9 @@ struct Reduced {
 /// How far models of this robot are off, beside what is usual: factors of its discrepancy.
 struct Scales {
   double robot = 1;
-  std::vector<double> blocks;  ///< [kBlocks]
-  std::vector<char> free;      ///< [kBlocks] whether it is larger than models are, by whatever it takes
+  std::vector<double> blocks;      ///< [kBlocks]
+  std::vector<double> background;  ///< of columns that scale with the robot
+  std::vector<char> free;          ///< [kBlocks] whether it is larger than models are, by whatever it takes
 };
 inline constexpr int kClasses = static_cast<int>(Regimes::count), kBlocks = kChannels * (kHarmonics + 1) * kClasses;
 
@@ -99,16 +100,13 @@ class Evidence {
   /// `use`: which flights. `discrepancy_sd`: of delta's coefficients.
   Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
                  const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const;
-  /// What log p gains when a coefficient of delta, each for itself, may be as large as `more_sd` besides, while the columns
-  /// stay as they are.
-  BasisCoefficients local_gains(const SufficientStatistics& residual, const std::vector<char>& use,
-                                const BasisCoefficients& discrepancy_sd, const BasisCoefficients& more_sd) const;
   /// Expectation-maximisation over the scales of the discrepancy, from `start` on. `own_sd`: what equations of effects get wrong of
-  /// themselves, which no scale changes. `freeing_nats`: the price at which a block may be larger than any model is off; none: no block.
+  /// themselves, which no scale changes; `with_robot`: columns from which on coefficients scale with the robot. `freeing_nats`: the price at which a block may be larger than any model is off; none: no block.
   Weighed weigh(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
-                const Eigen::VectorXd& prior_mean, const std::vector<char>& use, const BasisCoefficients& own_sd,
-                const Scales& start, std::optional<double> freeing_nats = {}, int iterations = kMostIterations) const;
-  static constexpr int kMostIterations = 12;
+                const Eigen::VectorXd& prior_mean, std::size_t with_robot, const std::vector<char>& use,
+                const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats = {},
+                int iterations = kMostIterations) const;
+  static constexpr int kMostIterations = 40;
   void set_discrepancy(ModelDiscrepancy discrepancy) { discrepancy_ = std::move(discrepancy); }
   /// Those that every model of this robot has from now on.
   void set_scales(const Scales& scales) { scales_ = scales; }
@@ -146,7 +144,7 @@ class Evidence {
   int threads_;
   RegimeBasis basis_;
   std::vector<Group> groups_;
-  Scales scales_{1, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
+  Scales scales_{1, std::vector<double>(kBlocks, 1), {}, std::vector<char>(kBlocks, 0)};
   Residuals weights_;
   std::vector<Eigen::MatrixXd> plain_inverse_;        ///< of basis x basis, by channel
   std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< basis x basis of the whitened rows, [flight][group]

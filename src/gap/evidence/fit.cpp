@@ -152,14 +152,31 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
     for (VectorXd& sum : flight) sum /= n;
 }
 
-void Fitter::set_background(const std::vector<BasisCoefficients>& columns, const Fit& beside) {
+void Fitter::set_background(const std::vector<BasisCoefficients>& same,
+                            const std::vector<BasisCoefficients>& with_robot, const Fit& beside) {
   background_.clear();
-  Columns all = columns_of(beside.point);
+  Columns all = own_columns_of(beside.point);
   const auto first = static_cast<Index>(all.columns.size());
-  for (const BasisCoefficients& c : columns) all.add(c, 0);
+  for (const auto* list : {&same, &with_robot})
+    for (const BasisCoefficients& c : *list) all.add(c, 0);
   const Reduced reduced = reduce(beside.point, all);
-  for (Index k = first; k < static_cast<Index>(all.columns.size()); ++k)
-    if (reduced.sums(k, k) > kTelling) background_.push_back(columns[static_cast<std::size_t>(k - first)]);
+  const auto add = [&](const std::vector<BasisCoefficients>& list, Index from) {
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      const Index i = from + static_cast<Index>(k);
+      if (reduced.sums(i, i) > kTelling) background_.push_back(list[k]);
+    }
+  };
+  add(same, first);
+  with_robot_ = background_.size();
+  add(with_robot, first + static_cast<Index>(same.size()));
+  take_scale();
+}
+
+void Fitter::take_scale() {
+  scaled_ = background_;
+  const Scales& scales = evidence_.scales();
+  for (std::size_t k = with_robot_; k < scaled_.size(); ++k)
+    scaled_[k] *= k - with_robot_ < scales.background.size() ? scales.background[k - with_robot_] : scales.robot;
 }
 
 Columns Fitter::own_columns_of(const Linearised& point) {
@@ -172,6 +189,13 @@ Columns Fitter::own_columns_of(const Linearised& point) {
 
 Columns Fitter::columns_of(const Linearised& point) const {
   Columns c = own_columns_of(point);
+  for (const BasisCoefficients& b : scaled_) c.add(b, 0);
+  return c;
+}
+
+Columns Fitter::unscaled_columns_of(const Linearised& point) const {
+  Columns c = own_columns_of(point);
+  c.with_robot = c.columns.size() + with_robot_;
   for (const BasisCoefficients& b : background_) c.add(b, 0);
   return c;
 }
@@ -215,7 +239,7 @@ MatrixXd Fit::covariance() const {
 
 double Fitter::cost(const SufficientStatistics& residual, const VectorXd& at) const {
   Columns c;
-  for (const BasisCoefficients& b : background_) c.add(b, 0);
+  for (const BasisCoefficients& b : scaled_) c.add(b, 0);
   const Reduced reduced = evidence_.reduce(residual, c.columns, all_flights(), evidence_.discrepancy_sd());
   return 0.5 * at.squaredNorm() - Evidence::posterior(reduced, c.chosen, c.mean()).log_evidence;
 }

@@ -2,6 +2,8 @@
 // differences between vehicles that fly side by side as lanes.
 #pragma once
 
+#include <limits>
+
 #include "gap/evidence/evidence.hpp"
 #include "gap/evidence/hypothesis.hpp"
 
@@ -36,6 +38,7 @@ struct Columns {
   std::vector<const BasisCoefficients*> columns;
   std::vector<int> chosen;  ///< all of them
   std::vector<double> prior_mean;
+  std::size_t with_robot = std::numeric_limits<std::size_t>::max();  ///< from which on they scale with the robot
   Eigen::VectorXd mean() const;
   void add(const BasisCoefficients& column, double mean);
 };
@@ -49,14 +52,20 @@ class Fitter {
   Fitter(const std::vector<PredictedFlight>& flights, const Evidence& evidence, int threads)
       : flights_(flights), evidence_(evidence), threads_(threads) {}
 
-  /// Columns that may take what they can beside every hypothesis, with standard normal coefficients; those of which the flights tell
-  /// nothing, beside a fit's, are left out.
-  void set_background(const std::vector<BasisCoefficients>& columns, const Fit& beside);
+  /// Columns that may take what they can beside every hypothesis, with standard normal coefficients: first those that are the same for
+  /// every robot, then those that are larger the more models of it are off. Of which the flights tell nothing, beside a fit's, are left
+  /// out.
+  void set_background(const std::vector<BasisCoefficients>& same, const std::vector<BasisCoefficients>& with_robot,
+                      const Fit& beside);
+  /// From now on the background is that of a robot of the evidence's scale.
+  void take_scale();
   std::vector<char> all_flights() const { return std::vector<char>(flights_.size(), 1); }
   /// The columns of a point that do not come apart.
   static Columns own_columns_of(const Linearised& point);
-  /// Those, then the background's.
+  /// Those, then the background's, as this robot has it.
   Columns columns_of(const Linearised& point) const;
+  /// The same with the background of a robot whose scale is 1.
+  Columns unscaled_columns_of(const Linearised& point) const;
   /// What the equations of its effects get wrong of themselves: shares of all that the sizes of each change.
   BasisCoefficients form_error(const Hypothesis& hypothesis, const Linearised& point) const;
 
@@ -90,7 +99,8 @@ class Fitter {
   const std::vector<PredictedFlight>& flights_;
   const Evidence& evidence_;
   int threads_;
-  std::vector<BasisCoefficients> background_;
+  std::vector<BasisCoefficients> background_, scaled_;
+  std::size_t with_robot_ = 0;  ///< of the background, from which on it scales with the robot
 };
 
 }  // namespace flappy::gap

@@ -45,8 +45,8 @@ void expect(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDis
     std::vector<BasisCoefficients> scaled;
     for (const SizeColumn& s : robot->sizes()) scaled.push_back(now.background_sd(s.effect) * s.change);
     for (const BasisCoefficients& s : scaled) c.add(s, 0);
-    const Weighed w =
-        evidence.weigh(at.statistics, c.columns, c.mean(), robot->fitter().all_flights(), {}, Scales{}, {}, 1);
+    const Weighed w = evidence.weigh(at.statistics, c.columns, c.mean(), c.columns.size(),
+                                     robot->fitter().all_flights(), {}, Scales{}, {}, 1);
     for (std::size_t k = 0; k < scaled.size(); ++k) {
       const auto i = static_cast<Index>(first + k);
       const std::string& effect = robot->sizes()[k].effect;
@@ -95,6 +95,39 @@ void shrink(Shares& shares) {
       }
 }
 
+/// What most of an entry's columns is: of which regimes, in units of what models get wrong.
+std::map<std::string, std::size_t> classes_of(const std::vector<std::unique_ptr<RobotFit>>& robots) {
+  std::map<std::string, std::array<double, kClasses>> sums;
+  for (const std::unique_ptr<RobotFit>& robot : robots) {
+    const Evidence& evidence = robot->evidence();
+    const BasisCoefficients sd = evidence.discrepancy_sd();
+    for (const SizeColumn& s : robot->sizes())
+      for (int g = 0; g < kGroups; ++g)
+        for (int i = 0; i < evidence.basis().size(); ++i)
+          if (sd(g, i) > 0)
+            sums[s.effect][static_cast<std::size_t>(regimes_of(evidence.basis().kind(i)))] +=
+                std::pow(s.change(g, i) / sd(g, i), 2);
+  }
+  std::map<std::string, std::size_t> classes;
+  for (const auto& [effect, of] : sums)
+    classes[effect] = static_cast<std::size_t>(std::ranges::max_element(of) - of.begin());
+  return classes;
+}
+
+/// Robots are of few makings, of which each looks like a few entries: half of an entry's variance is the mean of those of its class.
+void shrink(const std::map<std::string, std::size_t>& classes, std::map<std::string, Moment>& sizes) {
+  std::array<Moment, kClasses> pooled{};
+  for (const auto& [effect, m] : sizes) {
+    Moment& p = pooled[classes.at(effect)];
+    p.sum += m.sum / m.count;
+    p.count += 1;
+  }
+  for (auto& [effect, m] : sizes) {
+    const Moment& p = pooled[classes.at(effect)];
+    m = {m.sum / m.count + p.sum / p.count, 2};
+  }
+}
+
 void take(const Shares& shares, const std::map<std::string, Moment>& sizes, ModelDiscrepancy& d) {
   for (std::size_t c = 0; c < kChannels; ++c)
     for (std::size_t h = 0; h <= kHarmonics; ++h)
@@ -131,7 +164,10 @@ ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>&
     Shares shares{};
     std::map<std::string, Moment> sizes;
     expect(robots, now, shares, sizes);
-    if (n == kIterations) shrink(shares);
+    if (n == kIterations) {
+      shrink(shares);
+      shrink(classes_of(robots), sizes);
+    }
     take(shares, sizes, now);
   }
   static_cast<void>(threads);

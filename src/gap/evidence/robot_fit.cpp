@@ -32,18 +32,25 @@ void RobotFit::fit_parameters() {
 void RobotFit::refit_beside_background() {
   find_sizes(withheld_);
   find_nuisances();
-  std::vector<BasisCoefficients> background = nuisances_;
-  for (const SizeColumn& c : sizes_) background.push_back(evidence_.discrepancy().background_sd(c.effect) * c.change);
-  fitter_.set_background(background, parameters_);
+  std::vector<BasisCoefficients> background;
+  for (const auto* list : {&sizes_, &shapes_})
+    for (const SizeColumn& c : *list)
+      background.push_back(evidence_.discrepancy().background_sd(c.effect) * c.change);
+  fitter_.set_background(nuisances_, background, parameters_);
   learn_scales();
   parameters_ = fitter_.refit(plain_, parameters_, 4);
   learn_scales();
 }
 
+void RobotFit::learn_scales() {
+  evidence_.set_scales(weigh(plain_, parameters_.point).scales);
+  fitter_.take_scale();
+}
+
 Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, std::optional<double> freeing_nats) const {
-  const Columns c = fitter_.columns_of(at);
-  return evidence_.weigh(at.statistics, c.columns, c.mean(), fitter_.all_flights(), fitter_.form_error(hypothesis, at),
-                         evidence_.scales(), freeing_nats);
+  const Columns c = fitter_.unscaled_columns_of(at);
+  return evidence_.weigh(at.statistics, c.columns, c.mean(), c.with_robot, fitter_.all_flights(),
+                         fitter_.form_error(hypothesis, at), evidence_.scales(), freeing_nats);
 }
 
 /// Of a residual `steps` steps away from that of the parameters, for one step.
@@ -55,18 +62,26 @@ BasisCoefficients RobotFit::change(Residuals there, double steps) const {
 }
 
 void RobotFit::find_sizes(const std::vector<std::string>& withheld) {
-  std::vector<SizeColumn> columns;
+  std::vector<SizeStep> steps = size_steps(uncertain_, parameters_.point.at, withheld);
   std::vector<Candidate> candidates;
-  for (SizeStep& s : size_steps(uncertain_, parameters_.point.at, withheld)) {
-    columns.push_back({s.effect, s.unknown, {}});
+  for (SizeStep& s : steps) {
     candidates.push_back(std::move(s.candidate));
+    for (Candidate& c : s.shaped) candidates.push_back(std::move(c));
   }
   std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
-  io::parallel_for(columns.size(), threads_, [&](std::size_t i) {
-    if (!rows[i].empty()) columns[i].change = change(std::move(rows[i]), kSizeReach);
+  std::vector<BasisCoefficients> changes(rows.size());
+  io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
+    if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), kSizeReach);
   });
-  std::erase_if(columns, [](const SizeColumn& c) { return c.change.size() == 0; });  // it comes apart
-  sizes_ = std::move(columns);
+  sizes_.clear();
+  shapes_.clear();
+  std::size_t i = 0;
+  for (const SizeStep& s : steps) {
+    const BasisCoefficients own = changes[i++];
+    if (own.size() > 0) sizes_.push_back({s.effect, s.unknown, own});
+    for (std::size_t k = 0; k < s.shaped.size(); ++k, ++i)
+      if (own.size() > 0 && changes[i].size() > 0) shapes_.push_back({s.effect, s.unknown, changes[i] - own});
+  }
 }
 
 void RobotFit::find_nuisances() {

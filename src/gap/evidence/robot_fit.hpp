@@ -26,6 +26,8 @@ class RobotFit {
   const Linearised& nominal() const { return nominal_; }
   /// What every size of the catalogue changes.
   const std::vector<SizeColumn>& sizes() const { return sizes_; }
+  /// What it makes of that to have another shape, by a standard deviation of each.
+  const std::vector<SizeColumn>& shapes() const { return shapes_; }
   /// What each number that a header may have wrong changes, for one standard deviation; as ModelDiscrepancy::nuisances.
   const std::vector<BasisCoefficients>& nuisances() const { return nuisances_; }
 
@@ -33,7 +35,7 @@ class RobotFit {
   Weighed weigh(const Hypothesis& hypothesis, const Linearised& at, std::optional<double> freeing_nats = {}) const;
 
  private:
-  void learn_scales() { evidence_.set_scales(weigh(plain_, parameters_.point).scales); }
+  void learn_scales();
   void find_sizes(const std::vector<std::string>& withheld);
   void find_nuisances();
   BasisCoefficients change(Residuals there, double steps) const;
@@ -47,7 +49,7 @@ class RobotFit {
   Hypothesis plain_;
   Linearised nominal_;
   Fit parameters_;
-  std::vector<SizeColumn> sizes_;
+  std::vector<SizeColumn> sizes_, shapes_;
   std::vector<BasisCoefficients> nuisances_;
 };
 

@@ -90,7 +90,13 @@ std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Vect
       if (!h.unknowns()[static_cast<std::size_t>(i)].size) continue;
       VectorXd there = here;
       there[i] = kSizeReach;
-      steps.push_back({id, i - first, h.candidate(there)});
+      steps.push_back({id, i - first, h.candidate(there), {}});
+      for (Index shape = first; shape < h.size(); ++shape) {
+        if (h.unknowns()[static_cast<std::size_t>(shape)].size) continue;
+        VectorXd other = there;
+        other[shape] = 1;
+        steps.back().shaped.push_back(h.candidate(h.bounded(other)));
+      }
     }
   }
   return steps;

@@ -10,6 +10,7 @@ struct SizeStep {
   std::string effect;
   Eigen::Index unknown;  ///< of the effect's
   Candidate candidate;
+  std::vector<Candidate> shaped;  ///< the same with each of its shapes a standard deviation away
 };
 inline constexpr double kSizeReach = 0.4;
 

@@ -4,9 +4,11 @@
 //   z | theta ~ N(H^-1 d (right - normal change theta), H^-1)      H = 1 + d normal d
 // so that the expected squares of delta in a block follow, and with n coefficients in it the scale that makes them most probable,
 //   s^2 = (sum E[delta^2] / D^2 + nu f^2) / (n + nu),
-// f being the robot's own (Dempster, Laird, Rubin 1977: the log evidence, with what is thought of the scales, never falls). The
+// f being the robot's own; each
+// coefficient of the background has one, too (Dempster, Laird, Rubin 1977: the log evidence, with what is thought of the scales, never falls). The
 // evidence is taken where it is largest: the width of that maximum is the same for every hypothesis, to first order.
 #include <cmath>
+#include <limits>
 
 #include "gap/evidence/evidence.hpp"
 #include "io/parallel.hpp"
@@ -20,6 +22,8 @@ using Eigen::VectorXd;
 
 /// Nats that another iteration has to bring.
 constexpr double kSettled = 0.1;
+/// Strides grow so while they succeed.
+constexpr double kLonger = 1.5, kLongest = 8;
 /// A block that is free is so many times larger than the robot's others, at least.
 constexpr double kLeastFree = 2;
 
@@ -42,6 +46,54 @@ double log_prior(double scale, double robot, double freedom) {
   return freedom / 2 * (2 * std::log(ratio) + 1 - ratio * ratio);
 }
 
+/// A law of scales about the robot's own, and what the scales that follow it add up to.
+struct Law {
+  double freedom = 0, count = 0, inverses = 0;
+  void add(double scale) {
+    count += 1;
+    inverses += 1 / (scale * scale);
+  }
+  double value(double f) const { return freedom / 2 * (2 * count * std::log(f) - f * f * inverses); }
+};
+
+/// The most probable factor of a robot.
+double robot_of(const Law& blocks, const Law& background, double sd) {
+  constexpr double kFinest = 0.02;
+  double best = 1, most = -std::numeric_limits<double>::infinity();
+  for (double log_f = -5; log_f <= 3; log_f += kFinest) {
+    const double f = std::exp(log_f);
+    const double value = blocks.value(f) + background.value(f) - 0.5 * std::pow(log_f / sd, 2);
+    if (value > most) most = value, best = f;
+  }
+  return best;
+}
+
+/// The most probable scale of a coefficient, all others as they are, from its mean and variance in units of the scale that it has.
+/// Expectation-maximisation would hardly move from a small one (Tipping, Faul 2003: its evidence in closed form).
+double scale_of(double mean, double variance, double scale, double robot, double freedom) {
+  constexpr double kFinest = 0.05, kReach = 6;
+  const double seen = std::max(0.0, 1 / variance - 1) / (scale * scale), pull = mean / (scale * variance);
+  double best = scale, most = -std::numeric_limits<double>::infinity();
+  for (double log_s = -1; log_s <= kReach; log_s += kFinest) {
+    const double s = robot * std::exp(log_s), s2 = s * s;
+    const double value =
+        0.5 * (pull * pull * s2 / (1 + s2 * seen) - std::log1p(s2 * seen)) + log_prior(s, robot, freedom);
+    if (value > most) most = value, best = s;
+  }
+  return best;
+}
+
+/// From scales on, so many times as far as expectation-maximisation would go, which crawls (Salakhutdinov, Roweis 2003).
+Scales strided(const Scales& from, const Scales& to, double stride) {
+  const auto go = [&](double a, double b) { return a * std::pow(b / a, stride); };
+  Scales s = to;
+  s.robot = go(from.robot, to.robot);
+  for (std::size_t b = 0; b < s.blocks.size(); ++b)
+    if (!from.free[b] && !to.free[b]) s.blocks[b] = go(from.blocks[b], to.blocks[b]);
+  for (std::size_t i = 0; i < s.background.size(); ++i) s.background[i] = go(from.background[i], to.background[i]);
+  return s;
+}
+
 }  // namespace
 
 int Evidence::block_of(int group, BasisFunction function) {
@@ -50,10 +102,11 @@ int Evidence::block_of(int group, BasisFunction function) {
 }
 
 Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
-                        const VectorXd& prior_mean, const std::vector<char>& use, const BasisCoefficients& own_sd,
-                        const Scales& start, std::optional<double> freeing_nats, int iterations) const {
+                        const VectorXd& prior_mean, std::size_t with_robot, const std::vector<char>& use,
+                        const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats,
+                        int iterations) const {
   const Index q = basis_.size(), k = static_cast<Index>(columns.size());
-  const double nu = discrepancy_.spread.block_freedom;
+  const double nu = discrepancy_.spread.block_freedom, nu_background = discrepancy_.spread.background_freedom;
   std::vector<int> seen;
   for (int g = 0; g < kGroups; ++g)
     for (std::size_t f = 0; f < use.size(); ++f)
@@ -89,7 +142,10 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
   if (best.scales.blocks.empty()) best.scales.blocks.assign(kBlocks, 1);
   if (best.scales.free.empty()) best.scales.free.assign(kBlocks, 0);
   best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
-  Scales now = best.scales;
+  const std::size_t with_background = std::min(with_robot, static_cast<std::size_t>(k));
+  best.scales.background.resize(static_cast<std::size_t>(k) - with_background, best.scales.robot);
+  Scales now = best.scales, next = best.scales;
+  double stride = 1;
   std::vector<Half> halves(seen.size());
   std::vector<int> chosen(static_cast<std::size_t>(k));
   for (Index i = 0; i < k; ++i) chosen[static_cast<std::size_t>(i)] = static_cast<int>(i);
@@ -108,7 +164,12 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
       h.llt.compute(precision);
       h.half = h.llt.matrixL().solve(h.sd.asDiagonal() * s.all);
     });
-    Reduced reduced{whole, 0};
+    // columns in units of what is thought of their coefficients
+    VectorXd unit = VectorXd::Ones(k + 1);
+    for (std::size_t i = 0; i < now.background.size(); ++i)
+      unit[static_cast<Index>(with_background + i)] = now.background[i];
+    io::parallel_for(seen.size(), threads_, [&](std::size_t n) { halves[n].half *= unit.asDiagonal(); });
+    Reduced reduced{unit.asDiagonal() * whole * unit.asDiagonal(), 0};
     for (const Half& h : halves) {
       reduced.sums.selfadjointView<Eigen::Lower>().rankUpdate(h.half.transpose(), -1);
       reduced.log_scale -= h.llt.matrixLLT().diagonal().array().log().sum();
@@ -140,30 +201,46 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
         w.squares(seen[n], i) = squares[n][i];
       }
     });
-    if (gain > 0) best = std::move(w);
+    const VectorXd w_mean = w.posterior.mean, w_variance = w.posterior.covariance.diagonal();
+    if (!(gain > 0)) {  // too far: from the best on, by a step that cannot fail
+      if (stride == 1) break;
+      stride = 1;
+      now = strided(best.scales, next, stride);
+      continue;
+    }
+    best = std::move(w);
     if (gain < kSettled) break;
+    stride = std::min(kLongest, kLonger * stride);
+    next = best.scales;
     std::vector<double> total(kBlocks, 0);
     for (std::size_t n = 0; n < seen.size(); ++n)
       for (Index i = 0; i < q; ++i)
         total[static_cast<std::size_t>(block_of(seen[n], basis_.kind(static_cast<int>(i))))] += squares[n][i];
-    double inverses = 0, bound = 0;
+    Law blocks{nu}, background{nu_background};
+    for (std::size_t i = 0; i < next.background.size(); ++i) {
+      const auto at = static_cast<Index>(with_background + i);
+      const double most = scale_of(w_mean[at], w_variance[at], next.background[i], next.robot, nu_background);
+      next.background[i] = std::sqrt(next.background[i] * most);  // not all at once, as columns are alike
+      background.add(next.background[i]);
+    }
     for (std::size_t b = 0; b < kBlocks; ++b) {
       if (counts[b] == 0) continue;
-      const double n = counts[b], f2 = now.robot * now.robot;
+      const double n = counts[b], f2 = next.robot * next.robot;
       const double usual2 = (total[b] + nu * f2) / (n + nu);
-      now.blocks[b] = std::sqrt(usual2);
-      now.free[b] = 0;
+      next.blocks[b] = std::sqrt(usual2);
+      next.free[b] = 0;
       if (freeing_nats) {
         const double free2 = std::max(total[b] / n, kLeastFree * kLeastFree * f2);
         const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };
-        if (objective(free2) - *freeing_nats > objective(usual2) + log_prior(std::sqrt(usual2), now.robot, nu)) {
-          now.blocks[b] = std::sqrt(free2);
-          now.free[b] = 1;
+        if (objective(free2) - *freeing_nats > objective(usual2) + log_prior(std::sqrt(usual2), next.robot, nu)) {
+          next.blocks[b] = std::sqrt(free2);
+          next.free[b] = 1;
         }
       }
-      if (!now.free[b]) inverses += 1 / (now.blocks[b] * now.blocks[b]), bound += 1;
+      if (!next.free[b]) blocks.add(next.blocks[b]);
     }
-    if (bound > 0) now.robot = std::sqrt(bound / inverses);
+    next.robot = robot_of(blocks, background, discrepancy_.spread.robot_sd);
+    now = strided(best.scales, next, stride);
   }
   return best;
 }

@@ -216,9 +216,8 @@ Rows PredictedFlight::declared_noise(std::uint64_t seed) const {
                                  h.power->current_noise_A * normal(random)});
     put_power(power, rows);
   }
-  // mean forces have the noise of motion capture alone, which that of the comparison bounds
-  const std::vector<StreamRow> streams = stream_noise(recording_, seed);
-  put_streams(streams, rows);
+  put_streams(stream_noise(recording_, seed, false), rows);
+  const std::vector<StreamRow> streams = stream_noise(recording_, seed, true);
   for (std::size_t j = 0; j < recording_.beats; ++j)
     for (std::size_t i = 0; i < 3; ++i)
       rows[j * kRowsPerBeat + (kForceX + i) * kCoefficients] = streams[j].path_m_s2[static_cast<Eigen::Index>(i)];

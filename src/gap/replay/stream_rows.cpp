@@ -108,7 +108,7 @@ std::vector<StreamRow> stream_rows(const Recording& r) {
   return differences(r, pose_s, samples);
 }
 
-std::vector<StreamRow> stream_noise(const Recording& r, std::uint64_t seed) {
+std::vector<StreamRow> stream_noise(const Recording& r, std::uint64_t seed, bool mocap_alone) {
   const flightlog::FlightHeader& h = r.log.header;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
@@ -119,10 +119,10 @@ std::vector<StreamRow> stream_noise(const Recording& r, std::uint64_t seed) {
   Vector3d velocity = Vector3d::Zero();
   for (std::size_t k = 0; k < r.intervals(); ++k) {
     const double dt = r.interval_s(k);
-    const Vector3d a = noise(h.imu.accel_noise_m_s2);
+    const Vector3d a = noise(mocap_alone ? 0 : h.imu.accel_noise_m_s2);
     path.push_back(path.back() + dt * velocity + dt * dt / 2 * a);
     velocity += dt * a;
-    angle.push_back(angle.back() + dt * noise(h.imu.gyro_noise_rad_s));
+    angle.push_back(angle.back() + dt * noise(mocap_alone ? 0 : h.imu.gyro_noise_rad_s));
     t_s.push_back(r.end_s[k]);
   }
   std::vector<double> pose_s, samples;

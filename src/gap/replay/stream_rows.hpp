@@ -21,7 +21,7 @@ struct StreamRow {
 
 /// One for each beat.
 std::vector<StreamRow> stream_rows(const Recording& recording);
-/// The same of noise as the header declares it and nothing else.
-std::vector<StreamRow> stream_noise(const Recording& recording, std::uint64_t seed);
+/// The same of noise as the header declares it and nothing else: of both streams, or of motion capture alone.
+std::vector<StreamRow> stream_noise(const Recording& recording, std::uint64_t seed, bool mocap_alone);
 
 }  // namespace flappy::gap

@@ -403,8 +403,13 @@ TEST(VerdictRule, IsReadStrictly) {
   EXPECT_EQ(discrepancy(model), "accepted");
   EXPECT_NE(discrepancy(with(model, "body_drag = ", "body_dragg = ")).find("background_sd.body_dragg"),
             std::string::npos);
-  EXPECT_NE(discrepancy(with(model, "[4.0, 0.05]", "[4.0, 0.06]")).find("do not add up to 1"), std::string::npos);
-  EXPECT_NE(discrepancy(with(model, "[share.turn]", "[share.turns]")).find("share.turn"), std::string::npos);
+  EXPECT_NE(discrepancy(with(model, "block_freedom = ", "block_freedoms = ")).find("spread.block_freedom"),
+            std::string::npos);
+  EXPECT_NE(discrepancy(with(model, "[share.path_x]", "[share.paths_x]")).find("share.path_x"), std::string::npos);
+  // and is written as it is read
+  const std::string again = discrepancy_text(read_model_discrepancy(), "somebody");
+  EXPECT_EQ(discrepancy(again), "accepted");
+  EXPECT_EQ(discrepancy_text(read_model_discrepancy(path), "somebody"), again);
 }
 
 }  // namespace
