@@ -59,9 +59,8 @@ struct Reduced {
 /// How far models of this robot are off, beside what is usual: factors of its discrepancy.
 struct Scales {
   double robot = 1;
-  std::vector<double> blocks;      ///< [kBlocks]
-  std::vector<double> background;  ///< of columns that scale with the robot
-  std::vector<char> free;          ///< [kBlocks] whether it is larger than models are, by whatever it takes
+  std::vector<double> blocks;  ///< [kBlocks]
+  std::vector<char> free;      ///< [kBlocks] whether it is larger than models are, by whatever it takes
 };
 inline constexpr int kClasses = static_cast<int>(Regimes::count), kBlocks = kChannels * (kHarmonics + 1) * kClasses;
 
@@ -144,7 +143,7 @@ class Evidence {
   int threads_;
   RegimeBasis basis_;
   std::vector<Group> groups_;
-  Scales scales_{1, std::vector<double>(kBlocks, 1), {}, std::vector<char>(kBlocks, 0)};
+  Scales scales_{1, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
   Residuals weights_;
   std::vector<Eigen::MatrixXd> plain_inverse_;        ///< of basis x basis, by channel
   std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< basis x basis of the whitened rows, [flight][group]

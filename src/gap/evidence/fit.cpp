@@ -174,9 +174,7 @@ void Fitter::set_background(const std::vector<BasisCoefficients>& same,
 
 void Fitter::take_scale() {
   scaled_ = background_;
-  const Scales& scales = evidence_.scales();
-  for (std::size_t k = with_robot_; k < scaled_.size(); ++k)
-    scaled_[k] *= k - with_robot_ < scales.background.size() ? scales.background[k - with_robot_] : scales.robot;
+  for (std::size_t k = with_robot_; k < scaled_.size(); ++k) scaled_[k] *= evidence_.scales().robot;
 }
 
 Columns Fitter::own_columns_of(const Linearised& point) {

@@ -11,6 +11,7 @@
 #include "io/parallel.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "io/statistics.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
@@ -114,18 +115,12 @@ std::map<std::string, std::size_t> classes_of(const std::vector<std::unique_ptr<
   return classes;
 }
 
-/// Robots are of few makings, of which each looks like a few entries: half of an entry's variance is the mean of those of its class.
+/// Robots are of few makings, of which each looks like a few entries: half of an entry's variance is that of the median of its class,
+/// which those few do not move.
 void shrink(const std::map<std::string, std::size_t>& classes, std::map<std::string, Moment>& sizes) {
-  std::array<Moment, kClasses> pooled{};
-  for (const auto& [effect, m] : sizes) {
-    Moment& p = pooled[classes.at(effect)];
-    p.sum += m.sum / m.count;
-    p.count += 1;
-  }
-  for (auto& [effect, m] : sizes) {
-    const Moment& p = pooled[classes.at(effect)];
-    m = {m.sum / m.count + p.sum / p.count, 2};
-  }
+  std::array<std::vector<double>, kClasses> of_class;
+  for (const auto& [effect, m] : sizes) of_class[classes.at(effect)].push_back(m.sum / m.count);
+  for (auto& [effect, m] : sizes) m = {m.sum / m.count + io::upper_median(of_class[classes.at(effect)]), 2};
 }
 
 void take(const Shares& shares, const std::map<std::string, Moment>& sizes, ModelDiscrepancy& d) {
@@ -150,8 +145,8 @@ std::vector<fs::path> flights_of(const fs::path& robot) {
 
 }  // namespace
 
-ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDiscrepancy& start,
-                                   int threads) {
+ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>& robots,
+                                   const ModelDiscrepancy& start) {
   ModelDiscrepancy now = start;
   io::ProgressLine line("learning");
   for (std::size_t i = 0; i < robots.size() && !io::interrupted(); ++i) {
@@ -170,7 +165,6 @@ ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>&
     }
     take(shares, sizes, now);
   }
-  static_cast<void>(threads);
   return now;
 }
 
@@ -194,7 +188,7 @@ void run_learn_discrepancy(const LearnCommand& command) {
   for (const std::vector<PredictedFlight>& f : flights)
     robots.push_back(std::make_unique<RobotFit>(f, uncertain, start, std::vector<std::string>(), command.threads));
   io::stop_on_interrupt();
-  const ModelDiscrepancy learnt = learn_discrepancy(robots, start, command.threads);
+  const ModelDiscrepancy learnt = learn_discrepancy(robots, start);
   io::write_atomically(command.out,
                        discrepancy_text(learnt, std::to_string(robots.size()) + " robots, commit " + io::commit()));
   std::printf("%s: learnt from %zu robots\n", command.out.c_str(), robots.size());

@@ -34,7 +34,7 @@ constexpr const char* kShares =
 constexpr const char* kSpread =
     R"(# How much more or less than usual models of a robot are off: standard deviation of the log of its own factor, wide, for a robot may be
 # nearly the model; and how far its blocks (a kind of regime in a channel and harmonic) go their own ways about it, as degrees of
-# freedom of an inverse gamma law; the same of what it has of single entries. Choices.
+# freedom of an inverse gamma law. Choices.
 )";
 constexpr const char* kSensors =
     R"(# What laboratories declare of sensors is right to so much, whatever else is so: standard deviations. Choices.
@@ -85,8 +85,7 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
     text += "\n";
   }
   text += std::string(kSpread) + "[spread]\nrobot_sd = " + number(d.spread.robot_sd) +
-          "\nblock_freedom = " + number(d.spread.block_freedom) +
-          "\nbackground_freedom = " + number(d.spread.background_freedom) + "\n\n" + kSensors +
+          "\nblock_freedom = " + number(d.spread.block_freedom) + "\n\n" + kSensors +
           "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") + "  # as it is mounted, about each axis\n" +
           "imu_place_m = " + sensor("imu_place") + "  # along each axis\npower_latency_s = " + sensor("power_delay") +
           "  # of a sample that is an instant, a mean, or held\n\n" + kBackground + "[background_sd]\n";
@@ -100,8 +99,7 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   root.schema(1);
   ModelDiscrepancy d;
   const io::Table spread = root.table("spread");
-  d.spread = {spread.number("robot_sd", io::positive()), spread.number("block_freedom", io::positive()),
-              spread.number("background_freedom", io::positive())};
+  d.spread = {spread.number("robot_sd", io::positive()), spread.number("block_freedom", io::positive())};
   d.form_error = root.number("form_error", io::non_negative());
 
   for (int channel = 0; channel < kChannels; ++channel) {

@@ -36,9 +36,9 @@ Regimes regimes_of(BasisFunction function);
 struct ModelDiscrepancy {
   /// Of one robot models are off by more or less than usual, and so is each kind of regime in each channel and harmonic of it (a
   /// block): log robot ~ N(0, robot_sd^2), and block^2 / robot^2 ~ inverse gamma of so many degrees of freedom, so that what is
-  /// left has heavy tails. So does what every vehicle has of an entry.
+  /// left has heavy tails. What every vehicle has of an entry is the more, too, the more models of it are off.
   struct Spread {
-    double robot_sd, block_freedom, background_freedom;
+    double robot_sd, block_freedom;
   } spread{};
   /// How well an entry's equation describes the effect of its name: sd of every coefficient as a share of its own.
   double form_error = 0;

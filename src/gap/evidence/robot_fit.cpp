@@ -34,8 +34,7 @@ void RobotFit::refit_beside_background() {
   find_nuisances();
   std::vector<BasisCoefficients> background;
   for (const auto* list : {&sizes_, &shapes_})
-    for (const SizeColumn& c : *list)
-      background.push_back(evidence_.discrepancy().background_sd(c.effect) * c.change);
+    for (const SizeColumn& c : *list) background.push_back(evidence_.discrepancy().background_sd(c.effect) * c.change);
   fitter_.set_background(nuisances_, background, parameters_);
   learn_scales();
   parameters_ = fitter_.refit(plain_, parameters_, 4);

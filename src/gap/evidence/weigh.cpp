@@ -4,8 +4,8 @@
 //   z | theta ~ N(H^-1 d (right - normal change theta), H^-1)      H = 1 + d normal d
 // so that the expected squares of delta in a block follow, and with n coefficients in it the scale that makes them most probable,
 //   s^2 = (sum E[delta^2] / D^2 + nu f^2) / (n + nu),
-// f being the robot's own; each
-// coefficient of the background has one, too (Dempster, Laird, Rubin 1977: the log evidence, with what is thought of the scales, never falls). The
+// f being the robot's own; the
+// coefficients of the background are of it, too (Dempster, Laird, Rubin 1977: the log evidence, with what is thought of the scales, never falls). The
 // evidence is taken where it is largest: the width of that maximum is the same for every hypothesis, to first order.
 #include <cmath>
 #include <limits>
@@ -46,39 +46,16 @@ double log_prior(double scale, double robot, double freedom) {
   return freedom / 2 * (2 * std::log(ratio) + 1 - ratio * ratio);
 }
 
-/// A law of scales about the robot's own, and what the scales that follow it add up to.
-struct Law {
-  double freedom = 0, count = 0, inverses = 0;
-  void add(double scale) {
-    count += 1;
-    inverses += 1 / (scale * scale);
-  }
-  double value(double f) const { return freedom / 2 * (2 * count * std::log(f) - f * f * inverses); }
-};
-
-/// The most probable factor of a robot.
-double robot_of(const Law& blocks, const Law& background, double sd) {
+/// The most probable factor f of a robot: of blocks whose 1 / s^2 add up to `inverses`, and of coefficients ~ N(0, f^2) whose squares
+/// add up to `squares`.
+double robot_of(double freedom, double blocks, double inverses, double coefficients, double squares, double sd) {
   constexpr double kFinest = 0.02;
   double best = 1, most = -std::numeric_limits<double>::infinity();
   for (double log_f = -5; log_f <= 3; log_f += kFinest) {
-    const double f = std::exp(log_f);
-    const double value = blocks.value(f) + background.value(f) - 0.5 * std::pow(log_f / sd, 2);
-    if (value > most) most = value, best = f;
-  }
-  return best;
-}
-
-/// The most probable scale of a coefficient, all others as they are, from its mean and variance in units of the scale that it has.
-/// Expectation-maximisation would hardly move from a small one (Tipping, Faul 2003: its evidence in closed form).
-double scale_of(double mean, double variance, double scale, double robot, double freedom) {
-  constexpr double kFinest = 0.05, kReach = 6;
-  const double seen = std::max(0.0, 1 / variance - 1) / (scale * scale), pull = mean / (scale * variance);
-  double best = scale, most = -std::numeric_limits<double>::infinity();
-  for (double log_s = -1; log_s <= kReach; log_s += kFinest) {
-    const double s = robot * std::exp(log_s), s2 = s * s;
-    const double value =
-        0.5 * (pull * pull * s2 / (1 + s2 * seen) - std::log1p(s2 * seen)) + log_prior(s, robot, freedom);
-    if (value > most) most = value, best = s;
+    const double f2 = std::exp(2 * log_f);
+    const double value = freedom / 2 * (blocks * 2 * log_f - f2 * inverses) - coefficients * log_f -
+                         squares / (2 * f2) - 0.5 * std::pow(log_f / sd, 2);
+    if (value > most) most = value, best = std::exp(log_f);
   }
   return best;
 }
@@ -90,7 +67,6 @@ Scales strided(const Scales& from, const Scales& to, double stride) {
   s.robot = go(from.robot, to.robot);
   for (std::size_t b = 0; b < s.blocks.size(); ++b)
     if (!from.free[b] && !to.free[b]) s.blocks[b] = go(from.blocks[b], to.blocks[b]);
-  for (std::size_t i = 0; i < s.background.size(); ++i) s.background[i] = go(from.background[i], to.background[i]);
   return s;
 }
 
@@ -106,7 +82,7 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
                         const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats,
                         int iterations) const {
   const Index q = basis_.size(), k = static_cast<Index>(columns.size());
-  const double nu = discrepancy_.spread.block_freedom, nu_background = discrepancy_.spread.background_freedom;
+  const double nu = discrepancy_.spread.block_freedom;
   std::vector<int> seen;
   for (int g = 0; g < kGroups; ++g)
     for (std::size_t f = 0; f < use.size(); ++f)
@@ -142,8 +118,7 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
   if (best.scales.blocks.empty()) best.scales.blocks.assign(kBlocks, 1);
   if (best.scales.free.empty()) best.scales.free.assign(kBlocks, 0);
   best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
-  const std::size_t with_background = std::min(with_robot, static_cast<std::size_t>(k));
-  best.scales.background.resize(static_cast<std::size_t>(k) - with_background, best.scales.robot);
+  const auto first_scaled = static_cast<Index>(std::min(with_robot, static_cast<std::size_t>(k)));
   Scales now = best.scales, next = best.scales;
   double stride = 1;
   std::vector<Half> halves(seen.size());
@@ -166,8 +141,7 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
     });
     // columns in units of what is thought of their coefficients
     VectorXd unit = VectorXd::Ones(k + 1);
-    for (std::size_t i = 0; i < now.background.size(); ++i)
-      unit[static_cast<Index>(with_background + i)] = now.background[i];
+    unit.segment(first_scaled, k - first_scaled).setConstant(now.robot);
     io::parallel_for(seen.size(), threads_, [&](std::size_t n) { halves[n].half *= unit.asDiagonal(); });
     Reduced reduced{unit.asDiagonal() * whole * unit.asDiagonal(), 0};
     for (const Half& h : halves) {
@@ -216,13 +190,9 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
     for (std::size_t n = 0; n < seen.size(); ++n)
       for (Index i = 0; i < q; ++i)
         total[static_cast<std::size_t>(block_of(seen[n], basis_.kind(static_cast<int>(i))))] += squares[n][i];
-    Law blocks{nu}, background{nu_background};
-    for (std::size_t i = 0; i < next.background.size(); ++i) {
-      const auto at = static_cast<Index>(with_background + i);
-      const double most = scale_of(w_mean[at], w_variance[at], next.background[i], next.robot, nu_background);
-      next.background[i] = std::sqrt(next.background[i] * most);  // not all at once, as columns are alike
-      background.add(next.background[i]);
-    }
+    double blocks = 0, inverses = 0, scaled = 0;
+    for (Index i = first_scaled; i < k; ++i)
+      scaled += (w_mean[i] * w_mean[i] + w_variance[i]) * next.robot * next.robot;
     for (std::size_t b = 0; b < kBlocks; ++b) {
       if (counts[b] == 0) continue;
       const double n = counts[b], f2 = next.robot * next.robot;
@@ -237,9 +207,10 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
           next.free[b] = 1;
         }
       }
-      if (!next.free[b]) blocks.add(next.blocks[b]);
+      if (!next.free[b]) blocks += 1, inverses += 1 / (next.blocks[b] * next.blocks[b]);
     }
-    next.robot = robot_of(blocks, background, discrepancy_.spread.robot_sd);
+    next.robot =
+        robot_of(nu, blocks, inverses, static_cast<double>(k - first_scaled), scaled, discrepancy_.spread.robot_sd);
     now = strided(best.scales, next, stride);
   }
   return best;

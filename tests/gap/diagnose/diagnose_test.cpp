@@ -91,7 +91,8 @@ TEST(ResetPrediction, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
       const int g = channel * kCoefficients + c;
       const double ratio = rms(flights[0], left, g) / rms(flights[0], noise, g);
       EXPECT_GT(ratio, 0.7) << channel_name(channel) << " " << c;
-      EXPECT_LT(ratio, c == 0 && channel >= kForceX && channel <= kForceZ ? 1.7 : 1.4) << channel_name(channel) << " " << c;
+      EXPECT_LT(ratio, c == 0 && channel >= kForceX && channel <= kForceZ ? 1.7 : 1.4)
+          << channel_name(channel) << " " << c;
     }
 }
 
@@ -105,7 +106,8 @@ TEST(ResetPrediction, MeanForcesAreThoseOfMotionCapture) {
   const auto mean = [](const PredictedFlight& f, int channel) {
     double sum = 0, n = 0;
     for (std::size_t j = 0; j < f.beats(); ++j)
-      if (f.covers(j, channel)) sum += f.measured()[j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients], n += 1;
+      if (f.covers(j, channel))
+        sum += f.measured()[j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients], n += 1;
     return sum / n;
   };
   EXPECT_NEAR(mean(wrong, kPathZ) - mean(flights[0], kPathZ), -kError_m_s2, 0.02 * kError_m_s2);
@@ -187,9 +189,11 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
     EXPECT_GT(declared.back(), 0.4 * rms(flights[0], noise, g)) << g;
   }
   evidence.learn_noise(fit.point.residual);
-  // what a right model leaves is noise as declared, to the 8 % of a median of 200, and no less by definition
+  // what a right model leaves is noise as declared, to the 8 % of a median of 200, and no less by definition; of the mean force also
+  // that of the motion to which the torso is reset
   for (std::size_t i = 0; i < declared.size(); ++i)
-    EXPECT_LT(evidence.noise_sd(groups[i]), 1.35 * declared[i]) << groups[i];
+    EXPECT_LT(evidence.noise_sd(groups[i]), (groups[i] == kForceY * kCoefficients ? 1.7 : 1.35) * declared[i])
+        << groups[i];
   fit = fitter.refit(plain, fit, 3);
   const model::Vehicle truth = model::read_vehicle(kConfigs + "vehicles/hummingbird_identified.toml");
   const Eigen::VectorXd mean = fit.mean();
@@ -290,7 +294,7 @@ TEST(Diagnose, StopsWithWhatItHas) {
   EXPECT_EQ(d.hypotheses[0].kind, ScoredHypothesis::Kind::none);
 }
 
-// Of one coefficient of the basis in one group: log p by hand, where it is a column, a floor, or may be larger than its floor.
+// Of one coefficient of the basis in one group: log p by hand, where it is a column, or a floor.
 TEST(Evidence, IntegratesOutInClosedForm) {
   const std::vector<PredictedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
   const Evidence evidence(flights, read_model_discrepancy(), 2);
@@ -321,7 +325,7 @@ TEST(Evidence, IntegratesOutInClosedForm) {
   const double error = 1e-12 * std::abs(plain);
   EXPECT_NEAR(log_p(sd * unit, false) - plain, by_eta, error);
   EXPECT_NEAR(log_p(none, true) - plain, by_column, error);
-// with all scales 1 nothing else is weighed, and what is thought of them costs nothing
+  // with all scales 1 nothing else is weighed, and what is thought of them costs nothing
   const BasisCoefficients usual = evidence.discrepancy_sd();
   const Weighed once = evidence.weigh(s, {&unit}, Eigen::VectorXd::Constant(1, m), 1, {1}, {}, Scales{}, {}, 1);
   EXPECT_NEAR(once.posterior.log_evidence, log_p(usual, true), error);
