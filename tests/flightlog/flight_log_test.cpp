@@ -7,8 +7,11 @@
 #include <fstream>
 #include <functional>
 #include <numbers>
+#include <random>
 #include <stdexcept>
 
+#include "flightlog/readings.hpp"
+#include "flightlog/some_log.hpp"
 #include "io/files.hpp"
 
 namespace flappy::flightlog {
@@ -364,6 +367,45 @@ TEST_F(FlightLogFolder, RefusesWhatIsNotThere) {
   EXPECT_FALSE(without.power);
   fs::remove(folder_ / "flight.toml");
   EXPECT_EQ(read_message(folder_), (folder_ / "flight.toml").string() + ": cannot be read: No such file or directory");
+}
+
+// Three poses with markers taken for others are left out; a body that is carried elsewhere and stays there is not.
+TEST(Readings, LeaveOutSwappedMarkers) {
+  FlightLog log = test::some_log(4);
+  const std::size_t all = pose_readings(log).size();
+  FlightLog swapped = log;
+  for (const std::size_t i : {100, 101, 300}) {
+    swapped.mocap.qw[i] = 0, swapped.mocap.qx[i] = 1, swapped.mocap.qy[i] = 0, swapped.mocap.qz[i] = 0;
+    swapped.mocap.x_m[i] += 0.01;
+  }
+  EXPECT_EQ(pose_readings(swapped).size(), all - 3);
+  FlightLog carried = log;
+  for (std::size_t i = 400; i < carried.mocap.x_m.size(); ++i) carried.mocap.x_m[i] += 1;
+  EXPECT_EQ(pose_readings(carried).size(), all);
+}
+
+// Times of arrival that jitter by a tenth of a period, with gaps, become those of the clock: of a line through n of them, whose ends err by
+// 2 / sqrt(n) of the jitter. Times of no clock stay as they are.
+TEST(Readings, FindTheClockThatTookTheSamples) {
+  FlightLog log = test::some_log(8);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  const Column clock = log.mocap.t_s;
+  const double period_s = 5e-3, jitter_s = 0.1 * period_s;
+  Column kept, truth;
+  for (std::size_t i = 0; i < clock.size(); ++i) {
+    if (i % 97 < 5) continue;  // lost
+    kept.push_back(clock[i] + jitter_s * std::clamp(normal(random), -3.0, 3.0));
+    truth.push_back(clock[i]);
+  }
+  log.mocap.t_s = kept;
+  const FlightLog found = on_its_clocks(log);
+  ASSERT_EQ(found.mocap.t_s.size(), truth.size());
+  for (std::size_t i = 0; i < truth.size(); ++i)
+    ASSERT_NEAR(found.mocap.t_s[i], truth[i], 5 * jitter_s / std::sqrt(static_cast<double>(truth.size())));
+  for (std::size_t i = 0; i < log.mocap.t_s.size(); ++i)  // a rate that changes by 2 %
+    log.mocap.t_s[i] = truth[i] + 1e-3 * truth[i] * truth[i];
+  EXPECT_EQ(on_its_clocks(log).mocap.t_s, log.mocap.t_s);
 }
 
 }  // namespace

@@ -99,13 +99,18 @@ file(WRITE ${WORK}/bad/mocap.csv "t_s,x_mm,y_m,z_m,qw,qx,qy,qz\n")
 expect_refused("${WORK}/bad/mocap.csv:1: x_mm: unknown column; accepted here with another unit: \"x_m\"" check ${WORK}/bad)
 file(REMOVE ${WORK}/bad/flight.toml)
 expect_refused("${WORK}/bad/flight.toml: cannot be read: No such file or directory" check ${WORK}/bad)
-expect_refused("flappy-gap: A subcommand is required; accepted: check, import, diagnose; see flappy-gap --help")
-expect_refused("flappy-gap: diagnos: no such command; accepted: check, import, diagnose; did you mean \"diagnose\"?; see flappy-gap --help" diagnos)
+expect_refused("flappy-gap: A subcommand is required; accepted: check, import, diagnose, learn-discrepancy; see flappy-gap --help")
+expect_refused("flappy-gap: diagnos: no such command; accepted: check, import, diagnose, learn-discrepancy; did you mean \"diagnose\"?; see flappy-gap --help" diagnos)
 expect_refused("flappy-gap: flight is required; see flappy-gap --help" check)
 set(diagnose diagnose --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --priors ${SOURCE}/configs/gap/priors.toml
   --flights ${WORK}/good)
 expect_refused("--withhold gale: no such effect; accepted: identifiers of docs/effects.md" ${diagnose} --withhold gale)
 expect_refused("${WORK}/good/imu.csv: cannot be written: Not a directory" ${diagnose} --out ${WORK}/good/imu.csv)
+
+set(learn learn-discrepancy --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --out ${WORK}/learnt.toml --robots)
+expect_refused("${WORK}/bad: no flight; accepted: a folder of flight logs" ${learn} ${WORK}/bad)
+expect_refused("${WORK}/good/command.csv:152: the flight lasts 3 s, at least 6 s (60 beats) are needed; accepted: flights that flappy-gap check finds no fault in"
+  ${learn} ${WORK}/good)
 
 # ---- data that forbid a diagnosis are a result; nothing of an earlier one stays beside it
 

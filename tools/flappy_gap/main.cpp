@@ -5,7 +5,7 @@
 #include "flightlog/check/check.hpp"
 #include "flightlog/check/data_faults.hpp"
 #include "gap/diagnose/diagnose_command.hpp"
-#include "gap/evidence/learn_discrepancy.hpp"
+#include "gap/diagnose/learn_command.hpp"
 #include "import_command.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"

@@ -2,22 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
-#include "flappy/vehicle_file.hpp"
-#include "flightlog/check/data_faults.hpp"
-#include "io/config.hpp"
 #include "io/files.hpp"
-#include "io/parallel.hpp"
-#include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/statistics.hpp"
-#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 namespace {
 
-namespace fs = std::filesystem;
 using Eigen::Index;
 
 constexpr int kIterations = 16;
@@ -131,18 +123,6 @@ void take(const Shares& shares, const std::map<std::string, Moment>& sizes, Mode
   for (const auto& [effect, m] : sizes) d.background[effect] = std::max(m.root(), kLeastSize);
 }
 
-/// Flights below a folder; the folder itself where it is one.
-std::vector<fs::path> flights_of(const fs::path& robot) {
-  if (fs::exists(robot / "flight.toml")) return {robot};
-  std::vector<fs::path> flights;
-  std::error_code error;
-  for (const fs::directory_entry& e : fs::directory_iterator(robot, error))
-    if (fs::exists(e.path() / "flight.toml")) flights.push_back(e.path());
-  std::ranges::sort(flights);
-  if (flights.empty()) throw io::InputError(robot.string() + ": no flight; accepted: a folder of flight logs");
-  return flights;
-}
-
 }  // namespace
 
 ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>& robots,
@@ -166,32 +146,6 @@ ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>&
     take(shares, sizes, now);
   }
   return now;
-}
-
-void run_learn_discrepancy(const LearnCommand& command) {
-  io::check_output(command.out);
-  const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kPredictionStep_s);
-  const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors).root());
-  const ModelDiscrepancy start = read_model_discrepancy(command.discrepancy);
-  std::vector<std::vector<PredictedFlight>> flights;
-  for (const std::string& robot : command.robots) {
-    flights.emplace_back();
-    for (const fs::path& folder : flights_of(robot)) {
-      flightlog::FlightLog log = flightlog::read_flight_log(folder);
-      if (const auto faults = data_faults(log, folder); !faults.empty())
-        throw io::InputError(faults.front().file + ":" + std::to_string(faults.front().line) + ": " +
-                             faults.front().what + "; accepted: flights that flappy-gap check finds no fault in");
-      flights.back().emplace_back(Recording(folder, std::move(log), vehicle));
-    }
-  }
-  std::vector<std::unique_ptr<RobotFit>> robots;
-  for (const std::vector<PredictedFlight>& f : flights)
-    robots.push_back(std::make_unique<RobotFit>(f, uncertain, start, std::vector<std::string>(), command.threads));
-  io::stop_on_interrupt();
-  const ModelDiscrepancy learnt = learn_discrepancy(robots, start);
-  io::write_atomically(command.out,
-                       discrepancy_text(learnt, std::to_string(robots.size()) + " robots, commit " + io::commit()));
-  std::printf("%s: learnt from %zu robots\n", command.out.c_str(), robots.size());
 }
 
 }  // namespace flappy::gap

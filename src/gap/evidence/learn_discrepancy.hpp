@@ -14,12 +14,4 @@ namespace flappy::gap {
 /// what is found is taken towards that of like channels and entries, for single ones hold few coefficients.
 ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDiscrepancy& start);
 
-struct LearnCommand {
-  std::string vehicle, priors, discrepancy, out;
-  std::vector<std::string> robots;  ///< folders, each with the flights of one robot
-  int threads = 0;
-};
-/// flappy-gap learn-discrepancy.
-void run_learn_discrepancy(const LearnCommand& command);
-
 }  // namespace flappy::gap

@@ -259,10 +259,10 @@ TEST(Report, JsonTellsNoGapByNull) {
                         static_cast<double>(i), 1, 0.01, i != 29});
   nlohmann::ordered_json j = diagnosis_json(r);
   EXPECT_EQ(j["data_faults"].dump(), R"([{"file":"imu.csv","line":3,"what":"degrees"}])");
-  EXPECT_EQ(j["verdict"].dump(), R"({"kind":"data","effects":[],"probability":1.0})");
+  EXPECT_EQ(j["verdict"].dump(), R"({"kind":"data","effects":[],"remainder":false,"probability":1.0})");
   EXPECT_EQ(
       j["candidates"].dump(),
-      R"([{"effects":["wind"],"group":"world_force","probability":0.0,"parameters":{"wind.x_m_s":{"value":0.3,"low":0.1,"high":0.5,"unit":"m/s"}},"closure":null}])");
+      R"([{"effects":["wind"],"group":"world_force","remainder":false,"probability":0.0,"log_evidence":0.0,"parameters":{"wind.x_m_s":{"value":0.3,"low":0.1,"high":0.5,"unit":"m/s"}},"closure":null}])");
   EXPECT_TRUE(j["gap"]["nominal"].is_null());
   EXPECT_EQ(j["gap"]["refit"], 0.6);
   EXPECT_TRUE(j["gap"]["closure_low"].is_null());
