@@ -6,7 +6,6 @@
 #include "io/statistics.hpp"
 
 namespace flappy::flightlog {
-
 namespace {
 
 /// No flapper turns or travels so far between two poses: markers were taken for others. They are so for some poses at most.
@@ -33,10 +32,6 @@ std::vector<PoseReading> without_swaps(const std::vector<PoseReading>& poses) {
   }
   return kept;
 }
-
-}  // namespace
-
-namespace {
 
 /// Fewer samples say nothing of a clock. Of a period: how far a sample may come from its instant, and the mean of a block, which wanders
 /// where the clock is none.

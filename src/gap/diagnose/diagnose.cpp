@@ -44,10 +44,10 @@ class Diagnoser {
     around_ = row_context_of(flights_, noise_sd());
     loss_ = losses_of(around_, parameters_.point.residual);
     d.hypotheses.push_back(weigh(ScoredHypothesis::Kind::none, plain, robot_.nominal(), std::log(rule_.prior.none)));
-    plain_ = robot_.weigh(plain, parameters_.point).posterior.log_evidence;
     d.hypotheses.push_back(
         weigh(ScoredHypothesis::Kind::parameters, plain, parameters_.point, std::log(rule_.prior.parameters)));
     const double parameters = d.hypotheses[1].log_evidence;
+    plain_ = parameters - d.hypotheses[1].log_prior;
     d.hypotheses.push_back(explain_freely(plain, parameters_.point, std::log(rule_.prior.unknown)));
 
     std::vector<ScoredHypothesis> singles;

@@ -30,7 +30,7 @@ void RobotFit::fit_parameters() {
 }
 
 void RobotFit::refit_beside_background() {
-  find_sizes(withheld_);
+  find_sizes();
   find_nuisances();
   std::vector<BasisCoefficients> background;
   for (const auto* list : {&sizes_, &shapes_})
@@ -60,8 +60,8 @@ BasisCoefficients RobotFit::change(Residuals there, double steps) const {
   return evidence_.basis_coefficients(there);
 }
 
-void RobotFit::find_sizes(const std::vector<std::string>& withheld) {
-  std::vector<SizeStep> steps = size_steps(uncertain_, parameters_.point.at, withheld);
+void RobotFit::find_sizes() {
+  std::vector<SizeStep> steps = size_steps(uncertain_, parameters_.point.at, withheld_);
   std::vector<Candidate> candidates;
   for (SizeStep& s : steps) {
     candidates.push_back(std::move(s.candidate));

@@ -36,7 +36,7 @@ class RobotFit {
 
  private:
   void learn_scales();
-  void find_sizes(const std::vector<std::string>& withheld);
+  void find_sizes();
   void find_nuisances();
   BasisCoefficients change(Residuals there, double steps) const;
 

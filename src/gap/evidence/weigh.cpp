@@ -156,40 +156,37 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
       if (counts[b] > 0) thought += now.free[b] ? -*freeing_nats : log_prior(now.blocks[b], now.robot, nu);
     w.posterior.log_evidence += thought;
     const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
-
-    // expected squares of delta, in units of D
-    std::vector<VectorXd> squares(seen.size());
-    const MatrixXd spread = w.posterior.covariance.llt().matrixL();
-    io::parallel_for(seen.size(), threads_, [&](std::size_t n) {
-      const Half& h = halves[n];
-      const VectorXd z = h.llt.matrixU().solve(h.half.col(k) - h.half.leftCols(k) * w.posterior.mean);
-      const MatrixXd inverse = h.llt.matrixU().solve(MatrixXd::Identity(q, q));
-      const MatrixXd moved = h.llt.matrixU().solve(h.half.leftCols(k) * spread);
-      squares[n].resize(q);
-      for (Index i = 0; i < q; ++i) {
-        const double d = h.sd[i], shared = d > 0 ? 1 - std::pow(h.own[i] / d, 2) : 0;  // of the discrepancy's own
-        const double square = d * d * (z[i] * z[i] + inverse.row(i).squaredNorm() + moved.row(i).squaredNorm());
-        const double own = shared * shared * square + shared * h.own[i] * h.own[i];
-        squares[n][i] = sums[n].base[i] > 0 ? own / (sums[n].base[i] * sums[n].base[i]) : 0;
-        w.delta(seen[n], i) = z[i];
-        w.squares(seen[n], i) = squares[n][i];
-      }
-    });
-    const VectorXd w_mean = w.posterior.mean, w_variance = w.posterior.covariance.diagonal();
     if (!(gain > 0)) {  // too far: from the best on, by a step that cannot fail
       if (stride == 1) break;
       stride = 1;
       now = strided(best.scales, next, stride);
       continue;
     }
+
+    // expected squares of delta, in units of D
+    const MatrixXd spread = w.posterior.covariance.llt().matrixL();
+    io::parallel_for(seen.size(), threads_, [&](std::size_t n) {
+      const Half& h = halves[n];
+      const VectorXd z = h.llt.matrixU().solve(h.half.col(k) - h.half.leftCols(k) * w.posterior.mean);
+      const MatrixXd inverse = h.llt.matrixU().solve(MatrixXd::Identity(q, q));
+      const MatrixXd moved = h.llt.matrixU().solve(h.half.leftCols(k) * spread);
+      for (Index i = 0; i < q; ++i) {
+        const double d = h.sd[i], shared = d > 0 ? 1 - std::pow(h.own[i] / d, 2) : 0;  // of the discrepancy's own
+        const double square = d * d * (z[i] * z[i] + inverse.row(i).squaredNorm() + moved.row(i).squaredNorm());
+        const double own = shared * shared * square + shared * h.own[i] * h.own[i];
+        w.delta(seen[n], i) = z[i];
+        w.squares(seen[n], i) = sums[n].base[i] > 0 ? own / (sums[n].base[i] * sums[n].base[i]) : 0;
+      }
+    });
+    const VectorXd w_mean = w.posterior.mean, w_variance = w.posterior.covariance.diagonal();
     best = std::move(w);
     if (gain < kSettled) break;
     stride = std::min(kLongest, kLonger * stride);
     next = best.scales;
     std::vector<double> total(kBlocks, 0);
-    for (std::size_t n = 0; n < seen.size(); ++n)
+    for (const int g : seen)
       for (Index i = 0; i < q; ++i)
-        total[static_cast<std::size_t>(block_of(seen[n], basis_.kind(static_cast<int>(i))))] += squares[n][i];
+        total[static_cast<std::size_t>(block_of(g, basis_.kind(static_cast<int>(i))))] += best.squares(g, i);
     double blocks = 0, inverses = 0, scaled = 0;
     for (Index i = first_scaled; i < k; ++i)
       scaled += (w_mean[i] * w_mean[i] + w_variance[i]) * next.robot * next.robot;
