@@ -5,9 +5,10 @@ A file of src/blind/b or src/blind/c may include its own family, blind/family.hp
 standard library.
 """
 import re
-import sys
 import tempfile
 from pathlib import Path
+
+from self_test import misjudged, run
 
 FAMILIES = ("b", "c")
 SHARED = {"blind/family.hpp", "flightlog/flight_log.hpp"}
@@ -71,16 +72,8 @@ def self_test():
         ({"src/blind/b/x.inc": ""}, "made of .hpp and .cpp"),
         ({"src/blind/b/deep/x.hpp": "#include <Random123/philox.h>\n"}, "Random123/philox.h"),
     ]
-    for extra, expected in cases:
-        with tempfile.TemporaryDirectory() as folder:
-            for name, text in {**good, **extra}.items():
-                path = Path(folder, name)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(text, encoding="utf-8")
-            found = faults(Path(folder))
-        right = found == [] if expected is None else len(found) == 1 and expected in found[0]
-        if not right:
-            return [f"self-test: {extra} gave {found}, not {expected}"]
+    if wrong := misjudged(faults, good, cases):
+        return wrong
     with tempfile.TemporaryDirectory() as folder:
         if len(faults(Path(folder))) != 1:
             return ["self-test: a tree without families has no fault"]
@@ -88,6 +81,4 @@ def self_test():
 
 
 if __name__ == "__main__":
-    problems = self_test() if sys.argv[1:] == ["--self-test"] else faults(Path(sys.argv[1]))
-    print("\n".join(problems) or "no fault")
-    sys.exit(1 if problems else 0)
+    run(faults, self_test)

@@ -5,9 +5,9 @@ A quoted or angled include that begins with a room or with flappy/ is one arrow 
 another room brings in are its own affair.
 """
 import re
-import sys
-import tempfile
 from pathlib import Path, PurePosixPath
+
+from self_test import misjudged, run
 
 BASE = {"io", "model", "sim"}
 FLIGHT = BASE | {"policy", "flight"}
@@ -177,20 +177,8 @@ def self_test():
         ({"include/flappy/world.hpp": "#include <Eigen/Core>\n"}, "standard library only"),
         ({"include/flappy/world.hpp": '#include "sim/b.hpp"\n'}, "standard library only"),
     ]
-    for extra, expected in cases:
-        with tempfile.TemporaryDirectory() as folder:
-            for name, text in {**good, **extra}.items():
-                path = Path(folder, name)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(text, encoding="utf-8")
-            found = faults(Path(folder))
-        right = found == [] if expected is None else len(found) == 1 and expected in found[0]
-        if not right:
-            return [f"self-test: {extra} gave {found}, not {expected}"]
-    return []
+    return misjudged(faults, good, cases)
 
 
 if __name__ == "__main__":
-    problems = self_test() if sys.argv[1:] == ["--self-test"] else faults(Path(sys.argv[1]))
-    print("\n".join(problems) or "no fault")
-    sys.exit(1 if problems else 0)
+    run(faults, self_test)
