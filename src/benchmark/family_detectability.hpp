@@ -28,7 +28,7 @@
 
 namespace flappy::benchmark {
 
-inline constexpr double kShare = 0.015, kFigures = 0.1, kConstant = 0.05, kLate_s = 5e-4;
+inline constexpr double kShare = 0.03, kFigures = 0.1, kConstant = 0.3, kLate_s = 5e-4;
 
 /// A flight by beats: [beat][channel x 5 + coefficient], as Contrast has it; nothing where a beat lacks samples.
 using Beats = std::vector<std::optional<std::array<double, 30>>>;

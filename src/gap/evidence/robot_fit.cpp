@@ -66,20 +66,29 @@ void RobotFit::find_sizes() {
   for (SizeStep& s : steps) {
     candidates.push_back(std::move(s.candidate));
     for (Candidate& c : s.shaped) candidates.push_back(std::move(c));
+    for (Candidate& c : s.further) candidates.push_back(std::move(c));
   }
   std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
-  std::vector<BasisCoefficients> changes(rows.size());
+  std::vector<BasisCoefficients> changes(rows.size());  // of all that there is
   io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
-    if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), kSizeReach);
+    if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), 1);
   });
   sizes_.clear();
   shapes_.clear();
   std::size_t i = 0;
   for (const SizeStep& s : steps) {
-    const BasisCoefficients own = changes[i++];
-    if (own.size() > 0) sizes_.push_back({s.effect, s.unknown, own});
-    for (std::size_t k = 0; k < s.shaped.size(); ++k, ++i)
-      if (own.size() > 0 && changes[i].size() > 0) shapes_.push_back({s.effect, s.unknown, changes[i] - own});
+    std::vector<BasisCoefficients> along = {changes[i++]};
+    const std::size_t shapes = i;
+    i += s.shaped.size();
+    for (std::size_t n = 0; n < s.further.size(); ++n) along.push_back(changes[i++]);
+    if (along[0].size() == 0) continue;
+    sizes_.push_back({s.effect, s.unknown, along[0] / kSizeReach, {}});
+    for (std::size_t k = shapes; k < shapes + s.shaped.size(); ++k)
+      if (changes[k].size() > 0) shapes_.push_back({s.effect, s.unknown, (changes[k] - along[0]) / kSizeReach, {}});
+    for (std::size_t n = 1; n + 1 < along.size() && along[n].size() > 0 && along[n + 1].size() > 0; ++n) {
+      const double at = kSizeReach * static_cast<double>(n + 1);
+      sizes_.back().large.push_back({at, along[n] / at, (along[n + 1] - along[n - 1]) / (2 * kSizeReach)});
+    }
   }
 }
 

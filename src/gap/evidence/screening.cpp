@@ -24,35 +24,79 @@ class Screening {
       : columns_(columns) {
     Columns c = fitter.columns_of(fit.point);
     base_ = c.chosen;
-    for (const SizeColumn& column : columns) c.add(column.change, 0);
+    for (const SizeColumn& column : columns) {
+      at_.push_back(static_cast<int>(c.columns.size()));
+      c.add(column.change, 0);
+      for (const SizeColumn::Large& large : column.large) {
+        c.add(large.chord, 0);
+        c.add(large.change, -large.at);
+      }
+    }
     reduced_ = evidence.reduce(fit.point.statistics, c.columns, fitter.all_flights(), evidence.discrepancy_sd());
     mean_ = c.mean();
-    without_ = solve({}).log_evidence;
+    without_ = Evidence::posterior(reduced_, base_, mean_(base_)).log_evidence;
   }
 
+  /// The best of all places from which on it may be linear.
   Screened of(const std::string& effect) const {
-    const std::vector<Unknown> unknowns = unknowns_of(effect);
-    std::vector<std::size_t> own;
+    std::vector<Size> own;
     for (std::size_t i = 0; i < columns_.size(); ++i)
-      if (columns_[i].effect == effect) own.push_back(i);
-    const auto one_sided = [&](std::size_t i) {
-      return unknowns[static_cast<std::size_t>(columns_[i].unknown)].low >= 0;
+      if (columns_[i].effect == effect) own.push_back({i, at_[i], 0});
+    Screened best = around(effect, own, reduced_);
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      const std::vector<SizeColumn::Large>& large = columns_[own[k].column].large;
+      for (std::size_t n = 0; n < large.size(); ++n) {
+        std::vector<Size> there = own;
+        const int chord = own[k].at + 1 + 2 * static_cast<int>(n);
+        there[k].at = chord + 1;
+        there[k].from = large[n].at;
+        Screened s = around(effect, there, less(chord, large[n].at));
+        if (s.gain > best.gain) best = std::move(s);
+      }
+    }
+    return best;
+  }
+
+ private:
+  struct Size {
+    std::size_t column;
+    int at;       ///< in the reduced sums
+    double from;  ///< coordinate around which it is linear
+  };
+
+  /// The residual without so much of a column.
+  Reduced less(int column, double much) const {
+    Reduced r = reduced_;
+    const Index last = r.sums.rows() - 1;
+    r.sums(last, last) += much * (much * r.sums(column, column) - 2 * r.sums(column, last));
+    r.sums.col(last).head(last) -= much * r.sums.col(column).head(last);
+    r.sums.row(last).head(last) = r.sums.col(last).head(last).transpose();
+    return r;
+  }
+
+  Screened around(const std::string& effect, std::vector<Size> own, const Reduced& reduced) const {
+    const std::vector<Unknown> unknowns = unknowns_of(effect);
+    const auto one_sided = [&](const Size& s) {
+      return unknowns[static_cast<std::size_t>(columns_[s.column].unknown)].low >= 0;
     };
     Screened s{effect, 0, VectorXd::Zero(static_cast<Index>(unknowns.size()))};
     for (bool whole = true; !own.empty(); whole = false) {
-      const Posterior p = solve(own);
+      std::vector<int> chosen = base_;
+      for (const Size& size : own) chosen.push_back(size.at);
+      const Posterior p = Evidence::posterior(reduced, chosen, mean_(chosen));
       const auto at = [&](std::size_t k) { return static_cast<Index>(base_.size() + k); };
+      const auto coordinate = [&](std::size_t k) { return own[k].from + p.mean[at(k)]; };
       if (whole) {
         s.gain = p.log_evidence - without_;
         for (std::size_t k = 0; k < own.size(); ++k)
-          if (one_sided(own[k])) s.gain += log_twice_positive(p.mean[at(k)], std::sqrt(p.covariance(at(k), at(k))));
+          if (one_sided(own[k])) s.gain += log_twice_positive(coordinate(k), std::sqrt(p.covariance(at(k), at(k))));
       }
       // of sizes with one sign, the one that comes out farthest on the other is none
       std::size_t worst = own.size();
       for (std::size_t k = 0; k < own.size(); ++k)
-        if (one_sided(own[k]) && p.mean[at(k)] < (worst == own.size() ? 0 : p.mean[at(worst)])) worst = k;
+        if (one_sided(own[k]) && coordinate(k) < (worst == own.size() ? 0 : coordinate(worst))) worst = k;
       if (worst == own.size()) {
-        for (std::size_t k = 0; k < own.size(); ++k) s.coordinates[columns_[own[k]].unknown] = p.mean[at(k)];
+        for (std::size_t k = 0; k < own.size(); ++k) s.coordinates[columns_[own[k].column].unknown] = coordinate(k);
         break;
       }
       own.erase(own.begin() + static_cast<std::ptrdiff_t>(worst));
@@ -60,15 +104,8 @@ class Screening {
     return s;
   }
 
- private:
-  Posterior solve(const std::vector<std::size_t>& own) const {
-    std::vector<int> chosen = base_;
-    for (const std::size_t i : own) chosen.push_back(static_cast<int>(base_.size() + i));
-    return Evidence::posterior(reduced_, chosen, mean_(chosen));
-  }
-
   const std::vector<SizeColumn>& columns_;
-  std::vector<int> base_;
+  std::vector<int> base_, at_;  ///< in the reduced sums: what stands beside every effect; each size
   Reduced reduced_;
   VectorXd mean_;
   double without_ = 0;
@@ -90,7 +127,13 @@ std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Vect
       if (!h.unknowns()[static_cast<std::size_t>(i)].size) continue;
       VectorXd there = here;
       there[i] = kSizeReach;
-      steps.push_back({id, i - first, h.candidate(there), {}});
+      steps.push_back({id, i - first, h.candidate(there), {}, {}});
+      for (std::size_t n = 2; n <= kFurthest && h.unknowns()[static_cast<std::size_t>(i)].low >= 0; ++n) {
+        there[i] = kSizeReach * static_cast<double>(n);
+        if (h.bounded(there)[i] != there[i]) break;
+        steps.back().further.push_back(h.candidate(there));
+      }
+      there[i] = kSizeReach;
       for (Index shape = first; shape < h.size(); ++shape) {
         if (h.unknowns()[static_cast<std::size_t>(shape)].size) continue;
         VectorXd other = there;

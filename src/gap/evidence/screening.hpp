@@ -10,19 +10,27 @@ struct SizeStep {
   std::string effect;
   Eigen::Index unknown;  ///< of the effect's
   Candidate candidate;
-  std::vector<Candidate> shaped;  ///< the same with each of its shapes a standard deviation away
+  std::vector<Candidate> shaped;   ///< the same with each of its shapes a standard deviation away
+  std::vector<Candidate> further;  ///< of a size of one sign: two steps away, three, .. kFurthest
 };
+inline constexpr std::size_t kFurthest = 5;
 inline constexpr double kSizeReach = 0.4;
 
 /// Of every entry of the catalogue but `withheld`, at the given coordinates of the parameters; shapes are in the middle.
 std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
                                  const std::vector<std::string>& withheld);
 
-/// What a size changes for a unit of its coordinate.
+/// What a size changes for a unit of its coordinate, near 0; and where it is large, as a delay of a third of a beat turns what a smaller
+/// one does into something else.
 struct SizeColumn {
   std::string effect;
   Eigen::Index unknown;
   BasisCoefficients change;
+  struct Large {
+    double at;                        ///< coordinate
+    BasisCoefficients chord, change;  ///< on the way there, and there
+  };
+  std::vector<Large> large;
 };
 
 struct Screened {

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <random>
 
+#include "gap/evidence/robot_fit.hpp"
 #include "gap/replay/sensor_correction.hpp"
 #include "io/config.hpp"
 #include "model/effects/registry.hpp"
@@ -292,6 +293,21 @@ TEST(Diagnose, StopsWithWhatItHas) {
   }
   EXPECT_NEAR(sum, 1, 1e-12);
   EXPECT_EQ(d.hypotheses[0].kind, ScoredHypothesis::Kind::none);
+}
+
+// A third of a beat and more: near 0 its derivative shows nothing of it.
+TEST(Screening, FindsALongDelay) {
+  const std::vector<PredictedFlight> flights =
+      flown("hummingbird_nominal", {"vehicle.effects.command_delay.delay_s=0.013", "flight.duration_s=5"});
+  const sim::Randomisation prior = uncertain();
+  RobotFit robot(flights, prior, read_model_discrepancy(), {}, 2);
+  robot.fit_parameters();
+  robot.refit_beside_background();
+  const Screened first = screen(robot.evidence(), robot.fitter(), robot.parameters(), robot.sizes()).front();
+  EXPECT_EQ(first.effect, "command_delay");
+  EXPECT_GT(first.gain, 50);
+  const Unknown delay = unknowns_of("command_delay").front();
+  EXPECT_NEAR(delay.value(first.coordinates[0]), 0.013, 0.002) << "steps are 0.0036 s";
 }
 
 // Of one coefficient of the basis in one group: log p by hand, where it is a column, or a floor.
