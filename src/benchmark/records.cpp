@@ -129,7 +129,13 @@ Label label_from(const Json& json) {
 }
 
 Json to_json(const Prediction& p) {
-  Json sets = Json::array(), baselines = Json::object();
+  Json sets = Json::array(), weights = Json::array(), baselines = Json::object();
+  for (const Weight& w : p.weights)
+    weights.push_back({{"kind", w.kind},
+                       {"effects", w.effects},
+                       {"remainder", w.remainder},
+                       {"log_evidence", w.log_evidence},
+                       {"log_prior", w.log_prior}});
   for (const FittedSet& s : p.sets) {
     Json values = Json::object();
     for (const auto& [name, e] : s.values) values[name] = {{"value", e.value}, {"low", e.low}, {"high", e.high}};
@@ -145,6 +151,7 @@ Json to_json(const Prediction& p) {
           {"none", p.none},
           {"parameters", p.parameters},
           {"unknown", p.unknown},
+          {"weights", weights},
           {"gap", {{"nominal", optional(p.nominal)}, {"refit", optional(p.refit)}, {"noise_floor", optional(p.floor)}}},
           {"next", p.next},
           {"where", p.where ? Json{{"channel", p.where->channel}, {"regime", p.where->regime}} : Json(nullptr)},
@@ -168,6 +175,9 @@ Prediction prediction_from(const Json& json) {
   p.none = json.at("none");
   p.parameters = json.at("parameters");
   p.unknown = json.at("unknown");
+  for (const Json& w : json.at("weights"))
+    p.weights.push_back(
+        {w.at("kind"), w.at("effects").get<Names>(), w.at("remainder"), w.at("log_evidence"), w.at("log_prior")});
   const Json& gap = json.at("gap");
   p.nominal = optional_from(gap.at("nominal"));
   p.refit = optional_from(gap.at("refit"));

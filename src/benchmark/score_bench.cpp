@@ -76,7 +76,8 @@ class Predictions {
   Json read(std::size_t number) const { return read_json(file_of(number)); }
 
   Question question(const PublicCase& c, const std::vector<std::string>& withheld) const {
-    return {c.flights(folder_), vehicle_, command_.priors, command_.discrepancy, withheld, true, command_.experiments};
+    return {c.flights(folder_), vehicle_, command_.priors,     command_.discrepancy, command_.verdict,
+            withheld,           true,     command_.experiments};
   }
 
  private:

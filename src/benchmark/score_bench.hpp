@@ -16,7 +16,8 @@ struct ScoreCommand {
   std::filesystem::path vehicle;  ///< empty for the manifest's
   std::filesystem::path out;      ///< for score.md and score.csv; empty for the first folder
   std::filesystem::path priors = io::config_path("gap/priors.toml"),
-                        discrepancy = io::config_path("gap/model_discrepancy.toml");
+                        discrepancy = io::config_path("gap/model_discrepancy.toml"),
+                        verdict = io::config_path("gap/verdict.toml");
   std::filesystem::path experiments = io::config_path("gap/experiments");  ///< for the prediction
   int threads = 0;  ///< cases at a time; 0: one for each processor
   io::Ranks* ranks = nullptr;

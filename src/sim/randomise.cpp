@@ -28,6 +28,12 @@ Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : 
   for (const io::Table& table : config.tables("randomise")) {
     draws_.push_back(read_draw(table, parameters));
     check_reach(table, draws_.back(), parameters, reach);
+    if (draws_.back().minor) {
+      minors_.push_back(0);
+      continue;
+    }
+    if (++majors_ < draws_.size())
+      table.fail("minor", "a draw before this one is minor", "minor draws behind all others");
     check_bodies(table, draws_.back());
   }
 }
@@ -81,6 +87,7 @@ Randomisation::Draw Randomisation::read_draw(const io::Table& table, const std::
     draw.b = table.number("sd", io::non_negative());
     draw.cut_sd = table.number_or("cut_sd", 3, {1, 8});
   }
+  draw.minor = table.boolean_or("minor", false);
   return draw;
 }
 
@@ -144,6 +151,7 @@ model::Vehicle Randomisation::sample(RandomKey key) const {
   const std::vector<model::Parameter> parameters = model::parameters(vehicle);
   std::uint32_t base = 0;
   for (const Draw& draw : draws_) {
+    if (draw.minor) break;
     double variate = 0;
     if (draw.law == Law::scale_uniform || draw.law == Law::replace_uniform) {
       variate = 2 * uniform_pair(key, base).first - 1;
@@ -176,6 +184,16 @@ model::Vehicle Randomisation::from_posterior(std::vector<double> variates) const
   return vehicle;
 }
 
+void Randomisation::set_minors(const std::vector<double>& variates) {
+  const std::vector<double> middle(majors(), 0);
+  minors_.assign(variates.size(), 0);
+  for (std::size_t k = 0; k < variates.size(); ++k) {
+    minors_[k] = variates[k];
+    for (int tries = 0; tries < 10 && model::physical_fault(at(middle)); ++tries) minors_[k] *= 0.5;
+    if (model::physical_fault(at(middle))) minors_[k] = 0;
+  }
+}
+
 bool Randomisation::is_uniform(std::size_t draw) const {
   if (!posterior_.empty()) return false;
   return draws_[draw].law == Law::scale_uniform || draws_[draw].law == Law::replace_uniform;
@@ -194,9 +212,10 @@ model::Vehicle Randomisation::at(const std::vector<double>& variates) const {
   for (std::size_t d = 0; d < draws_.size(); ++d) {
     Draw draw = draws_[d];
     if (draw.law == Law::scale_half_normal) draw.law = Law::scale_normal;
+    const double variate = d < variates.size() ? variates[d] : minors_[d - majors_];
     for (const std::size_t i : draw.parameters)
       *parameters[i].value =
-          std::clamp(apply(draw, *parameters[i].value, variates[d]), parameters[i].low, parameters[i].high);
+          std::clamp(apply(draw, *parameters[i].value, variate), parameters[i].low, parameters[i].high);
   }
   return vehicle;
 }

@@ -5,9 +5,12 @@
 //   law = "scale_normal"
 //   sd = 0.10
 //   cut_sd = 3.0                                            # draws farther out are drawn again
+//   minor = true                                            # changes little: who fits a vehicle takes it as linear
 //
 // With n a normal draw and u a uniform one: scale_normal x (1 + sd n), scale_half_normal x (1 + |sd n|),
 // replace_normal mean + sd n, add_normal + sd n, scale_uniform x u, replace_uniform u in [low, high].
+//
+// Minor draws stand behind all others. No vehicle is drawn by them, and a body may become one that no body is, on one side.
 //
 // Or the posterior of a vehicle file: its parameters are drawn together from one normal distribution, whatever their
 // nominal figures, and kept within their accepted ranges.
@@ -39,10 +42,15 @@ class Randomisation {
 
   /// Draws of the table; each has one variate, standard normal or uniform in [-1, 1].
   std::size_t draws() const { return draws_.size() + posterior_.size(); }
+  /// Those before the minor ones.
+  std::size_t majors() const { return majors_ + posterior_.size(); }
+  /// Minor variates of `at` where none are given; one that makes a body none is drawn in.
+  void set_minors(const std::vector<double>& variates);
+  const std::vector<double>& minors() const { return minors_; }
   bool is_uniform(std::size_t draw) const;
   /// Path of its first parameter.
   std::string name(std::size_t draw) const;
-  /// The vehicle of given variates, one for each draw; a half-normal law takes the sign of its own.
+  /// The vehicle of given variates, one for each draw, or each but the minor ones; a half-normal law takes the sign of its own.
   model::Vehicle at(const std::vector<double>& variates) const;
 
  private:
@@ -52,6 +60,7 @@ class Randomisation {
     Law law;
     double a, b;  // mean and sd, or low and high
     double cut_sd;
+    bool minor;
   };
   struct Reach {
     double low, high;
@@ -72,6 +81,8 @@ class Randomisation {
 
   model::Vehicle nominal_;
   std::vector<Draw> draws_;
+  std::size_t majors_ = 0;
+  std::vector<double> minors_;
   std::vector<Uncertain> posterior_;  // one or the other
 };
 

@@ -3,13 +3,16 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cmath>
 #include <filesystem>
 #include <set>
 
+#include "benchmark/calibrate.hpp"
 #include "benchmark/families.hpp"
 #include "benchmark/make.hpp"
 #include "benchmark/records.hpp"
 #include "benchmark/score_bench.hpp"
+#include "gap/diagnose/verdict_rule.hpp"
 #include "io/files.hpp"
 #include "io/sha256.hpp"
 #include "model/effects/registry.hpp"
@@ -148,6 +151,34 @@ TEST_F(Benchmark, PredictsSealsAndScores) {
   EXPECT_EQ(io::read_text(bench / "manifest.json"), manifest);
   EXPECT_EQ(test::refusal([&] { make(1); }),
             bench.string() + ": begun with another plan; accepted: the same options, or a name for a new folder");
+}
+
+// Of two robots, each of which is said to have ground effect by 40 nats and ceiling effect by 30, one has the one and one the other: ten
+// nats are worth next to nothing.
+TEST_F(Benchmark, LearnsWhatANatIsWorth) {
+  ASSERT_TRUE(make(2));
+  CalibrateCommand calibrated{.folders = {root_ / "bench"}, .out = root_ / "verdict.toml"};
+  EXPECT_TRUE(test::refusal([&] {
+                calibrate(calibrated);
+              }).ends_with("was not scored; accepted: folders of flappy-blind score"));
+  ScoreCommand c = command();
+  c.predictor = [](const Question&) {
+    Prediction p;
+    p.weights = {{"parameters", {}, false, std::log(0.4), std::log(0.4)},
+                 {"effect", {"ground_effect"}, false, 40 + std::log(0.3), std::log(0.3)},
+                 {"effect", {"ceiling_effect"}, false, 30 + std::log(0.3), std::log(0.3)}};
+    return p;
+  };
+  score_bench(c);
+  const nlohmann::ordered_json json = calibrate(calibrated);
+  EXPECT_EQ(json.at("cases"), 2);
+  const gap::VerdictRule before = gap::read_verdict_rule(), after = gap::read_verdict_rule(calibrated.out);
+  EXPECT_GT(after.doubt.nats, 2 * before.doubt.nats);
+  EXPECT_EQ(after.gain.of_models, before.gain.of_models);
+  EXPECT_EQ(after.naming.of_all, before.naming.of_all) << "what is not learnt stays";
+  // nearly one half each, which is the best that can be said of both
+  EXPECT_LT(json.at("score_before").get<double>(), json.at("score").get<double>() - 0.1);
+  EXPECT_GT(json.at("score").get<double>(), std::log(0.4));
 }
 
 TEST_F(Benchmark, OpensLabelsOnceAllPredictionsAreSealed) {

@@ -335,6 +335,27 @@ TEST(RandomisationTable, RefusesWhatItCannotDraw) {
             "r.toml:1:1: randomise[0].parameters: is missing; accepted: an array of strings");
 }
 
+// They are there for whoever fits a vehicle.
+TEST(RandomisationTable, MinorDrawsAreMovedAndNeverDrawn) {
+  const std::string minor = "law = \"scale_normal\"\nsd = 0.1\nminor = true",
+                    major = table("\"torso.mass_kg\"", "law = \"scale_normal\"\nsd = 0.1");
+  // flat wings: their largest moment is the sum of the others, and none smaller
+  const std::string flat = table("\"left.wing.inertia_kg_m2.yy\"", minor);
+  Randomisation r = randomisation(major + flat);
+  EXPECT_EQ(r.draws(), 2u);
+  EXPECT_EQ(r.majors(), 1u);
+  const double inertia = r.nominal().left.wing.inertia_kg_m2.yy;
+  EXPECT_EQ(r.sample({.seed = 5, .flapper = 1}).left.wing.inertia_kg_m2.yy, inertia);
+  EXPECT_DOUBLE_EQ(r.at({0, 1}).left.wing.inertia_kg_m2.yy, 1.1 * inertia);
+  EXPECT_DOUBLE_EQ(r.at({1}).torso.mass_kg, 1.1 * r.nominal().torso.mass_kg);
+  r.set_minors({2});
+  EXPECT_DOUBLE_EQ(r.at({0}).left.wing.inertia_kg_m2.yy, 1.2 * inertia);
+  r.set_minors({-2});
+  EXPECT_GT(r.at({0}).left.wing.inertia_kg_m2.yy, 0.99 * inertia) << "drawn in until the body is one";
+  EXPECT_EQ(message(table("\"left.wing.inertia_kg_m2.yy\"", minor) + major),
+            "r.toml:6:1: randomise[1].minor: a draw before this one is minor; accepted: minor draws behind all others");
+}
+
 TEST(RandomisationTable, RefusesLawsThatDoNotExistOrFit) {
   EXPECT_EQ(mass("law = \"scale_norml\"\nsd = 0.1"),
             "r.toml:3:7: randomise[0].law: \"scale_norml\" is not known; accepted: \"scale_normal\", "
@@ -350,9 +371,9 @@ TEST(RandomisationTable, RefusesLawsThatDoNotExistOrFit) {
   EXPECT_EQ(mass("law = \"replace_normal\"\nsd = 0.1"),
             "r.toml:1:1: randomise[0].mean: is missing; accepted: a number");
   EXPECT_EQ(mass("law = \"scale_normal\"\nsd = 0.1\nmean = 1.0"),
-            "r.toml:5:1: randomise[0].mean: unknown key; accepted: cut_sd, law, parameters, sd");
+            "r.toml:5:1: randomise[0].mean: unknown key; accepted: cut_sd, law, minor, parameters, sd");
   EXPECT_EQ(mass("law = \"scale_uniform\"\nlow = 0.9\nhigh = 1.1\nsd = 0.1"),
-            "r.toml:6:1: randomise[0].sd: unknown key; accepted: high, law, low, parameters");
+            "r.toml:6:1: randomise[0].sd: unknown key; accepted: high, law, low, minor, parameters");
 }
 
 TEST(RandomisationTable, RefusesDrawsThatCouldLeaveTheAcceptedRange) {

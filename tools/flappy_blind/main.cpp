@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "benchmark/calibrate.hpp"
 #include "benchmark/detectability.hpp"
 #include "benchmark/detectability_table.hpp"
 #include "benchmark/families.hpp"
@@ -142,7 +143,13 @@ int main(int argc, char** argv) {
       .option("--discrepancy", scored.discrepancy,
               "what models get wrong; of a family: configs/gap/discrepancy/without_FAMILY.toml")
       .shows_default();
+  score.option("--verdict", scored.verdict, "constants of the verdict; of flappy-blind calibrate").shows_default();
   score.option("--threads", scored.threads, "cases at a time; 0: one for each processor").range(0, 1024);
+  io::Command calibrate = program.app().command("calibrate", "learns from scored cases how much evidence counts");
+  benchmark::CalibrateCommand calibrated;
+  calibrate.option("folders", calibrated.folders, "of flappy-blind score").required();
+  calibrate.option("--verdict", calibrated.verdict, "constants to start from").shows_default();
+  calibrate.option("--out", calibrated.out, "file for the constants").required();
   program.app().expect_commands(1, 1);
   program.takes_ranks();
   return program.run(argc, argv, [&] {
@@ -160,10 +167,12 @@ int main(int argc, char** argv) {
       if (!benchmark::make_bench(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
     } else if (score.given()) {
       scored.ranks = program.ranks("priors: " + io::sha256(io::read_text(scored.priors)) +
-                                   ", discrepancy: " + io::sha256(io::read_text(scored.discrepancy)) + "\n");
+                                   ", discrepancy: " + io::sha256(io::read_text(scored.discrepancy)) +
+                                   ", verdict: " + io::sha256(io::read_text(scored.verdict)) + "\n");
       const nlohmann::ordered_json scores = benchmark::score_bench(scored);
       if (!scores.is_null()) program.write_json(scores);
-    } else if (list.given() && !of.family.empty())
+    } else if (calibrate.given()) program.write_json(benchmark::calibrate(calibrated));
+    else if (list.given() && !of.family.empty())
       for (const blind::FamilyEffect& e : benchmark::family_named(of.family).effects())
         std::printf("%-30s %s\n", e.id.c_str(), e.typical.c_str());
     else if (list.given())

@@ -14,7 +14,7 @@ bool abstains(const Prediction& p) { return p.kind == "group" || p.probability <
 
 Prediction predict(const Question& q) {
   const model::Vehicle vehicle = model::read_vehicle(q.vehicle);
-  const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(q.priors).root());
+  sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(q.priors).root());
   std::vector<gap::PredictedFlight> flights;
   for (const std::filesystem::path& folder : q.flights) {
     flightlog::FlightLog log = flightlog::read_flight_log(folder);
@@ -26,9 +26,15 @@ Prediction predict(const Question& q) {
   options.threads = 1;
   options.withheld = q.withheld;
   options.discrepancy = gap::read_model_discrepancy(q.discrepancy);
+  options.rule = gap::read_verdict_rule(q.verdict);
   const gap::Diagnosis d = diagnose(flights, uncertain, options);
+  uncertain.set_minors(d.minors);
   const gap::Report r = verdict_report_of(flights, uncertain, d);
   Prediction p;
+  for (const gap::ScoredHypothesis& a : d.hypotheses)
+    p.weights.push_back({kind_name(a.kind), a.effects,
+                         a.kind == gap::ScoredHypothesis::Kind::effect && !a.terms.empty(), a.log_evidence,
+                         a.log_prior});
   p.kind = r.conclusion.remainder ? "remainder" : gap::kind_name(r.conclusion.kind);
   if (!r.unexplained.empty()) p.where = Where{r.unexplained.front().channel, r.unexplained.front().regime};
   p.effects = r.conclusion.effects;

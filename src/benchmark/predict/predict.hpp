@@ -23,6 +23,14 @@ struct FittedSet {
   double gain_sd = 0;                        ///< of E_refit - E, from blocks of beats
 };
 
+/// What the flights say of one hypothesis, before probabilities are made of it (gap/diagnose/verdict.hpp).
+struct Weight {
+  std::string kind;  ///< none, parameters, effect, unknown
+  std::vector<std::string> effects;
+  bool remainder = false;
+  double log_evidence = 0, log_prior = 0;
+};
+
 /// What a simpler method said.
 struct Baseline {
   std::vector<std::string> named;    ///< none: parameters
@@ -47,6 +55,7 @@ struct Prediction {
   double probability = 0;            ///< of this verdict
   std::vector<FittedSet> sets;       ///< most probable first
   double none = 0, parameters = 0, unknown = 0;
+  std::vector<Weight> weights;                  ///< of all hypotheses
   std::optional<double> nominal, refit, floor;  ///< E
   std::map<std::string, Baseline> baselines;    ///< by kBaselines
   /// Of a verdict that abstains: the two answers that the manoeuvre proposed tells apart, effects joined by +; or none.
@@ -61,7 +70,7 @@ inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "s
 
 struct Question {
   std::vector<std::filesystem::path> flights;  ///< folders of logs
-  std::filesystem::path vehicle, priors, discrepancy;
+  std::filesystem::path vehicle, priors, discrepancy, verdict;
   std::vector<std::string> withheld;  ///< entries that the catalogue is to lack
   bool baselines = true;
   std::filesystem::path experiments;  ///< manoeuvres to propose one of, where the verdict abstains; empty: none

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "gap/diagnose/verdict.hpp"
-#include "gap/evidence/robot_fit.hpp"
 #include "gap/localise/closure.hpp"
 #include "io/parallel.hpp"
 #include "model/effects/registry.hpp"
@@ -26,7 +25,6 @@ class Diagnoser {
   Diagnoser(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
             const DiagnoseOptions& options)
       : flights_(flights),
-        uncertain_(uncertain),
         options_(options),
         rule_(options.rule),
         threads_(io::thread_count(options.threads)),
@@ -60,9 +58,10 @@ class Diagnoser {
         a = fit_effects({s});
       singles.push_back(vanished(a) ? leave_open(s) : std::move(a));
     }
-    std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::log_evidence);
+    const auto counts = [&](const ScoredHypothesis& a) { return beyond_chance(a, plain_, rule_); };
+    std::ranges::sort(singles, std::greater{}, counts);
     // further effects jointly with the best
-    if (!singles.empty() && singles.front().fitted() && singles.front().log_evidence > parameters) {
+    if (!singles.empty() && singles.front().fitted() && counts(singles.front()) > parameters) {
       ScoredHypothesis best = singles.front();
       for (int n = 2; n <= options_.most_effects; ++n) {
         if (!progress(0.7 + 0.1 * n, "fitting another jointly with " + best.effects.back())) break;
@@ -71,16 +70,16 @@ class Diagnoser {
         std::vector<Screened> set = screened_of(best);
         set.push_back(further.front());
         ScoredHypothesis more = fit_effects(set);
-        if (vanished(more) || more.log_evidence < best.log_evidence) break;
+        if (vanished(more) || counts(more) < counts(best)) break;
         singles.push_back(more);
         best = std::move(more);
       }
     }
     // what leaves more than that entry's equation may
-    std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::log_evidence);
+    std::ranges::sort(singles, std::greater{}, counts);
     for (std::size_t i = 0, n = singles.size(); i < std::min<std::size_t>(n, kMostRemainders); ++i) {
       const ScoredHypothesis& a = singles[i];
-      if (!a.fitted() || a.log_evidence < parameters) break;
+      if (!a.fitted() || counts(a) < parameters) break;
       ScoredHypothesis more = explain_freely(Hypothesis(uncertain_, a.effects), a.fit.point, 0);
       if (more.terms.empty()) continue;
       more.kind = ScoredHypothesis::Kind::effect;
@@ -97,6 +96,10 @@ class Diagnoser {
     d.complete = !stopped_;
     set_probabilities(d.hypotheses, rule_);
     d.conclusion = conclude(d.hypotheses, rule_);
+    const ScoredHypothesis& concluded = d.hypotheses[d.conclusion.hypothesis];
+    d.sensors = concluded.fitted() ? robot_.sensors(Hypothesis(uncertain_, concluded.effects), concluded.fit)
+                                   : robot_.sensors(plain, parameters_);
+    d.minors = uncertain_.minors();
     d.nominal = robot_.nominal().residual;
     hold_out(d);
     d.noise_sd = noise_sd();
@@ -108,15 +111,6 @@ class Diagnoser {
     std::vector<double> sd;
     for (int g = 0; g < kGroups; ++g) sd.push_back(evidence_.noise_sd(g));
     return sd;
-  }
-
-  /// Of what so many effects gain over the parameters, what is more than chance.
-  double more_than_chance(const Hypothesis& h, double log_evidence) const {
-    if (h.effects().empty()) return log_evidence;
-    const double gain = log_evidence - plain_;
-    const double by_chance =
-        rule_.gain.by_chance_nats + rule_.gain.further_by_chance_nats * static_cast<double>(h.effects().size() - 1);
-    return plain_ + std::max(gain - by_chance, std::min(gain, 0.0));
   }
 
   Posterior posterior(const Linearised& l, const Columns& c, const std::vector<char>& use,
@@ -133,7 +127,7 @@ class Diagnoser {
     ScoredHypothesis a;
     a.kind = kind;
     a.effects = h.effects();
-    a.log_evidence = more_than_chance(h, robot_.weigh(h, l).posterior.log_evidence) + log_prior;
+    a.log_evidence = robot_.weigh(h, l).posterior.log_evidence + log_prior;
     a.log_prior = log_prior;
     return a;
   }
@@ -144,7 +138,7 @@ class Diagnoser {
     ScoredHypothesis a;
     a.kind = ScoredHypothesis::Kind::unknown;
     a.jointly_with = h.effects();
-    a.log_evidence = more_than_chance(h, w.posterior.log_evidence) + log_prior;
+    a.log_evidence = w.posterior.log_evidence + log_prior;
     a.log_prior = log_prior;
     const RegimeBasis& basis = evidence_.basis();
     for (std::size_t block = 0; block < w.scales.free.size(); ++block) {
@@ -297,12 +291,12 @@ class Diagnoser {
   }
 
   const std::vector<PredictedFlight>& flights_;
-  const sim::Randomisation& uncertain_;
   const DiagnoseOptions& options_;
   const VerdictRule& rule_;
   int threads_;
   std::vector<char> all_;
   RobotFit robot_;
+  const sim::Randomisation& uncertain_ = robot_.uncertain();
   const Evidence& evidence_ = robot_.evidence();
   const Fitter& fitter_ = robot_.fitter();
   const Fit& parameters_ = robot_.parameters();

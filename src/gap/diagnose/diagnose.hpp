@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gap/diagnose/verdict_rule.hpp"
-#include "gap/evidence/fit.hpp"
+#include "gap/evidence/robot_fit.hpp"
 
 namespace flappy::gap {
 
@@ -23,7 +23,7 @@ struct Term {
 struct ScoredHypothesis {
   enum class Kind { none, parameters, effect, unknown } kind = Kind::parameters;
   std::vector<std::string> effects;
-  double log_evidence = 0;  ///< of all flights
+  double log_evidence = 0;  ///< of all flights, and what was thought before
   double probability = 0;
   double log_prior = 0;
   std::vector<Term> terms;                ///< of an unknown cause, or of what is left beside effects
@@ -58,8 +58,10 @@ struct Diagnosis {
   bool complete = true;                      ///< false: progress had it stop before every effect was weighed
   std::vector<ScoredHypothesis> hypotheses;  ///< most probable first
   Conclusion conclusion;
-  Fit parameters;                ///< without any effect
-  Residuals nominal;             ///< what is left of the measurement with the vehicle's file
+  Fit parameters;                      ///< without any effect
+  std::vector<double> minors;          ///< variates of the vehicle's minor draws, for sim::Randomisation::set_minors
+  std::vector<SensorFinding> sensors;  ///< beside what is concluded
+  Residuals nominal;                   ///< what is left of the measurement with the vehicle's file
   Residuals refit;               ///< with parameters alone: in each flight what is left with the fit to the others
   std::vector<double> noise_sd;  ///< [group] of the rows of noise alone, as found
 };

@@ -162,7 +162,7 @@ void look_ahead(const DiagnoseCommand& command, const Asked& asked, const std::v
 }  // namespace
 
 Json run_diagnose(const DiagnoseCommand& command) {
-  const Asked asked = read_asked(command);
+  Asked asked = read_asked(command);
   const std::filesystem::path out = command.out;
   if (!out.empty()) {
     io::make_folder(out);
@@ -176,6 +176,7 @@ Json run_diagnose(const DiagnoseCommand& command) {
   for (std::size_t f = 0; !faulty && f < read.logs.size(); ++f)
     flights.emplace_back(Recording(command.flights[f], std::move(read.logs[f]), asked.vehicle));
   const Diagnosis d = faulty ? Diagnosis() : diagnose_visibly(flights, asked.uncertain, asked.options);
+  if (!faulty) asked.uncertain.set_minors(d.minors);
   // of an earlier diagnosis nothing stays beside this one
   for (const char* name : kFiles)
     if (std::error_code error; !out.empty()) std::filesystem::remove(out / name, error);

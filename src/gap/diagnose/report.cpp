@@ -10,13 +10,16 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kHalf90 = 1.645;
+/// Of what was believed of a sensor, that counts as news.
+constexpr double kNoticed = 0.25;
 constexpr std::size_t kMostPlaces = 20;
 
 std::vector<Moved> moved_by(const Fit& fit, const Hypothesis& hypothesis) {
   std::vector<Moved> moved;
   const Eigen::VectorXd mean = fit.mean();
   for (Eigen::Index i = 0; i < hypothesis.shared(); ++i)
-    moved.push_back({hypothesis.unknowns()[static_cast<std::size_t>(i)].name, mean[i]});
+    if (i != hypothesis.lag())  // that of a sensor
+      moved.push_back({hypothesis.unknowns()[static_cast<std::size_t>(i)].name, mean[i]});
   std::ranges::stable_sort(moved, std::greater{}, [](const Moved& m) { return std::abs(m.prior_sd); });
   return moved;
 }
@@ -147,6 +150,11 @@ Report verdict_report_of(const std::vector<PredictedFlight>& flights, const sim:
     r.unexplained.push_back({channel_name(t.channel), std::to_string(t.harmonic), basis.name(t.function),
                              regime_of(basis.name(t.function), basis.kind(t.function)), t.times, t.gain});
   r.jointly_with = freest.jointly_with;
+  for (const SensorFinding& s : d.sensors) {
+    const double reach = kHalf90 * s.sd;
+    if (std::abs(s.value) > std::max(reach, kNoticed * s.believed_sd))
+      r.sensors.push_back({s.name, s.value, s.value - reach, s.value + reach, unit_of(s.name)});
+  }
   if (concluded.kind == ScoredHypothesis::Kind::effect)
     r.moved = moved_by(concluded.fit, Hypothesis(uncertain, concluded.effects));
   else r.moved = moved_by(d.parameters, Hypothesis(uncertain, {}));
@@ -203,16 +211,19 @@ Json diagnosis_json(const Report& r) {
                      {"gap", p.gap},
                      {"noise_floor", p.noise_floor},
                      {"p_value", p.p_value}});
+  const auto estimates = [](const std::vector<SizeEstimate>& list) {
+    Json json = Json::object();
+    for (const SizeEstimate& s : list)
+      json[s.name] = {{"value", s.value}, {"low", s.low}, {"high", s.high}, {"unit", s.unit}};
+    return json;
+  };
   for (const Reported& c : r.candidates) {
-    Json parameters = Json::object();
-    for (const SizeEstimate& s : c.sizes)
-      parameters[s.name] = {{"value", s.value}, {"low", s.low}, {"high", s.high}, {"unit", s.unit}};
     candidates.push_back({{"effects", c.effects},
                           {"group", c.group},
                           {"remainder", c.remainder},
                           {"probability", c.probability},
                           {"log_evidence", c.log_evidence},
-                          {"parameters", parameters},
+                          {"parameters", estimates(c.sizes)},
                           {"closure", c.closure ? Json(c.closure->value) : Json(nullptr)}});
   }
   const auto closure = [&](double Closure::*part) { return r.closure ? Json((*r.closure).*part) : Json(nullptr); };
@@ -224,6 +235,7 @@ Json diagnosis_json(const Report& r) {
                  {"effects", r.conclusion.effects},
                  {"remainder", r.conclusion.remainder},
                  {"probability", r.conclusion.probability}}},
+               {"sensors", estimates(r.sensors)},
                {"where", where},
                {"candidates", candidates},
                {"unexplained", {{"jointly_with", r.jointly_with}, {"terms", unexplained}}},

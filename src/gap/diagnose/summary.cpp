@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include "flightlog/check/check_parts.hpp"
 
 namespace flappy::gap {
 namespace {
 
-constexpr std::size_t kSizes = 12, kRunnersUp = 3, kMoved = 4, kTerms = 3;
+constexpr std::size_t kSizes = 9, kRunnersUp = 3, kMoved = 3, kTerms = 3, kSensors = 3;
 
 std::string listed(const std::vector<std::string>& words, const char* last) {
   std::string all;
@@ -87,6 +88,22 @@ const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
   return most;
 }
 
+/// "the IMU's samples are 0.36 ms older than declared (0.30 to 0.42)"
+std::string sensor_line(const SizeEstimate& s) {
+  const bool more = s.value > 0;
+  const auto told = [&](const std::string& what, double factor, const char* unit, const std::string& how) {
+    const double a = factor * (more ? s.low : -s.high), b = factor * (more ? s.high : -s.low);
+    return flightlog::format("  %s %.2g %s %s (%.2g to %.2g)", what.c_str(), factor * std::abs(s.value), unit,
+                             how.c_str(), a, b);
+  };
+  const std::string axis = s.name.substr(s.name.rfind('.') + 1, 1), way = more ? "+" : "-";
+  if (s.name == "imu.latency_s") return told("the IMU's samples are", 1e3, "ms", more ? "older" : "younger");
+  if (s.name == "power_delay.delay_s") return told("those of currents are", 1e3, "ms", more ? "older" : "younger");
+  if (s.name.starts_with("imu_mounting"))
+    return told("the IMU is turned by", 180 / std::numbers::pi, "deg", "about " + way + axis);
+  return told("the IMU sits", 1e3, "mm", "along " + way + axis);
+}
+
 std::string name_of(const Reported& c) {
   return c.kind == ScoredHypothesis::Kind::effect ? listed(c.effects, "and") + (c.remainder ? " and more" : "")
                                                   : "(" + c.group + ")";
@@ -160,6 +177,10 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     lines.push_back("parameters that moved most, in standard deviations of what was believed:");
     for (std::size_t i = 0; i < r.moved.size() && i < kMoved; ++i)
       lines.push_back(flightlog::format("  %-36s %+10.2f", r.moved[i].name.c_str(), r.moved[i].prior_sd));
+  }
+  if (!r.sensors.empty()) {
+    lines.push_back("beside what the headers declare (90 %):");
+    for (std::size_t i = 0; i < r.sensors.size() && i < kSensors; ++i) lines.push_back(sensor_line(r.sensors[i]));
   }
   if (const ClosedLoop* c = most_corrected(r.closed_loop))
     lines.push_back(

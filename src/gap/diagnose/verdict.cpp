@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "model/effects/registry.hpp"
@@ -43,21 +44,26 @@ void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
   }
 }
 
+double beyond_chance(const ScoredHypothesis& a, double plain, const VerdictRule& rule) {
+  const double gain = a.log_evidence - a.log_prior - plain;
+  double chance = 0;
+  for (const std::string& e : a.effects)
+    chance += std::ranges::count(rule.gain.of_models, e) > 0 ? rule.gain.by_model_nats : rule.gain.by_chance_nats;
+  return a.log_prior + plain + std::max(gain - chance, std::min(gain, 0.0));
+}
+
 void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule) {
-  std::ranges::sort(hypotheses, std::greater{}, &ScoredHypothesis::log_evidence);
-  const double most = hypotheses.empty() ? 0 : hypotheses.front().log_evidence;
-  double sum = 0, of_effects = 0, effects = 0;
-  for (ScoredHypothesis& a : hypotheses) sum += a.probability = std::exp(a.log_evidence - most);
+  const auto parameters = std::ranges::find(hypotheses, ScoredHypothesis::Kind::parameters, &ScoredHypothesis::kind);
+  const double plain = parameters == hypotheses.end() ? 0 : parameters->log_evidence - parameters->log_prior;
+  double most = -std::numeric_limits<double>::infinity(), sum = 0;
+  for (const ScoredHypothesis& a : hypotheses) most = std::max(most, beyond_chance(a, plain, rule) - a.log_prior);
   for (ScoredHypothesis& a : hypotheses) {
-    a.probability /= sum;
-    if (a.kind == ScoredHypothesis::Kind::effect) of_effects += a.probability, effects += 1;
+    const double behind = most + a.log_prior - beyond_chance(a, plain, rule);
+    a.probability = std::exp(a.log_prior -
+                             rule.doubt.freedom / 2 * std::log1p(2 * behind / (rule.doubt.nats * rule.doubt.freedom)));
+    sum += a.probability;
   }
-  for (ScoredHypothesis& a : hypotheses) {
-    if (a.kind == ScoredHypothesis::Kind::unknown) a.probability += rule.doubt.unknown * of_effects;
-    if (a.kind == ScoredHypothesis::Kind::effect)
-      a.probability +=
-          rule.doubt.confused * of_effects / effects - (rule.doubt.unknown + rule.doubt.confused) * a.probability;
-  }
+  for (ScoredHypothesis& a : hypotheses) a.probability /= sum;
   std::ranges::stable_sort(hypotheses, std::greater{}, &ScoredHypothesis::probability);
 }
 

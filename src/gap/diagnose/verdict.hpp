@@ -16,8 +16,14 @@ bool refuted(const Losses& parameters, const Losses& effects, const VerdictRule&
 /// Makes the figures of the effects of a fit, along whose coordinates its directions are, as uncertain as they are.
 void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule);
 
-/// Of every hypothesis, from its log evidence; the most probable first. Of what speaks for entries a little goes to an unknown cause,
-/// which may look like one, and to all entries alike.
+/// The log evidence of a hypothesis, where what its effects gain over the parameters alone by chance counts for nothing. `plain`: log
+/// evidence of the parameters, without what was thought before.
+double beyond_chance(const ScoredHypothesis& hypothesis, double plain, const VerdictRule& rule);
+
+/// Of every hypothesis; the most probable first. Where d nats speak for the best rather than for it, it counts
+///   (1 + 2 d / (n f))^(-f / 2)       n, f: doubt.nats, doubt.freedom
+/// of what was thought before: nats are right up to a factor that is as uncertain as the variance of Student's t (exp(-d / n) for
+/// f -> infinity), for no making's errors are quite those that the evidence takes for granted.
 void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule);
 
 /// The largest mass, rivals that such flights often cannot separate (EffectInfo::group) pooled: a set of effects pools with those whose

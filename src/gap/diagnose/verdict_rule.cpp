@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "io/config.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 
@@ -19,15 +20,18 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
   if (!(std::abs(r.prior.none + r.prior.parameters + r.prior.effect + r.prior.unknown - 1) < 1e-9))
     prior.fail("", "none, parameters, effect and unknown do not add up to 1", "probabilities that do");
   const io::Table gain = root.table("gain");
-  r.gain = {gain.number("by_chance_nats", kNats), gain.number("further_by_chance_nats", kNats),
-            gain.number("further_screened_nats", kNats), gain.number("vanished_size", kPositive)};
+  r.gain = {gain.number("by_chance_nats", kNats), gain.number("by_model_nats", kNats),
+            gain.number("further_screened_nats", kNats), gain.number("vanished_size", kPositive),
+            gain.strings("of_models")};
+  for (const std::string& id : r.gain.of_models)
+    if (model::effect_index(id.c_str()) < 0)
+      gain.fail("of_models", "no effect \"" + id + "\"", "identifiers of docs/effects.md");
   r.unknown = {root.table("unknown").number("freeing_nats", kNats)};
   r.refutation = {root.table("refutation").number("share_of_gap", kNats)};
   const io::Table interval = root.table("interval");
   r.interval = {interval.number("sd_factor", kPositive), interval.number("size_error", kNats)};
   const io::Table doubt = root.table("doubt");
-  r.doubt = {doubt.number("unknown", kShare), doubt.number("confused", kShare)};
-  if (r.doubt.unknown + r.doubt.confused > 1) doubt.fail("", "unknown and confused exceed 1 together", "shares");
+  r.doubt = {doubt.number("nats", kPositive), doubt.number("freedom", kPositive)};
   const io::Table naming = root.table("naming");
   r.naming = {naming.number("of_all", kShare), naming.number("of_pool", kShare),
               naming.number("member_of_pool", kShare)};

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "io/installation.hpp"
@@ -14,7 +15,8 @@ struct VerdictRule {
     double none, parameters, effect, unknown, further_effect, remainder;
   } prior;
   struct Gain {
-    double by_chance_nats, further_by_chance_nats, further_screened_nats, vanished_size;
+    double by_chance_nats, by_model_nats, further_screened_nats, vanished_size;
+    std::vector<std::string> of_models;  ///< entries that by_model_nats are of
   } gain;
   struct UnknownCause {
     double freeing_nats;
@@ -26,7 +28,7 @@ struct VerdictRule {
     double sd_factor, size_error;
   } interval;
   struct Doubt {
-    double unknown, confused;
+    double nats, freedom;
   } doubt;
   struct Naming {
     double of_all, of_pool, member_of_pool;

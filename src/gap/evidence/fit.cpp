@@ -152,9 +152,10 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
     for (VectorXd& sum : flight) sum /= n;
 }
 
-void Fitter::set_background(const std::vector<BasisCoefficients>& same,
+void Fitter::set_background(const std::vector<BasisCoefficients>& same, const std::vector<double>& means,
                             const std::vector<BasisCoefficients>& with_robot, const Fit& beside) {
   background_.clear();
+  means_.clear();
   Columns all = own_columns_of(beside.point);
   const auto first = static_cast<Index>(all.columns.size());
   for (const auto* list : {&same, &with_robot})
@@ -163,13 +164,28 @@ void Fitter::set_background(const std::vector<BasisCoefficients>& same,
   const auto add = [&](const std::vector<BasisCoefficients>& list, Index from) {
     for (std::size_t k = 0; k < list.size(); ++k) {
       const Index i = from + static_cast<Index>(k);
-      if (reduced.sums(i, i) > kTelling) background_.push_back(list[k]);
+      if (!(reduced.sums(i, i) > kTelling)) continue;
+      background_.push_back(list[k]);
+      means_.push_back(&list == &same ? means[k] : 0);
+      places_.push_back(k);
     }
   };
+  places_.clear();
   add(same, first);
   with_robot_ = background_.size();
   add(with_robot, first + static_cast<Index>(same.size()));
   take_scale();
+}
+
+std::vector<Fitter::Beside> Fitter::beside(const Linearised& point) const {
+  const Columns c = columns_of(point);
+  const Posterior p = Evidence::posterior(reduce(point, c), c.chosen, c.mean());
+  std::vector<Beside> list;
+  for (std::size_t k = 0; k < with_robot_; ++k) {
+    const Index i = static_cast<Index>(c.columns.size() - scaled_.size() + k);
+    list.push_back({places_[k], p.mean[i], std::sqrt(p.covariance(i, i))});
+  }
+  return list;
 }
 
 void Fitter::take_scale() {
@@ -185,16 +201,20 @@ Columns Fitter::own_columns_of(const Linearised& point) {
   return c;
 }
 
+void Fitter::add_background(const std::vector<BasisCoefficients>& list, Columns& to) const {
+  for (std::size_t k = 0; k < list.size(); ++k) to.add(list[k], means_[k]);
+}
+
 Columns Fitter::columns_of(const Linearised& point) const {
   Columns c = own_columns_of(point);
-  for (const BasisCoefficients& b : scaled_) c.add(b, 0);
+  add_background(scaled_, c);
   return c;
 }
 
 Columns Fitter::unscaled_columns_of(const Linearised& point) const {
   Columns c = own_columns_of(point);
   c.with_robot = c.columns.size() + with_robot_;
-  for (const BasisCoefficients& b : background_) c.add(b, 0);
+  add_background(background_, c);
   return c;
 }
 
@@ -237,7 +257,7 @@ MatrixXd Fit::covariance() const {
 
 double Fitter::cost(const SufficientStatistics& residual, const VectorXd& at) const {
   Columns c;
-  for (const BasisCoefficients& b : scaled_) c.add(b, 0);
+  add_background(scaled_, c);
   const Reduced reduced = evidence_.reduce(residual, c.columns, all_flights(), evidence_.discrepancy_sd());
   return 0.5 * at.squaredNorm() - Evidence::posterior(reduced, c.chosen, c.mean()).log_evidence;
 }

@@ -55,8 +55,16 @@ class Fitter {
   /// Columns that may take what they can beside every hypothesis, with standard normal coefficients: first those that are the same for
   /// every robot, then those that are larger the more models of it are off. Of which the flights tell nothing, beside a fit's, are left
   /// out.
-  void set_background(const std::vector<BasisCoefficients>& same, const std::vector<BasisCoefficients>& with_robot,
-                      const Fit& beside);
+  /// `means`: what is thought of the coefficients of the former.
+  void set_background(const std::vector<BasisCoefficients>& same, const std::vector<double>& means,
+                      const std::vector<BasisCoefficients>& with_robot, const Fit& beside);
+  /// What a point leaves for a column of those that are the same for every robot: its place among them, and its coefficient.
+  struct Beside {
+    std::size_t place;
+    double mean, sd;
+  };
+  /// Those of which the flights tell.
+  std::vector<Beside> beside(const Linearised& point) const;
   /// From now on the background is that of a robot of the evidence's scale.
   void take_scale();
   std::vector<char> all_flights() const { return std::vector<char>(flights_.size(), 1); }
@@ -99,8 +107,11 @@ class Fitter {
   const std::vector<PredictedFlight>& flights_;
   const Evidence& evidence_;
   int threads_;
+  void add_background(const std::vector<BasisCoefficients>& list, Columns& to) const;
   std::vector<BasisCoefficients> background_, scaled_;
-  std::size_t with_robot_ = 0;  ///< of the background, from which on it scales with the robot
+  std::vector<double> means_;        ///< of background_
+  std::size_t with_robot_ = 0;       ///< of the background, from which on it scales with the robot
+  std::vector<std::size_t> places_;  ///< of the columns before that, as they were given
 };
 
 }  // namespace flappy::gap

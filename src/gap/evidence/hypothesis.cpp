@@ -34,7 +34,7 @@ std::vector<Unknown> unknowns_of(const std::string& effect) {
 
 Hypothesis::Hypothesis(const sim::Randomisation& uncertain, std::vector<std::string> effects)
     : uncertain_(&uncertain), effects_(std::move(effects)) {
-  for (std::size_t d = 0; d < uncertain.draws(); ++d)
+  for (std::size_t d = 0; d < uncertain.majors(); ++d)
     unknowns_.push_back({"", uncertain.name(d), 0, 1, uncertain.is_uniform(d) ? -1.0 : -kFarthest,
                          uncertain.is_uniform(d) ? 1.0 : kFarthest, false});
   unknowns_.push_back({"", "imu.latency_s", 0, kImuLagSd_s, -kFarthest * kImuLagSd_s, kFarthest * kImuLagSd_s, false});
@@ -50,10 +50,15 @@ Eigen::VectorXd Hypothesis::bounded(Eigen::VectorXd coordinates) const {
   return coordinates;
 }
 
-Candidate Hypothesis::candidate(const Eigen::VectorXd& coordinates) const {
+Candidate Hypothesis::candidate(const Eigen::VectorXd& coordinates,
+                                std::optional<std::pair<std::size_t, double>> minor) const {
   std::vector<double> variates(static_cast<std::size_t>(parameters()));
   for (std::size_t d = 0; d < variates.size(); ++d)
     variates[d] = unknowns_[d].value(coordinates[static_cast<Eigen::Index>(d)]);
+  if (minor) {
+    variates.insert(variates.end(), uncertain_->minors().begin(), uncertain_->minors().end());
+    variates[minor->first] += minor->second;
+  }
   Candidate c{uncertain_->at(variates), unknowns_[static_cast<std::size_t>(lag())].value(coordinates[lag()])};
   for (Eigen::Index i = shared(); i < size(); ++i) {
     const Unknown& u = unknowns_[static_cast<std::size_t>(i)];

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gap/replay/reset_prediction.hpp"
@@ -31,7 +33,7 @@ class Hypothesis {
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
   Eigen::Index size() const { return static_cast<Eigen::Index>(unknowns_.size()); }
   /// Of these, the first are the vehicle's parameters, the same for every hypothesis; then the IMU's lag.
-  Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->draws()); }
+  Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->majors()); }
   Eigen::Index lag() const { return parameters(); }
   Eigen::Index shared() const { return parameters() + 1; }
   /// Sizes start at 0, shapes in the middle of their range.
@@ -39,7 +41,9 @@ class Hypothesis {
   /// Into the accepted ranges.
   Eigen::VectorXd bounded(Eigen::VectorXd coordinates) const;
 
-  Candidate candidate(const Eigen::VectorXd& coordinates) const;
+  /// `minor`: one of the draws that are taken as linear, and by how much farther.
+  Candidate candidate(const Eigen::VectorXd& coordinates,
+                      std::optional<std::pair<std::size_t, double>> minor = {}) const;
 
  private:
   const sim::Randomisation* uncertain_;

@@ -1,11 +1,21 @@
 #include "gap/evidence/robot_fit.hpp"
 
+#include <cmath>
+
 #include "io/parallel.hpp"
 
 namespace flappy::gap {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kMostRounds = 5;
+/// Nats that another round has to bring; and that a round may lose, as lines are no curves.
+constexpr double kWorthwhile = 2;
+
+}  // namespace
 
 RobotFit::RobotFit(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
                    const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads)
@@ -15,7 +25,7 @@ RobotFit::RobotFit(const std::vector<PredictedFlight>& flights, const sim::Rando
       threads_(io::thread_count(threads)),
       evidence_(flights, discrepancy, threads_),
       fitter_(flights, evidence_, threads_),
-      plain_(uncertain, {}) {}
+      plain_(uncertain_, {}) {}
 
 void RobotFit::fit_parameters() {
   const Directions none{MatrixXd(plain_.size(), 0), VectorXd(0)};
@@ -32,13 +42,47 @@ void RobotFit::fit_parameters() {
 void RobotFit::refit_beside_background() {
   find_sizes();
   find_nuisances();
-  std::vector<BasisCoefficients> background;
-  for (const auto* list : {&sizes_, &shapes_})
-    for (const SizeColumn& c : *list) background.push_back(evidence_.discrepancy().background_sd(c.effect) * c.change);
-  fitter_.set_background(nuisances_, background, parameters_);
+  set_background();
   learn_scales();
   parameters_ = fitter_.refit(plain_, parameters_, 4);
   learn_scales();
+  for (int round = 0; round < kMostRounds && fly_minors(); ++round) continue;
+}
+
+/// From now on what the flights say of the minor figures is flown, and parameters are fitted beside it. False where that brought next to
+/// nothing, or so much less than nothing that it is taken back.
+bool RobotFit::fly_minors() {
+  const auto log_evidence = [&] { return weigh(plain_, parameters_.point).posterior.log_evidence; };
+  const std::vector<double> minors = uncertain_.minors();
+  const Fit parameters = parameters_;
+  const double before = log_evidence();
+  std::vector<double> there = minors;
+  for (const Fitter::Beside& b : fitter_.beside(parameters_.point))
+    if (b.place >= nuisances_.size()) there[b.place - nuisances_.size()] += b.mean;
+  const auto take = [&](const std::vector<double>& variates, Fit fit) {
+    uncertain_.set_minors(variates);
+    set_background();
+    parameters_ = std::move(fit);
+  };
+  take(there, parameters_);
+  parameters_ = fitter_.fit(plain_, parameters_.mean(), parameters_, 6);
+  learn_scales();
+  const double gain = log_evidence() - before;
+  if (gain < -kWorthwhile) {
+    take(minors, parameters);
+    learn_scales();
+  }
+  return gain > kWorthwhile;
+}
+
+void RobotFit::set_background() {
+  std::vector<BasisCoefficients> background, same = nuisances_;
+  std::vector<double> means(nuisances_.size(), 0);
+  same.insert(same.end(), minors_.begin(), minors_.end());
+  for (const double at : uncertain_.minors()) means.push_back(-at);
+  for (const auto* list : {&sizes_, &shapes_})
+    for (const SizeColumn& c : *list) background.push_back(evidence_.discrepancy().background_sd(c.effect) * c.change);
+  fitter_.set_background(same, means, background, parameters_);
 }
 
 void RobotFit::learn_scales() {
@@ -50,6 +94,19 @@ Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, std:
   const Columns c = fitter_.unscaled_columns_of(at);
   return evidence_.weigh(at.statistics, c.columns, c.mean(), c.with_robot, fitter_.all_flights(),
                          fitter_.form_error(hypothesis, at), evidence_.scales(), freeing_nats);
+}
+
+std::vector<SensorFinding> RobotFit::sensors(const Hypothesis& hypothesis, const Fit& fit) const {
+  const Eigen::Index lag = hypothesis.lag();
+  const Unknown& late = hypothesis.unknowns()[static_cast<std::size_t>(lag)];
+  std::vector<SensorFinding> list = {
+      {late.name, late.value(fit.mean()[lag]), late.scale * std::sqrt(fit.covariance()(lag, lag)), late.scale}};
+  for (const Fitter::Beside& b : fitter_.beside(fit.point)) {
+    if (b.place >= nuisances_.size()) break;  // figures of the vehicle
+    const ModelDiscrepancy::Nuisance& n = evidence_.discrepancy().nuisances[b.place];
+    list.push_back({n.id + "." + n.value, b.mean * n.sd, b.sd * n.sd, n.sd});
+  }
+  return list;
 }
 
 /// Of a residual `steps` steps away from that of the parameters, for one step.
@@ -95,17 +152,27 @@ void RobotFit::find_sizes() {
 void RobotFit::find_nuisances() {
   const std::vector<ModelDiscrepancy::Nuisance>& all = evidence_.discrepancy().nuisances;
   std::vector<Candidate> candidates;
+  std::vector<double> steps(all.size(), 1);
   for (const ModelDiscrepancy::Nuisance& n : all) {
     Candidate c = plain_.candidate(parameters_.point.at);
     for (const ModelDiscrepancy::Nuisance& other : all)
       if (other.id == n.id) c.sensors[n.id][other.value] = other.value == n.value ? n.sd : 0;
     candidates.push_back(std::move(c));
   }
+  for (std::size_t d = uncertain_.majors(); d < uncertain_.draws(); ++d) {
+    // on the side on which its body is possible
+    Candidate c = plain_.candidate(parameters_.point.at, std::pair{d, 1.0});
+    const bool other = model::physical_fault(c.vehicle).has_value();
+    steps.push_back(other ? -1 : 1);
+    candidates.push_back(other ? plain_.candidate(parameters_.point.at, std::pair{d, -1.0}) : std::move(c));
+  }
   std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
-  nuisances_.assign(all.size(), BasisCoefficients::Zero(kGroups, evidence_.basis().size()));
-  io::parallel_for(all.size(), threads_, [&](std::size_t i) {
-    if (!rows[i].empty()) nuisances_[i] = change(std::move(rows[i]), 1);
+  std::vector<BasisCoefficients> changes(rows.size(), BasisCoefficients::Zero(kGroups, evidence_.basis().size()));
+  io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
+    if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), steps[i]);
   });
+  nuisances_.assign(changes.begin(), changes.begin() + static_cast<std::ptrdiff_t>(all.size()));
+  minors_.assign(changes.begin() + static_cast<std::ptrdiff_t>(all.size()), changes.end());
 }
 
 }  // namespace flappy::gap

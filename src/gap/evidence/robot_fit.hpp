@@ -6,9 +6,16 @@
 
 namespace flappy::gap {
 
+/// A number that a header has wrong by so much.
+struct SensorFinding {
+  std::string name;  ///< as "imu_mounting.x_rad", or "imu.latency_s"
+  double value, sd;
+  double believed_sd;  ///< before the flights
+};
+
 class RobotFit {
  public:
-  /// `withheld`: entries that the catalogue is to lack. `flights` and `uncertain` are kept.
+  /// `withheld`: entries that the catalogue is to lack. `flights` are kept.
   RobotFit(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
            const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
 
@@ -20,6 +27,8 @@ class RobotFit {
   void set_discrepancy(const ModelDiscrepancy& discrepancy) { evidence_.set_discrepancy(discrepancy); }
   const Evidence& evidence() const { return evidence_; }
   const Fitter& fitter() const { return fitter_; }
+  /// With what the flights say of its minor draws.
+  const sim::Randomisation& uncertain() const { return uncertain_; }
   const Hypothesis& plain() const { return plain_; }
   const Fit& parameters() const { return parameters_; }
   /// The vehicle's file, weighed by the same noise.
@@ -30,6 +39,11 @@ class RobotFit {
   const std::vector<SizeColumn>& shapes() const { return shapes_; }
   /// What each number that a header may have wrong changes, for one standard deviation; as ModelDiscrepancy::nuisances.
   const std::vector<BasisCoefficients>& nuisances() const { return nuisances_; }
+  /// What the minor figures of the vehicle change, for one standard deviation.
+  const std::vector<BasisCoefficients>& minors() const { return minors_; }
+
+  /// What sensors are off by beyond their headers, given a fit.
+  std::vector<SensorFinding> sensors(const Hypothesis& hypothesis, const Fit& fit) const;
 
   /// A hypothesis, with scales of its own.
   Weighed weigh(const Hypothesis& hypothesis, const Linearised& at, std::optional<double> freeing_nats = {}) const;
@@ -38,10 +52,12 @@ class RobotFit {
   void learn_scales();
   void find_sizes();
   void find_nuisances();
+  void set_background();
+  bool fly_minors();
   BasisCoefficients change(Residuals there, double steps) const;
 
   const std::vector<PredictedFlight>& flights_;
-  const sim::Randomisation& uncertain_;
+  sim::Randomisation uncertain_;
   std::vector<std::string> withheld_;
   int threads_;
   Evidence evidence_;
@@ -50,7 +66,7 @@ class RobotFit {
   Linearised nominal_;
   Fit parameters_;
   std::vector<SizeColumn> sizes_, shapes_;
-  std::vector<BasisCoefficients> nuisances_;
+  std::vector<BasisCoefficients> nuisances_, minors_;
 };
 
 }  // namespace flappy::gap

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <memory>
 #include <numbers>
 #include <numeric>
 #include <random>
@@ -11,6 +13,7 @@
 #include "gap/evidence/robot_fit.hpp"
 #include "gap/replay/sensor_correction.hpp"
 #include "io/config.hpp"
+#include "io/files.hpp"
 #include "model/effects/registry.hpp"
 #include "rollout/fly.hpp"
 #include "rollout/fly_fixture.hpp"
@@ -293,6 +296,31 @@ TEST(Diagnose, StopsWithWhatItHas) {
   }
   EXPECT_NEAR(sum, 1, 1e-12);
   EXPECT_EQ(d.hypotheses[0].kind, ScoredHypothesis::Kind::none);
+}
+
+// Figures that priors call minor: a wing's centre of mass, a spring that is stiffer one way, an inertia about one axis.
+TEST(RobotFit, FliesMinorFigures) {
+  const std::vector<PredictedFlight> flights =
+      flown("hummingbird_nominal",
+            {"vehicle.left.wing.com_m.x=0.0006", "vehicle.right.spring.stiffness_positive_Nm_rad=0.0147",
+             "vehicle.right.leading_edge.inertia_kg_m2.zz=1.0e-7",
+             "vehicle.right.leading_edge.inertia_kg_m2.xx=1.422e-7", "flight.duration_s=5"});
+  const std::string text = io::read_text(kConfigs + "gap/priors.toml");
+  const auto fitted = [&](const std::string& priors) {
+    const sim::Randomisation prior =
+        sim::read_randomisation(nominal(), io::Config::parse(priors, "priors.toml").root());
+    auto robot = std::make_unique<RobotFit>(flights, prior, read_model_discrepancy(), std::vector<std::string>{}, 2);
+    robot->fit_parameters();
+    robot->refit_beside_background();
+    return robot;
+  };
+  const auto robot = fitted(text), without = fitted(text.substr(0, text.find("# Figures that change little")));
+  EXPECT_GT(without->evidence().scales().robot, 1.5 * robot->evidence().scales().robot) << "errors of the model else";
+  const sim::Randomisation& found = robot->uncertain();
+  std::map<std::string, double> minors;
+  for (std::size_t d = found.majors(); d < found.draws(); ++d)
+    minors.try_emplace(found.name(d), found.minors()[d - found.majors()]);
+  EXPECT_NEAR(minors.at("left.wing.com_m.x"), 0.0006 / 0.0003, 1) << "in units of what is believed";
 }
 
 // A third of a beat and more: near 0 its derivative shows nothing of it.

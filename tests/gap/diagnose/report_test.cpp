@@ -45,31 +45,39 @@ Conclusion conclude(const std::vector<ScoredHypothesis>& hypotheses) {
   return gap::conclude(hypotheses, read_verdict_rule());
 }
 
-TEST(Verdict, IsNotSureOfEntries) {
-  const auto weighed = [](double log_evidence, ScoredHypothesis a) {
-    a.log_evidence = log_evidence;
+TEST(Verdict, CountsNatsBeyondChanceByStudentsT) {
+  const auto weighed = [](double log_evidence, double prior, ScoredHypothesis a) {
+    a.log_prior = std::log(prior);
+    a.log_evidence = log_evidence + a.log_prior;
     return a;
   };
-  std::vector<ScoredHypothesis> all = {weighed(-1000, hypothesis(0, ScoredHypothesis::Kind::parameters)),
-                                       weighed(-1000, hypothesis(0, ScoredHypothesis::Kind::unknown)),
-                                       weighed(-900, hypothesis(0, {"body_drag"})),
-                                       weighed(-800, hypothesis(0, {"wind"}))};
-  set_probabilities(all, read_verdict_rule());
-  // 0.06 of what entries hold goes to an unknown cause, 0.06 to both entries alike
+  VerdictRule rule = read_verdict_rule();
+  rule.gain.by_chance_nats = 10;
+  rule.gain.by_model_nats = 45;
+  rule.gain.of_models = {"body_drag"};
+  rule.doubt = {2, 4};
+  std::vector<ScoredHypothesis> all = {weighed(-1000, 0.2, hypothesis(0, ScoredHypothesis::Kind::parameters)),
+                                       weighed(-980, 0.2, hypothesis(0, ScoredHypothesis::Kind::unknown)),
+                                       weighed(-870, 0.3, hypothesis(0, {"wind", "body_drag"})),
+                                       weighed(-960, 0.1, hypothesis(0, {"body_drag"})),
+                                       weighed(-880, 0.2, hypothesis(0, {"wind"}))};
+  set_probabilities(all, rule);
+  // gains beyond chance: 110 of wind, 75 of the pair, none of body_drag's 40, 20 of what is unknown
+  const auto share = [](double prior, double behind) { return prior * std::pow(1 + behind / 4, -2); };
+  const double sum = 0.2 + share(0.3, 35) + share(0.1, 110) + share(0.2, 90) + share(0.2, 110);
   EXPECT_EQ(all[0].effects, std::vector<std::string>{"wind"});
-  EXPECT_NEAR(all[0].probability, 0.88 + 0.03, 1e-12);
-  EXPECT_EQ(all[1].kind, ScoredHypothesis::Kind::unknown);
-  EXPECT_NEAR(all[1].probability, 0.06, 1e-12);
-  EXPECT_NEAR(all[2].probability, 0.03, 1e-12);
-  EXPECT_NEAR(all[3].probability, 0, 1e-12);
-  // what other hypotheses hold stays
-  all = {weighed(std::log(0.7), hypothesis(0, ScoredHypothesis::Kind::parameters)),
-         weighed(std::log(0.3), hypothesis(0, {"wind"})),
-         weighed(-1000, hypothesis(0, ScoredHypothesis::Kind::unknown))};
-  set_probabilities(all, read_verdict_rule());
-  EXPECT_NEAR(all[0].probability, 0.7, 1e-12);
-  EXPECT_NEAR(all[1].probability, 0.3 * 0.94, 1e-12);
-  EXPECT_NEAR(all[2].probability, 0.3 * 0.06, 1e-12);
+  EXPECT_NEAR(all[0].probability, 0.2 / sum, 1e-12);
+  EXPECT_EQ(all[1].effects.size(), 2u);
+  EXPECT_NEAR(all[1].probability, share(0.3, 35) / sum, 1e-12);
+  EXPECT_EQ(all[2].kind, ScoredHypothesis::Kind::unknown);
+  EXPECT_NEAR(all[2].probability, share(0.2, 90) / sum, 1e-12);
+  EXPECT_NEAR(all[3].probability, share(0.2, 110) / sum, 1e-12);
+  EXPECT_NEAR(all[4].probability, share(0.1, 110) / sum, 1e-12);
+  // what loses against the parameters has lost all of it
+  all = {weighed(-1000, 0.5, hypothesis(0, ScoredHypothesis::Kind::parameters)),
+         weighed(-1004, 0.5, hypothesis(0, {"wind"}))};
+  set_probabilities(all, rule);
+  EXPECT_NEAR(all[1].probability, 0.25 / 1.25, 1e-12);
 }
 
 TEST(Verdict, NamesTheLargestMass) {
@@ -206,6 +214,9 @@ TEST(Report, SaysWhatToDoInThirtyLines) {
     r.moved.push_back({"torso.mass_kg", 1.5});
   }
   r.places.push_back({"refit", "frequency", 0, "0 to 0.5 Hz", 2, 1, 1e-3, true});
+  r.sensors = {{"imu.latency_s", 3.6e-4, 3e-4, 4.2e-4, "s"},
+               {"power_delay.delay_s", -1e-3, -1.2e-3, -8e-4, "s"},
+               {"imu_mounting.y_rad", -0.02, -0.03, -0.01, "rad"}};
   r.closed_loop = {{"flight", "mean_bias_V", 1, 0, 0.9}};
   r.next = NextExperiment{"dash", {"wind", "tether"}, 3};
   r.closure = Closure{0.9, 0.8, 0.95};
@@ -223,6 +234,11 @@ TEST(Report, SaysWhatToDoInThirtyLines) {
   EXPECT_NE(text.find("wind.x_m_s"), std::string::npos);
   EXPECT_NE(text.find("0.3 (0.1 to 0.5) m/s\n"), std::string::npos);
   EXPECT_NE(text.find("runners-up: tether 0.2"), std::string::npos) << text;
+  EXPECT_NE(
+      text.find("the IMU's samples are 0.36 ms older (0.3 to 0.42)\n  those of currents are 1 ms younger (0.8 to 1.2)\n"
+                "  the IMU is turned by 1.1 deg about -y (0.57 to 1.7)\n"),
+      std::string::npos)
+      << text;
   r.conclusion = {Conclusion::Kind::effect, {"wind"}, 0.3, 0};
   EXPECT_NE(all().find("(probability 0.30, no more than a guess)"), std::string::npos);
   EXPECT_NE(all().find("--set vehicle=/out/vehicle_corrected.toml"), std::string::npos);
@@ -282,8 +298,8 @@ std::string contents(const std::filesystem::path& path) { return io::read_text(p
 void expect_schema(const nlohmann::ordered_json& j) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : j.items()) keys.push_back(key);
-  EXPECT_EQ(keys, (std::vector<std::string>{"schema", "flights", "data_faults", "verdict", "where", "candidates",
-                                            "unexplained", "gap", "closed_loop", "next_experiment"}));
+  EXPECT_EQ(keys, (std::vector<std::string>{"schema", "flights", "data_faults", "verdict", "sensors", "where",
+                                            "candidates", "unexplained", "gap", "closed_loop", "next_experiment"}));
   double sum = 0;
   for (const auto& c : j["candidates"]) {
     sum += c["probability"].get<double>();
@@ -398,7 +414,8 @@ TEST(VerdictRule, IsReadStrictly) {
   EXPECT_NE(verdict("priors = 1\n" + rule).find(path + ":1:1: priors: "), std::string::npos)
       << verdict("priors = 1\n" + rule);
   EXPECT_NE(verdict(with(rule, "none = 0.1", "none = 0.2")).find("do not add up to 1"), std::string::npos);
-  EXPECT_NE(verdict(with(rule, "confused = 0.06", "")).find("doubt.confused"), std::string::npos);
+  EXPECT_NE(verdict(with(rule, "freedom = ", "free = ")).find("doubt.freedom"), std::string::npos);
+  EXPECT_NE(verdict(with(rule, "\"body_drag\"", "\"body_drags\"")).find("no effect \"body_drags\""), std::string::npos);
   const std::string model = contents(kConfigs + "gap/model_discrepancy.toml");
   EXPECT_EQ(discrepancy(model), "accepted");
   EXPECT_NE(discrepancy(with(model, "body_drag = ", "body_dragg = ")).find("background_sd.body_dragg"),

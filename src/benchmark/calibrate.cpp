@@ -1,0 +1,206 @@
+#include "benchmark/calibrate.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+
+#include "benchmark/records.hpp"
+#include "gap/diagnose/verdict.hpp"
+#include "io/files.hpp"
+#include "io/program.hpp"
+
+namespace flappy::benchmark {
+namespace {
+
+namespace fs = std::filesystem;
+using gap::ScoredHypothesis;
+using gap::VerdictRule;
+
+/// An answer is never taken for less probable, so that no single case decides.
+constexpr double kLeast = 1e-3;
+
+/// What may be chosen: where it stands in the file, its range, and whether it is sought on a logarithmic scale.
+struct Constant {
+  const char *table, *key;
+  std::function<double&(VerdictRule&)> of;
+  double low, high;
+  bool by_factors;
+};
+
+const std::array<Constant, 6>& constants() {
+  static const std::array<Constant, 6> kAll = {{
+      {"doubt", "nats", [](VerdictRule& r) -> double& { return r.doubt.nats; }, 0.1, 100, true},
+      {"doubt", "freedom", [](VerdictRule& r) -> double& { return r.doubt.freedom; }, 0.3, 30, true},
+      {"gain", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.by_chance_nats; }, 0, 300, false},
+      {"gain", "by_model_nats", [](VerdictRule& r) -> double& { return r.gain.by_model_nats; }, 0, 300, false},
+      {"prior", "unknown", [](VerdictRule& r) -> double& { return r.prior.unknown; }, 0.01, 0.8, true},
+      {"prior", "remainder", [](VerdictRule& r) -> double& { return r.prior.remainder; }, 0.001, 1, true},
+  }};
+  return kAll;
+}
+
+struct Case {
+  CaseTruth truth;
+  std::vector<ScoredHypothesis> hypotheses;
+  double weight = 0;
+  std::size_t part = 0;
+};
+
+ScoredHypothesis::Kind kind_from(const std::string& name) {
+  using Kind = ScoredHypothesis::Kind;
+  for (const Kind k : {Kind::none, Kind::parameters, Kind::effect, Kind::unknown})
+    if (name == kind_name(k)) return k;
+  throw io::InputError("prediction: no kind \"" + name + "\"; accepted: none, parameters, effect, unknown");
+}
+
+/// What was thought of a hypothesis beforehand, under another rule.
+double moved_prior(const ScoredHypothesis& a, const VerdictRule& from, const VerdictRule& to) {
+  using Kind = ScoredHypothesis::Kind;
+  const auto move = [](double before, double now) { return std::log(now / before); };
+  switch (a.kind) {
+    case Kind::none:
+      return move(from.prior.none, to.prior.none);
+    case Kind::parameters:
+      return move(from.prior.parameters, to.prior.parameters);
+    case Kind::unknown:
+      return move(from.prior.unknown, to.prior.unknown);
+    case Kind::effect:
+      return move(from.prior.effect, to.prior.effect) +
+             (a.terms.empty() ? 0 : move(from.prior.remainder, to.prior.remainder));
+  }
+  return 0;
+}
+
+class Calibration {
+ public:
+  explicit Calibration(const CalibrateCommand& command) : rule_(gap::read_verdict_rule(command.verdict)) {
+    std::map<std::string, std::size_t> parts;
+    std::vector<double> counts;
+    for (const fs::path& folder : command.folders) {
+      const Manifest manifest = read_manifest(folder);
+      if (!fs::exists(folder / "true_fits"))
+        throw io::InputError(folder.string() + ": was not scored; accepted: folders of flappy-blind score");
+      std::map<std::size_t, CaseTruth> truths;
+      const Json sealed = read_json(folder / "sealed" / "labels.json");
+      for (const Json& json : sealed.at("cases")) {
+        const Label l = label_from(json);
+        truths[l.planned.number] = l.truth();
+      }
+      for (const PublicCase& c : manifest.cases) {
+        const Prediction p = prediction_from(read_json(folder / "predictions" / (number_text(c.number) + ".json")));
+        Case own{.truth = truths.at(c.number)};
+        for (const Weight& w : p.weights) {
+          ScoredHypothesis a;
+          a.kind = kind_from(w.kind);
+          a.effects = w.effects;
+          a.log_evidence = w.log_evidence;
+          a.log_prior = w.log_prior;
+          if (w.remainder) a.terms.emplace_back();
+          own.hypotheses.push_back(std::move(a));
+        }
+        if (own.hypotheses.empty()) continue;  // its data were at fault
+        own.part = parts.try_emplace(manifest.family + " " + own.truth.part, counts.size()).first->second;
+        if (own.part == counts.size()) counts.push_back(0);
+        counts[own.part] += 1;
+        cases_.push_back(std::move(own));
+      }
+    }
+    for (Case& c : cases_) c.weight = 1 / (counts[c.part] * static_cast<double>(counts.size()));
+  }
+
+  std::size_t cases() const { return cases_.size(); }
+  const VerdictRule& start() const { return rule_; }
+
+  /// Mean logarithm of what the right answers get.
+  double score(const VerdictRule& rule) const {
+    double sum = 0;
+    for (const Case& c : cases_) {
+      std::vector<ScoredHypothesis> all = c.hypotheses;
+      for (ScoredHypothesis& a : all) {
+        const double move = moved_prior(a, rule_, rule);
+        a.log_prior += move;
+        a.log_evidence += move;
+      }
+      set_probabilities(all, rule);
+      double probability = 0;
+      for (const ScoredHypothesis& a : all)
+        if (right(c.truth, {.kind = kind_name(a.kind), .effects = a.effects})) probability += a.probability;
+      sum += c.weight * std::log(kLeast + (1 - kLeast) * probability);
+    }
+    return sum;
+  }
+
+  /// Along one constant after another, by steps that shrink (Hooke, Jeeves 1961).
+  VerdictRule best() const {
+    VerdictRule rule = rule_;
+    double value = score(rule);
+    for (double step = 0.5; step > 0.01; step /= 2)
+      for (bool better = true; better;) {
+        better = false;
+        for (const Constant& c : constants())
+          for (const double way : {step, -step}) {
+            VerdictRule there = rule;
+            double& x = c.of(there);
+            x = std::clamp(c.by_factors ? x * std::exp(way) : x + 40 * way, c.low, c.high);
+            if (std::string(c.key) == "unknown") share(there, rule);
+            const double now = score(there);
+            if (now > value + 1e-6) rule = there, value = now, better = true;
+          }
+      }
+    return rule;
+  }
+
+ private:
+  /// The others have what an unknown cause leaves.
+  static void share(VerdictRule& rule, const VerdictRule& before) {
+    const double factor = (1 - rule.prior.unknown) / (1 - before.prior.unknown);
+    for (double* p : {&rule.prior.none, &rule.prior.parameters, &rule.prior.effect}) *p *= factor;
+  }
+
+  VerdictRule rule_;
+  std::vector<Case> cases_;
+};
+
+std::string rounded(double x) {
+  char text[24];
+  std::snprintf(text, sizeof text, "%.4g", x);
+  return text;
+}
+
+/// The file with other figures: all else stays as it is.
+void set_figure(std::string& text, const std::string& table, const std::string& key, const std::string& value) {
+  const std::size_t from = text.find("\n[" + table + "]"), at = text.find("\n" + key + " = ", from);
+  if (from == std::string::npos || at == std::string::npos) return;
+  const std::size_t begin = at + key.size() + 4, end = text.find_first_of(" \n", begin);
+  text.replace(begin, end - begin, value);
+}
+
+}  // namespace
+
+Json calibrate(const CalibrateCommand& command) {
+  io::check_output(command.out, {command.verdict});
+  const Calibration calibration(command);
+  VerdictRule before = calibration.start(), after = calibration.best();
+  after.prior.none = std::stod(rounded(after.prior.none));
+  after.prior.parameters = std::stod(rounded(after.prior.parameters));
+  after.prior.unknown = std::stod(rounded(after.prior.unknown));
+  after.prior.effect = 1 - after.prior.none - after.prior.parameters - after.prior.unknown;
+  std::string text = io::read_text(command.verdict);
+  Json json = {
+      {"cases", calibration.cases()}, {"score_before", calibration.score(before)}, {"score", calibration.score(after)}};
+  for (const Constant& c : constants()) {
+    set_figure(text, c.table, c.key, rounded(c.of(after)));
+    json[c.key] = c.of(after);
+    std::printf("%-7s %-24s %10.4g, was %.4g\n", c.table, c.key, c.of(after), c.of(before));
+  }
+  for (const auto& [key, value] :
+       {std::pair{"none", after.prior.none}, {"parameters", after.prior.parameters}, {"effect", after.prior.effect}})
+    set_figure(text, "prior", key, io::shortest_digits(value));
+  std::printf("mean log probability of what is right: %.3f, was %.3f, of %zu cases\n", json["score"].get<double>(),
+              json["score_before"].get<double>(), calibration.cases());
+  io::write_atomically(command.out, text);
+  return json;
+}
+
+}  // namespace flappy::benchmark
