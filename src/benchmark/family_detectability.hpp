@@ -10,9 +10,8 @@
 // squares. The rms is of the tenth of the beats that shows it most: 3 of 30 s, for some effects act near the ground, or the wall, alone.
 // R is the rms of the waveform of the three forces together, or of the three turning accelerations: a wing by itself shakes along all
 // axes, and what cancels between two wings is known no better than its parts. Only the mean force is the weight, and measured by that.
-// A third of a waveform is what quasi-steady models of a wing leave of computed and measured forces (16 to 31 % of the rms for the
-// paper's), so kConstant; motion and inputs change a waveform by a tenth, of which a third is kShare; kLate is what a stream's declared
-// latency is known to, at best (configs/gap/model_discrepancy.toml).
+// These are choices: a constant of a third of a waveform, as much as quasi-steady models of a wing may leave; of the tenth by which
+// motion and inputs change it a third as well, kShare; and the lateness that is left in a declared latency.
 // An effect is detectable at the size at which its largest q comes to kShare, with changes that grow as the size; beyond half the
 // largest size that robots have, it is undetectable.
 //

@@ -62,8 +62,7 @@ struct Report {
   std::vector<Unexplained> unexplained;
   std::vector<std::string> jointly_with;  ///< effects that are in force beside what is unexplained
   std::vector<Moved> moved;               ///< parameters beside the concluded effects, the farthest first
-  std::vector<SizeEstimate>
-      sensors;  ///< what headers have wrong for sure, and by a quarter of what was believed at least
+  std::vector<SizeEstimate> sensors;      ///< what headers have wrong for sure, and not by next to nothing
   std::vector<GapLocation> places;
   std::optional<double> nominal, refit, effect;  ///< E; the effect: of the best candidate with one
   double noise_floor = 0;

@@ -88,7 +88,7 @@ const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
   return most;
 }
 
-/// "the IMU's samples are 0.36 ms older than declared (0.30 to 0.42)"
+/// By how much, which way, and its interval.
 std::string sensor_line(const SizeEstimate& s) {
   const bool more = s.value > 0;
   const auto told = [&](const std::string& what, double factor, const char* unit, const std::string& how) {

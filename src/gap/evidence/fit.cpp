@@ -152,28 +152,23 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
     for (VectorXd& sum : flight) sum /= n;
 }
 
-void Fitter::set_background(const std::vector<BasisCoefficients>& same, const std::vector<double>& means,
-                            const std::vector<BasisCoefficients>& with_robot, const Fit& beside) {
+void Fitter::set_background(const Columns& same, const std::vector<BasisCoefficients>& with_robot, const Fit& beside) {
   background_.clear();
   means_.clear();
-  Columns all = own_columns_of(beside.point);
-  const auto first = static_cast<Index>(all.columns.size());
-  for (const auto* list : {&same, &with_robot})
-    for (const BasisCoefficients& c : *list) all.add(c, 0);
-  const Reduced reduced = reduce(beside.point, all);
-  const auto add = [&](const std::vector<BasisCoefficients>& list, Index from) {
-    for (std::size_t k = 0; k < list.size(); ++k) {
-      const Index i = from + static_cast<Index>(k);
-      if (!(reduced.sums(i, i) > kTelling)) continue;
-      background_.push_back(list[k]);
-      means_.push_back(&list == &same ? means[k] : 0);
-      places_.push_back(k);
-    }
-  };
   places_.clear();
-  add(same, first);
-  with_robot_ = background_.size();
-  add(with_robot, first + static_cast<Index>(same.size()));
+  Columns all = own_columns_of(beside.point);
+  const std::size_t first = all.columns.size(), scaled = first + same.columns.size();
+  for (std::size_t k = 0; k < same.columns.size(); ++k) all.add(*same.columns[k], same.prior_mean[k]);
+  for (const BasisCoefficients& c : with_robot) all.add(c, 0);
+  const Reduced reduced = reduce(beside.point, all);
+  for (std::size_t i = first; i < all.columns.size(); ++i) {
+    const auto diagonal = static_cast<Index>(i);
+    if (!(reduced.sums(diagonal, diagonal) > kTelling)) continue;
+    background_.push_back(*all.columns[i]);
+    means_.push_back(all.prior_mean[i]);
+    if (i < scaled) places_.push_back(i - first);
+  }
+  with_robot_ = places_.size();
   take_scale();
 }
 

@@ -55,9 +55,7 @@ class Fitter {
   /// Columns that may take what they can beside every hypothesis, with standard normal coefficients: first those that are the same for
   /// every robot, then those that are larger the more models of it are off. Of which the flights tell nothing, beside a fit's, are left
   /// out.
-  /// `means`: what is thought of the coefficients of the former.
-  void set_background(const std::vector<BasisCoefficients>& same, const std::vector<double>& means,
-                      const std::vector<BasisCoefficients>& with_robot, const Fit& beside);
+  void set_background(const Columns& same, const std::vector<BasisCoefficients>& with_robot, const Fit& beside);
   /// What a point leaves for a column of those that are the same for every robot: its place among them, and its coefficient.
   struct Beside {
     std::size_t place;

@@ -33,8 +33,8 @@ void expect(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDis
     const Evidence& evidence = robot->evidence();
     const Linearised& at = robot->parameters().point;
     Columns c = robot->fitter().own_columns_of(at);
-    for (const BasisCoefficients& n : robot->nuisances()) c.add(n, 0);
-    for (std::size_t k = 0; k < robot->minors().size(); ++k) c.add(robot->minors()[k], -robot->uncertain().minors()[k]);
+    const Columns lines = robot->lines();
+    for (std::size_t k = 0; k < lines.columns.size(); ++k) c.add(*lines.columns[k], lines.prior_mean[k]);
     const std::size_t first = c.columns.size();
     std::vector<BasisCoefficients> scaled;
     for (const SizeColumn& s : robot->sizes()) scaled.push_back(now.background_sd(s.effect) * s.change);

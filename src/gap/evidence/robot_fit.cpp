@@ -41,7 +41,7 @@ void RobotFit::fit_parameters() {
 
 void RobotFit::refit_beside_background() {
   find_sizes();
-  find_nuisances();
+  find_lines();
   set_background();
   learn_scales();
   parameters_ = fitter_.refit(plain_, parameters_, 4);
@@ -75,14 +75,18 @@ bool RobotFit::fly_minors() {
   return gain > kWorthwhile;
 }
 
+Columns RobotFit::lines() const {
+  Columns c;
+  for (const BasisCoefficients& n : nuisances_) c.add(n, 0);
+  for (std::size_t k = 0; k < minors_.size(); ++k) c.add(minors_[k], -uncertain_.minors()[k]);
+  return c;
+}
+
 void RobotFit::set_background() {
-  std::vector<BasisCoefficients> background, same = nuisances_;
-  std::vector<double> means(nuisances_.size(), 0);
-  same.insert(same.end(), minors_.begin(), minors_.end());
-  for (const double at : uncertain_.minors()) means.push_back(-at);
+  std::vector<BasisCoefficients> background;
   for (const auto* list : {&sizes_, &shapes_})
     for (const SizeColumn& c : *list) background.push_back(evidence_.discrepancy().background_sd(c.effect) * c.change);
-  fitter_.set_background(same, means, background, parameters_);
+  fitter_.set_background(lines(), background, parameters_);
 }
 
 void RobotFit::learn_scales() {
@@ -149,7 +153,7 @@ void RobotFit::find_sizes() {
   }
 }
 
-void RobotFit::find_nuisances() {
+void RobotFit::find_lines() {
   const std::vector<ModelDiscrepancy::Nuisance>& all = evidence_.discrepancy().nuisances;
   std::vector<Candidate> candidates;
   std::vector<double> steps(all.size(), 1);

@@ -37,11 +37,9 @@ class RobotFit {
   const std::vector<SizeColumn>& sizes() const { return sizes_; }
   /// What it makes of that to have another shape, by a standard deviation of each.
   const std::vector<SizeColumn>& shapes() const { return shapes_; }
-  /// What each number that a header may have wrong changes, for one standard deviation; as ModelDiscrepancy::nuisances.
-  const std::vector<BasisCoefficients>& nuisances() const { return nuisances_; }
-  /// What the minor figures of the vehicle change, for one standard deviation.
-  const std::vector<BasisCoefficients>& minors() const { return minors_; }
-
+  /// What each number that a header may have wrong, and each minor figure of the vehicle, changes for one standard deviation, and what is
+  /// thought of its coefficient, from what is flown on.
+  Columns lines() const;
   /// What sensors are off by beyond their headers, given a fit.
   std::vector<SensorFinding> sensors(const Hypothesis& hypothesis, const Fit& fit) const;
 
@@ -51,7 +49,7 @@ class RobotFit {
  private:
   void learn_scales();
   void find_sizes();
-  void find_nuisances();
+  void find_lines();
   void set_background();
   bool fly_minors();
   BasisCoefficients change(Residuals there, double steps) const;
