@@ -152,8 +152,10 @@ struct NamedColumn {
 /// Calls visit(stream's name, its columns) for all that a log has.
 void streams(FlightLog& log, const auto& visit) {
   auto& c = log.command;
-  std::vector<NamedColumn> command = {
-      {"t_s", &c.t_s}, {"left_voltage_V", &c.left_voltage_V}, {"right_voltage_V", &c.right_voltage_V}};
+  std::vector<NamedColumn> command = {{"t_s", &c.t_s}};
+  if (log.header.inputs.empty())
+    command.insert(command.end(), {{"left_voltage_V", &c.left_voltage_V}, {"right_voltage_V", &c.right_voltage_V}});
+  for (std::size_t i = 0; i < c.declared.size(); ++i) command.push_back({log.header.inputs[i].c_str(), &c.declared[i]});
   if (c.inputs)
     command.insert(command.end(), {{"amplitude_V", &c.inputs->amplitude_V},
                                    {"difference_V", &c.inputs->difference_V},
@@ -171,24 +173,32 @@ void streams(FlightLog& log, const auto& visit) {
                                           {"qy", &p.qy},
                                           {"qz", &p.qz}});
   auto& u = log.imu;
-  visit("imu", std::vector<NamedColumn>{{"t_s", &u.t_s},
-                                        {"gyro_x_rad_s", &u.gyro_x_rad_s},
-                                        {"gyro_y_rad_s", &u.gyro_y_rad_s},
-                                        {"gyro_z_rad_s", &u.gyro_z_rad_s},
-                                        {"accel_x_m_s2", &u.accel_x_m_s2},
-                                        {"accel_y_m_s2", &u.accel_y_m_s2},
-                                        {"accel_z_m_s2", &u.accel_z_m_s2}});
-  if (log.power)
-    visit("power", std::vector<NamedColumn>{{"t_s", &log.power->t_s},
-                                            {"battery_V", &log.power->battery_V},
-                                            {"left_current_A", &log.power->left_current_A},
-                                            {"right_current_A", &log.power->right_current_A}});
+  std::vector<NamedColumn> imu = {{"t_s", &u.t_s}};
+  if (log.header.imu.gyro)
+    imu.insert(
+        imu.end(),
+        {{"gyro_x_rad_s", &u.gyro_x_rad_s}, {"gyro_y_rad_s", &u.gyro_y_rad_s}, {"gyro_z_rad_s", &u.gyro_z_rad_s}});
+  imu.insert(imu.end(),
+             {{"accel_x_m_s2", &u.accel_x_m_s2}, {"accel_y_m_s2", &u.accel_y_m_s2}, {"accel_z_m_s2", &u.accel_z_m_s2}});
+  if (log.header.imu.rate_hz > 0) visit("imu", imu);
+  if (log.power) {
+    auto& b = *log.power;
+    std::vector<NamedColumn> power = {{"t_s", &b.t_s}, {"battery_V", &b.battery_V}};
+    if (log.header.power->currents)
+      power.insert(power.end(), {{"left_current_A", &b.left_current_A}, {"right_current_A", &b.right_current_A}});
+    visit("power", power);
+  }
   if (log.wings)
     visit("wings", std::vector<NamedColumn>{{"t_s", &log.wings->t_s},
                                             {"left_stroke_rad", &log.wings->left_stroke_rad},
                                             {"left_rotation_rad", &log.wings->left_rotation_rad},
                                             {"right_stroke_rad", &log.wings->right_stroke_rad},
                                             {"right_rotation_rad", &log.wings->right_rotation_rad}});
+  if (log.attitude) {
+    auto& a = *log.attitude;
+    visit("attitude",
+          std::vector<NamedColumn>{{"t_s", &a.t_s}, {"qw", &a.qw}, {"qx", &a.qx}, {"qy", &a.qy}, {"qz", &a.qz}});
+  }
 }
 
 nb::dict read_flight(const std::filesystem::path& folder) {
@@ -274,8 +284,8 @@ nb::dict fly(const std::filesystem::path& config, const std::vector<std::string>
 void bind_flights(nb::module_& m) {
   bind_fleet(m);
   m.def("read_flight", &read_flight, "folder"_a,
-        "A flight log: \"header\" (the text of flight.toml) and the streams command, mocap, imu, and power and wings "
-        "where it has them, each a dict "
+        "A flight log: \"header\" (the text of flight.toml) and the streams command, mocap, imu, and power, wings and "
+        "attitude where it has them, each a dict "
         "of columns, float64 (samples,), in the units that their names end with. InputError: \"file:line: what; what "
         "is accepted\".");
   m.def("write_flight", &write_flight, "folder"_a, "flight"_a,

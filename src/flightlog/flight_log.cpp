@@ -38,7 +38,7 @@ const std::vector<Field<BeatInputs>> kInputFields = {{"amplitude_V", &BeatInputs
                                                      {"bias_V", &BeatInputs::bias_V, 100},
                                                      {"split_cycle", &BeatInputs::split_cycle, 0.5}};
 const std::string kPhase = "phase_rad";
-constexpr double kPhaseLimit = 1e9;
+constexpr double kPhaseLimit = 1e9, kInputLimit = 1e6;
 const std::vector<Field<MocapStream>> kMocapFields = {
     {"t_s", &MocapStream::t_s, kLatest}, {"x_m", &MocapStream::x_m, 1e6}, {"y_m", &MocapStream::y_m, 1e6},
     {"z_m", &MocapStream::z_m, 1e6},     {"qw", &MocapStream::qw, 2},     {"qx", &MocapStream::qx, 2},
@@ -50,10 +50,17 @@ const std::vector<Field<ImuStream>> kImuFields = {{"t_s", &ImuStream::t_s, kLate
                                                   {"accel_x_m_s2", &ImuStream::accel_x_m_s2, 1e5},
                                                   {"accel_y_m_s2", &ImuStream::accel_y_m_s2, 1e5},
                                                   {"accel_z_m_s2", &ImuStream::accel_z_m_s2, 1e5}};
+const std::vector<Field<ImuStream>> kAccelFields = {kImuFields[0], kImuFields[4], kImuFields[5], kImuFields[6]};
 const std::vector<Field<PowerStream>> kPowerFields = {{"t_s", &PowerStream::t_s, kLatest},
                                                       {"battery_V", &PowerStream::battery_V, 100},
                                                       {"left_current_A", &PowerStream::left_current_A, 100},
                                                       {"right_current_A", &PowerStream::right_current_A, 100}};
+const std::vector<Field<PowerStream>> kBatteryFields = {kPowerFields[0], kPowerFields[1]};
+const std::vector<Field<AttitudeStream>> kAttitudeFields = {{"t_s", &AttitudeStream::t_s, kLatest},
+                                                            {"qw", &AttitudeStream::qw, 2},
+                                                            {"qx", &AttitudeStream::qx, 2},
+                                                            {"qy", &AttitudeStream::qy, 2},
+                                                            {"qz", &AttitudeStream::qz, 2}};
 const std::vector<Field<WingsStream>> kWingsFields = {{"t_s", &WingsStream::t_s, kLatest},
                                                       {"left_stroke_rad", &WingsStream::left_stroke_rad, 1e3},
                                                       {"left_rotation_rad", &WingsStream::left_rotation_rad, 1e3},
@@ -64,6 +71,15 @@ const std::vector<Field<WingsStream>> kWingsFields = {{"t_s", &WingsStream::t_s,
   throw io::InputError(place + ": " + what + (accepted.empty() ? "" : "; accepted: " + std::string(accepted)));
 }
 
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// Whether a stream has a part that those with voltages must have.
+bool has_part(const io::Table& stream, const char* key, bool declared_inputs) {
+  const bool has = stream.boolean_or(key, true);
+  if (!has && !declared_inputs) stream.fail(key, "is false in a log with voltages", "true, or [command] inputs");
+  return has;
+}
+
 /// Length 1 to the last digits, so that what was written reads back exactly.
 void normalise(double length, std::initializer_list<double*> components) {
   if (std::abs(length - 1) <= 4 * std::numeric_limits<double>::epsilon()) return;
@@ -72,10 +88,33 @@ void normalise(double length, std::initializer_list<double*> components) {
 
 // ---- the header
 
+ImuHeader parse_imu_header(const io::Table& imu, bool declared_inputs) {
+  const io::Range rate = positive(1e6);
+  ImuHeader h;
+  h.rate_hz = imu.number("rate_hz", rate);
+  h.latency_s = imu.number("latency_s", non_negative(10));
+  h.bandwidth_hz = imu.number("bandwidth_hz", rate);
+  std::ranges::copy(imu.numbers("position_m", 3, {-1, 1}), h.position_m.begin());
+  h.accel_noise_m_s2 = imu.number("accel_noise_m_s2", non_negative(1e3));
+  h.gyro = read_gyro(imu, declared_inputs);
+  if (!h.gyro) return h;
+  h.gyro_noise_rad_s = imu.number("gyro_noise_rad_s", non_negative(10));
+  std::ranges::copy(imu.numbers("gyro_bias_sd_rad_s", 3, non_negative(10)), h.gyro_bias_sd_rad_s.begin());
+  return h;
+}
+
+PowerHeader parse_power_header(const io::Table& power, bool declared_inputs) {
+  PowerHeader h{power.number("battery_nominal_V", positive(100)), power.number("rate_hz", positive(1e6)),
+                power.number("latency_s", non_negative(10)), power.number("voltage_noise_V", non_negative(10))};
+  h.currents = read_currents(power, declared_inputs);
+  if (h.currents) h.current_noise_A = power.number("current_noise_A", non_negative(10));
+  return h;
+}
+
 FlightHeader parse_header(const io::Table& root) {
   root.schema(1);
-  root.accept({"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2", "ambient", "mocap", "imu", "power",
-               "wings"});
+  root.accept({"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2", "ambient", "command", "mocap",
+               "imu", "power", "wings", "attitude"});
   FlightHeader h;
   h.vehicle = root.string("vehicle");
   if (h.vehicle.empty() || h.vehicle.find_first_of("/\\") != std::string::npos)
@@ -84,7 +123,8 @@ FlightHeader parse_header(const io::Table& root) {
   if (!h.vehicle_sha256.empty() &&
       (h.vehicle_sha256.size() != 64 || h.vehicle_sha256.find_first_not_of("0123456789abcdef") != std::string::npos))
     root.fail("vehicle_sha256", "is no SHA-256", "64 digits of 0 to 9 and a to f");
-  h.flapping_Hz = root.number("flapping_Hz", positive(1e3));
+  if (const auto command = root.optional_table("command")) h.inputs = read_inputs(*command);
+  h.flapping_Hz = read_flapping(root, h.inputs);
   h.gravity_m_s2 = root.number("gravity_m_s2", non_negative(100));
 
   h.ambient = read_ambient(root.table("ambient"));
@@ -93,20 +133,14 @@ FlightHeader parse_header(const io::Table& root) {
   const io::Table mocap = root.table("mocap");
   h.mocap = {mocap.number("rate_hz", rate), mocap.number("latency_s", latency),
              mocap.number("position_noise_m", non_negative(1)), mocap.number("attitude_noise_rad", non_negative(1))};
-  const io::Table imu = root.table("imu");
-  h.imu.rate_hz = imu.number("rate_hz", rate);
-  h.imu.latency_s = imu.number("latency_s", latency);
-  h.imu.bandwidth_hz = imu.number("bandwidth_hz", rate);
-  h.imu.gyro_noise_rad_s = imu.number("gyro_noise_rad_s", non_negative(10));
-  h.imu.accel_noise_m_s2 = imu.number("accel_noise_m_s2", non_negative(1e3));
-  std::ranges::copy(imu.numbers("position_m", 3, {-1, 1}), h.imu.position_m.begin());
-  std::ranges::copy(imu.numbers("gyro_bias_sd_rad_s", 3, non_negative(10)), h.imu.gyro_bias_sd_rad_s.begin());
-  if (const auto power = root.optional_table("power"))
-    h.power = {power->number("battery_nominal_V", positive(100)), power->number("rate_hz", rate),
-               power->number("latency_s", latency), power->number("voltage_noise_V", non_negative(10)),
-               power->number("current_noise_A", non_negative(10))};
+  const bool declared = !h.inputs.empty();
+  if (!declared || root.has("imu")) h.imu = parse_imu_header(root.table("imu"), declared);
+  if (const auto power = root.optional_table("power")) h.power = parse_power_header(*power, declared);
   if (const auto wings = root.optional_table("wings"))
     h.wings = {wings->number("rate_hz", rate), wings->number("noise_rad", non_negative(1))};
+  if (const auto attitude = root.optional_table("attitude"))
+    h.attitude = {attitude->number("rate_hz", rate), attitude->number("latency_s", latency),
+                  attitude->number("noise_rad", non_negative(1))};
   root.finish();
   return h;
 }
@@ -123,7 +157,7 @@ std::string header_text(const FlightHeader& h) {
   line("schema", "1");
   line("vehicle", io::toml_string(h.vehicle));
   if (!h.vehicle_sha256.empty()) line("vehicle_sha256", io::toml_string(h.vehicle_sha256));
-  number("flapping_Hz", h.flapping_Hz);
+  if (h.flapping_Hz > 0) number("flapping_Hz", h.flapping_Hz);
   number("gravity_m_s2", h.gravity_m_s2);
 
   text += "\n[ambient]\n";
@@ -135,20 +169,33 @@ std::string header_text(const FlightHeader& h) {
     walls += (walls.empty() ? "" : ", ") + array(std::array{w.x_m, w.y_m, w.normal_x, w.normal_y});
   line("walls", "[" + walls + "]");
 
+  if (!h.inputs.empty()) {
+    std::string list;
+    for (const std::string& name : h.inputs) list += (list.empty() ? "" : ", ") + io::toml_string(name);
+    text += "\n[command]\n";
+    line("inputs", "[" + list + "]");
+  }
+
   text += "\n[mocap]\n";
   number("rate_hz", h.mocap.rate_hz);
   number("latency_s", h.mocap.latency_s);
   number("position_noise_m", h.mocap.position_noise_m);
   number("attitude_noise_rad", h.mocap.attitude_noise_rad);
 
-  text += "\n[imu]\n";
-  number("rate_hz", h.imu.rate_hz);
-  number("latency_s", h.imu.latency_s);
-  number("bandwidth_hz", h.imu.bandwidth_hz);
-  line("position_m", array(h.imu.position_m));
-  number("gyro_noise_rad_s", h.imu.gyro_noise_rad_s);
-  line("gyro_bias_sd_rad_s", array(h.imu.gyro_bias_sd_rad_s));
-  number("accel_noise_m_s2", h.imu.accel_noise_m_s2);
+  if (h.imu.rate_hz > 0) {
+    text += "\n[imu]\n";
+    number("rate_hz", h.imu.rate_hz);
+    number("latency_s", h.imu.latency_s);
+    number("bandwidth_hz", h.imu.bandwidth_hz);
+    line("position_m", array(h.imu.position_m));
+    if (h.imu.gyro) {
+      number("gyro_noise_rad_s", h.imu.gyro_noise_rad_s);
+      line("gyro_bias_sd_rad_s", array(h.imu.gyro_bias_sd_rad_s));
+    } else {
+      line("gyro", "false");
+    }
+    number("accel_noise_m_s2", h.imu.accel_noise_m_s2);
+  }
 
   if (h.power) {
     text += "\n[power]\n";
@@ -156,12 +203,19 @@ std::string header_text(const FlightHeader& h) {
     number("rate_hz", h.power->rate_hz);
     number("latency_s", h.power->latency_s);
     number("voltage_noise_V", h.power->voltage_noise_V);
-    number("current_noise_A", h.power->current_noise_A);
+    if (h.power->currents) number("current_noise_A", h.power->current_noise_A);
+    else line("currents", "false");
   }
   if (h.wings) {
     text += "\n[wings]\n";
     number("rate_hz", h.wings->rate_hz);
     number("noise_rad", h.wings->noise_rad);
+  }
+  if (h.attitude) {
+    text += "\n[attitude]\n";
+    number("rate_hz", h.attitude->rate_hz);
+    number("latency_s", h.attitude->latency_s);
+    number("noise_rad", h.attitude->noise_rad);
   }
   return text;
 }
@@ -243,6 +297,17 @@ Stream parse_stream(const std::string& text, const fs::path& path, const std::ve
   return stream;
 }
 
+CommandStream parse_declared(const std::string& text, const fs::path& path, const std::vector<std::string>& inputs) {
+  std::vector<std::string> names = {"t_s"};
+  names.insert(names.end(), inputs.begin(), inputs.end());
+  const StreamReader reader(text, path, names);
+  CommandStream command;
+  command.t_s = reader.take("t_s", kLatest);
+  reader.require_increasing(command.t_s);
+  for (const std::string& name : inputs) command.declared.push_back(reader.take(name, kInputLimit));
+  return command;
+}
+
 CommandStream parse_command(const std::string& text, const fs::path& path) {
   std::vector<std::string> optional = names_of(kInputFields);
   optional.push_back(kPhase);
@@ -262,8 +327,10 @@ CommandStream parse_command(const std::string& text, const fs::path& path) {
   return command;
 }
 
-MocapStream parse_mocap(const std::string& text, const fs::path& path) {
-  MocapStream m = parse_stream(text, path, kMocapFields);
+/// A stream with a quaternion.
+template <class Stream>
+Stream parse_turned(const std::string& text, const fs::path& path, const std::vector<Field<Stream>>& fields) {
+  Stream m = parse_stream(text, path, fields);
   for (std::size_t i = 0; i < m.t_s.size(); ++i) {
     const double length = std::sqrt(m.qw[i] * m.qw[i] + m.qx[i] * m.qx[i] + m.qy[i] * m.qy[i] + m.qz[i] * m.qz[i]);
     if (std::abs(length - 1) > kUnitTolerance)
@@ -291,9 +358,15 @@ std::string stream_text(const Stream& stream, const std::vector<Field<Stream>>& 
   return io::csv_text(names, columns);
 }
 
-std::string command_text(const CommandStream& command) {
+std::string command_text(const CommandStream& command, const std::vector<std::string>& inputs) {
   std::vector<std::string> names;
   std::vector<Column> columns;
+  if (!inputs.empty()) {
+    names = {"t_s"}, columns = {command.t_s};
+    names.insert(names.end(), inputs.begin(), inputs.end());
+    columns.insert(columns.end(), command.declared.begin(), command.declared.end());
+    return io::csv_text(names, columns);
+  }
   add_columns(command, kCommandFields, names, columns);
   if (command.inputs) add_columns(*command.inputs, kInputFields, names, columns);
   if (command.phase_rad) {
@@ -306,10 +379,11 @@ std::string command_text(const CommandStream& command) {
 // ---- the whole
 
 void require_overlap(const FlightLog& log, const fs::path& folder) {
-  std::vector<std::pair<std::string, const Column*>> streams = {
-      {kCommand, &log.command.t_s}, {kMocap, &log.mocap.t_s}, {kImu, &log.imu.t_s}};
+  std::vector<std::pair<std::string, const Column*>> streams = {{kCommand, &log.command.t_s}, {kMocap, &log.mocap.t_s}};
+  if (!log.imu.t_s.empty()) streams.emplace_back(kImu, &log.imu.t_s);
   if (log.power) streams.emplace_back(kPower, &log.power->t_s);
   if (log.wings) streams.emplace_back(kWings, &log.wings->t_s);
+  if (log.attitude) streams.emplace_back(kAttitude, &log.attitude->t_s);
   const auto& last = *std::ranges::max_element(streams, {}, [](const auto& s) { return s.second->front(); });
   const auto& first = *std::ranges::min_element(streams, {}, [](const auto& s) { return s.second->back(); });
   if (last.second->front() >= first.second->back())
@@ -327,14 +401,26 @@ const std::string& text_of(const LogFiles& files, const std::string& name, const
 }
 
 /// The stream of an optional file, which the header's table of the same name says how to read.
+void require_declared(const std::string& name, const fs::path& folder, bool declared) {
+  const std::string table = "[" + name.substr(0, name.find('.')) + "]";
+  if (!declared)
+    refuse((folder / name).string(), "is there, but " + kHeader + " has no " + table, table + ", or no " + name);
+}
+
+const std::vector<Field<ImuStream>>& imu_fields(const FlightHeader& h) {
+  return h.imu.gyro ? kImuFields : kAccelFields;
+}
+
+const std::vector<Field<PowerStream>>& power_fields(const FlightHeader& h) {
+  return h.power && !h.power->currents ? kBatteryFields : kPowerFields;
+}
+
 template <class Stream>
 std::optional<Stream> parse_optional(const LogFiles& files, const std::string& name, const fs::path& folder,
                                      bool declared, const std::vector<Field<Stream>>& fields) {
   const auto found = files.find(name);
   if (found == files.end()) return std::nullopt;
-  const std::string table = "[" + name.substr(0, name.find('.')) + "]";
-  if (!declared)
-    refuse((folder / name).string(), "is there, but " + kHeader + " has no " + table, table + ", or no " + name);
+  require_declared(name, folder, declared);
   return parse_stream(found->second, folder / name, fields);
 }
 
@@ -362,26 +448,67 @@ LogAmbient read_ambient(const io::Table& ambient) {
   return a;
 }
 
+std::vector<std::string> read_inputs(const io::Table& command) {
+  constexpr std::string_view kAccepted = "names of columns, of letters, digits and _";
+  const std::vector<std::string> inputs = command.strings("inputs");
+  if (inputs.empty()) command.fail("inputs", "is empty", kAccepted);
+  for (const std::string& name : inputs) {
+    const bool plain = std::ranges::all_of(
+        name, [](char c) { return c == '_' || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || is_digit(c); });
+    if (!plain || name.empty() || is_digit(name.front()) || name == "t_s")
+      command.fail("inputs", "\"" + name + "\" is no name of an input", kAccepted);
+    if (std::ranges::count(inputs, name) > 1)
+      command.fail("inputs", "\"" + name + "\" is there twice", "each input once");
+  }
+  return inputs;
+}
+
+double read_flapping(const io::Table& root, const std::vector<std::string>& inputs) {
+  return inputs.empty() || root.has("flapping_Hz") ? root.number("flapping_Hz", positive(1e3)) : 0;
+}
+
+bool read_gyro(const io::Table& imu, bool declared_inputs) { return has_part(imu, "gyro", declared_inputs); }
+
+bool read_currents(const io::Table& power, bool declared_inputs) {
+  return has_part(power, "currents", declared_inputs);
+}
+
+void require_voltages(const FlightLog& log, const std::string& place) {
+  if (log.header.inputs.empty()) return;
+  refuse(place, "is driven by " + io::joined(log.header.inputs),
+         "a flight driven by left_voltage_V and right_voltage_V");
+}
+
 FlightLog parse_flight_log(const LogFiles& files, const fs::path& folder) {
   const io::Table root = io::Config::parse(text_of(files, kHeader, folder), (folder / kHeader).string()).root();
   FlightLog log;
   log.header = parse_header(root);
-  log.command = parse_command(text_of(files, kCommand, folder), folder / kCommand);
-  log.mocap = parse_mocap(text_of(files, kMocap, folder), folder / kMocap);
-  log.imu = parse_stream(text_of(files, kImu, folder), folder / kImu, kImuFields);
-  log.power = parse_optional(files, kPower, folder, log.header.power.has_value(), kPowerFields);
-  log.wings = parse_optional(files, kWings, folder, log.header.wings.has_value(), kWingsFields);
+  const FlightHeader& h = log.header;
+  const std::string& command = text_of(files, kCommand, folder);
+  log.command = h.inputs.empty() ? parse_command(command, folder / kCommand)
+                                 : parse_declared(command, folder / kCommand, h.inputs);
+  log.mocap = parse_turned(text_of(files, kMocap, folder), folder / kMocap, kMocapFields);
+  if (h.imu.rate_hz > 0) text_of(files, kImu, folder);
+  log.imu = parse_optional(files, kImu, folder, h.imu.rate_hz > 0, imu_fields(h)).value_or(ImuStream{});
+  log.power = parse_optional(files, kPower, folder, h.power.has_value(), power_fields(h));
+  log.wings = parse_optional(files, kWings, folder, h.wings.has_value(), kWingsFields);
+  if (const auto found = files.find(kAttitude); found != files.end()) {
+    require_declared(kAttitude, folder, h.attitude.has_value());
+    log.attitude = parse_turned(found->second, folder / kAttitude, kAttitudeFields);
+  }
   require_overlap(log, folder);
   return log;
 }
 
 LogFiles flight_log_files(const FlightLog& log) {
-  LogFiles files = {{kHeader, header_text(log.header)},
-                    {kCommand, command_text(log.command)},
-                    {kMocap, stream_text(log.mocap, kMocapFields)},
-                    {kImu, stream_text(log.imu, kImuFields)}};
-  if (log.power) files[kPower] = stream_text(*log.power, kPowerFields);
+  const FlightHeader& h = log.header;
+  LogFiles files = {{kHeader, header_text(h)},
+                    {kCommand, command_text(log.command, h.inputs)},
+                    {kMocap, stream_text(log.mocap, kMocapFields)}};
+  if (h.imu.rate_hz > 0) files[kImu] = stream_text(log.imu, imu_fields(h));
+  if (log.power) files[kPower] = stream_text(*log.power, power_fields(h));
   if (log.wings) files[kWings] = stream_text(*log.wings, kWingsFields);
+  if (log.attitude) files[kAttitude] = stream_text(*log.attitude, kAttitudeFields);
   return files;
 }
 

@@ -1,12 +1,17 @@
 // The log of a flight, as any laboratory can write it: a folder of one header and one table for each stream.
 //
 //   flight.toml   what is declared: FlightHeader, `schema = 1`
-//   command.csv   t_s,left_voltage_V,right_voltage_V; optional: amplitude_V,difference_V,bias_V,split_cycle and phase_rad
+//   command.csv   t_s,left_voltage_V,right_voltage_V; optional: amplitude_V,difference_V,bias_V,split_cycle and phase_rad.
+//                 Of a robot without such motors: t_s and the inputs that [command] declares, nothing else
 //   mocap.csv     t_s,x_m,y_m,z_m,qw,qx,qy,qz
 //   imu.csv       t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2
 //   power.csv     optional, declared in [power]: t_s,battery_V,left_current_A,right_current_A
+//   attitude.csv  optional, declared in [attitude]: t_s,qw,qx,qy,qz, as a second estimator had it
 //   wings.csv     optional, declared in [wings]: t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad
 //   truth.csv     only from a simulator: the full state; no reader here opens it
+//
+// Where inputs are declared, imu.csv is optional as well; [imu] gyro = false: it has no gyro; [power] currents = false:
+// power.csv has the battery alone.
 //
 // All streams share one clock; each has its own rate and may have gaps; time increases. World W: z up. Body B: x
 // forward, y left, z up. Quaternion w, x, y, z, body to world, of length 1.
@@ -52,12 +57,14 @@ struct ImuHeader {
   double gyro_noise_rad_s = 0;
   std::array<double, 3> gyro_bias_sd_rad_s = {0, 0, 0};
   double accel_noise_m_s2 = 0;
+  bool gyro = true;  ///< whether imu.csv has one; without, its noise and bias are 0
   bool operator==(const ImuHeader&) const = default;
 };
 
 /// Voltage at a motor = command x battery_V / battery_nominal_V.
 struct PowerHeader {
   double battery_nominal_V = 0, rate_hz = 0, latency_s = 0, voltage_noise_V = 0, current_noise_A = 0;
+  bool currents = true;  ///< whether power.csv has them; without, their noise is 0
   bool operator==(const PowerHeader&) const = default;
 };
 
@@ -66,16 +73,25 @@ struct WingsHeader {
   bool operator==(const WingsHeader&) const = default;
 };
 
+/// Of a second estimator's attitude, as a rotation vector.
+struct AttitudeHeader {
+  double rate_hz = 0, latency_s = 0, noise_rad = 0;
+  bool operator==(const AttitudeHeader&) const = default;
+};
+
 /// All of flight.toml.
 struct FlightHeader {
-  std::string vehicle;         ///< name of the vehicle's file as declared, without folder
-  std::string vehicle_sha256;  ///< of that file's bytes, lower-case hex; empty where not declared
-  double flapping_Hz = 0, gravity_m_s2 = 9.81;
+  std::string vehicle;              ///< name of the vehicle's file as declared, without folder
+  std::string vehicle_sha256;       ///< of that file's bytes, lower-case hex; empty where not declared
+  std::vector<std::string> inputs;  ///< columns of command.csv in place of voltages; empty: it has voltages
+  double flapping_Hz = 0;           ///< 0 where inputs are declared and nothing flaps
+  double gravity_m_s2 = 9.81;
   LogAmbient ambient;
   MocapHeader mocap;
-  ImuHeader imu;
+  ImuHeader imu;  ///< of rate 0 where there is none
   std::optional<PowerHeader> power;
   std::optional<WingsHeader> wings;
+  std::optional<AttitudeHeader> attitude;
   bool operator==(const FlightHeader&) const = default;
 };
 
@@ -87,11 +103,12 @@ struct BeatInputs {
   bool operator==(const BeatInputs&) const = default;
 };
 
-/// t_s is when the driver applied the voltages; they hold until the next.
+/// t_s is when the driver applied the voltages, or the inputs; they hold until the next.
 struct CommandStream {
   Column t_s, left_voltage_V, right_voltage_V;
   std::optional<BeatInputs> inputs;
-  std::optional<Column> phase_rad;  ///< of the beat, 2 pi each; wrapped or not
+  std::optional<Column> phase_rad;    ///< of the beat, 2 pi each; wrapped or not
+  std::vector<Column> declared = {};  ///< in the order of FlightHeader::inputs; where they are, there are no voltages
   bool operator==(const CommandStream&) const = default;
 };
 
@@ -101,13 +118,13 @@ struct MocapStream {
   bool operator==(const MocapStream&) const = default;
 };
 
-/// Rate and specific force in B; t_s is when the sample arrived.
+/// Rate and specific force in B, the rate empty where there is no gyro, all where there is no IMU; t_s is when the sample arrived.
 struct ImuStream {
   Column t_s, gyro_x_rad_s, gyro_y_rad_s, gyro_z_rad_s, accel_x_m_s2, accel_y_m_s2, accel_z_m_s2;
   bool operator==(const ImuStream&) const = default;
 };
 
-/// Instantaneous and signed.
+/// Instantaneous and signed; currents empty where they are not logged.
 struct PowerStream {
   Column t_s, battery_V, left_current_A, right_current_A;
   bool operator==(const PowerStream&) const = default;
@@ -118,6 +135,11 @@ struct WingsStream {
   bool operator==(const WingsStream&) const = default;
 };
 
+struct AttitudeStream {
+  Column t_s, qw, qx, qy, qz;
+  bool operator==(const AttitudeStream&) const = default;
+};
+
 struct FlightLog {
   FlightHeader header;
   CommandStream command;
@@ -125,14 +147,15 @@ struct FlightLog {
   ImuStream imu;
   std::optional<PowerStream> power;  ///< only where the header has it, as the next
   std::optional<WingsStream> wings;
+  std::optional<AttitudeStream> attitude;
   bool operator==(const FlightLog&) const = default;
 };
 
 /// The names of the files.
 namespace log_file {
 inline const std::string kHeader = "flight.toml", kCommand = "command.csv", kMocap = "mocap.csv", kImu = "imu.csv",
-                         kPower = "power.csv", kWings = "wings.csv", kTruth = "truth.csv";
-inline const std::vector<std::string> kAll = {kHeader, kCommand, kMocap, kImu, kPower, kWings, kTruth};
+                         kPower = "power.csv", kWings = "wings.csv", kAttitude = "attitude.csv", kTruth = "truth.csv";
+inline const std::vector<std::string> kAll = {kHeader, kCommand, kMocap, kImu, kPower, kWings, kAttitude, kTruth};
 }  // namespace log_file
 
 /// Columns of truth.csv: pose, motion and wings, as the flapper has them, and its gyro's bias.
@@ -169,6 +192,12 @@ inline const std::vector<std::string> kMotionNames = {"t_s",
 /// Reads the keys of [ambient].
 LogAmbient read_ambient(const io::Table& ambient);
 
+/// `inputs`, `flapping_Hz`, `gyro` of [imu] and `currents` of [power], as a log and the mapping of an import have them.
+std::vector<std::string> read_inputs(const io::Table& command);
+double read_flapping(const io::Table& root, const std::vector<std::string>& inputs);
+bool read_gyro(const io::Table& imu, bool declared_inputs);
+bool read_currents(const io::Table& power, bool declared_inputs);
+
 /// Texts of the files of a log by name, truth.csv left out.
 using LogFiles = std::map<std::string, std::string>;
 
@@ -180,6 +209,9 @@ FlightLog read_flight_log(const std::filesystem::path& folder);
 
 /// The same from texts; `folder` stands for the place in messages.
 FlightLog parse_flight_log(const LogFiles& files, const std::filesystem::path& folder);
+
+/// InputError "place: ..." where inputs are declared, of what needs voltages, and with them an IMU that has a gyro.
+void require_voltages(const FlightLog& log, const std::string& place);
 
 /// InputError where one of these folders is given twice, under whatever name.
 void check_each_once(const std::vector<std::string>& folders);

@@ -81,18 +81,18 @@ void check_each_once(const std::vector<std::string>& folders) {
 FlightLog read_flight_log(const fs::path& folder) {
   std::error_code error;
   LogFiles files;
-  const std::vector<std::string> optional = {kPower, kWings};
+  const std::vector<std::string> optional = {kImu, kPower, kWings, kAttitude};
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     if (!name.ends_with(".csv") || name == kTruth) continue;
     // An optional stream under a wrong name would be left out in silence.
     const std::string nearest = io::nearest_name(name, optional);
     if (!nearest.empty() && nearest != name)
-      refuse(entry.path(), "is no stream of a flight log", kPower + " or " + kWings + io::did_you_mean(name, optional));
+      refuse(entry.path(), "is no stream of a flight log", io::joined(optional) + io::did_you_mean(name, optional));
     if (!nearest.empty()) files[name] = io::read_text(entry.path());
   }
   if (error) refuse(folder, "cannot be read: " + error.message(), "");
-  for (const auto& name : {kHeader, kCommand, kMocap, kImu}) files[name] = io::read_text(folder / name);
+  for (const auto& name : {kHeader, kCommand, kMocap}) files[name] = io::read_text(folder / name);
   FlightLog log = parse_flight_log(files, folder);
   const auto warn = [&](const char* table, const std::string& name) {
     io::log(io::LogLevel::warning,
@@ -100,6 +100,7 @@ FlightLog read_flight_log(const fs::path& folder) {
   };
   if (log.header.power && !log.power) warn("power", kPower);
   if (log.header.wings && !log.wings) warn("wings", kWings);
+  if (log.header.attitude && !log.attitude) warn("attitude", kAttitude);
   return log;
 }
 

@@ -93,6 +93,7 @@ Smoother::Smoother(const FlightLog& log, const std::filesystem::path& folder)
     : gravity_m_s2_(log.header.gravity_m_s2),
       longest_unseen_s_(kLongestUnseenFrames / log.header.mocap.rate_hz),
       arm_m_(log.header.imu.position_m.data()) {
+  require_voltages(log, folder.string());
   read_imu(log);
   const std::vector<Pose> poses = read_poses(log);
   if (poses.size() < 2)

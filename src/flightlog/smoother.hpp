@@ -37,7 +37,7 @@ class Smoother {
  public:
   using Covariance = Eigen::Matrix<double, 15, 15>;
 
-  /// io::InputError, naming `folder`, where motion capture and IMU, less their latencies, share fewer than two poses.
+  /// io::InputError, naming `folder`, where the flight has no voltages, and so perhaps no gyro, and where motion capture and IMU, less their latencies, share fewer than two poses.
   Smoother(const FlightLog& log, const std::filesystem::path& folder);
 
   /// Between the first and the last pose that the IMU covers.

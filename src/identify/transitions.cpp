@@ -231,6 +231,7 @@ Transitions::~Transitions() = default;
 
 void Transitions::add(const std::filesystem::path& folder, const flightlog::FlightLog& log,
                       const model::Vehicle& vehicle) {
+  flightlog::require_voltages(log, folder.string());
   const auto refuse = [&](const std::string& what) { throw io::InputError(folder.string() + ": " + what); };
   auto flight = std::make_unique<Flight>(folder, log, vehicle, options_.source);
   const flightlog::Smoother& t = flight->track;

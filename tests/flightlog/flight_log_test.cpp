@@ -94,6 +94,90 @@ TEST(FlightLog, ReadsBackExactly) {
   EXPECT_EQ(flight_log_files(least).size(), 4u);
 }
 
+/// Of a robot that is driven by other things than two voltages: three inputs, an IMU without gyro, a battery alone.
+flightlog::FlightLog log_of_inputs() {
+  flightlog::FlightLog log = sample_log();
+  flightlog::FlightHeader& h = log.header;
+  h.inputs = {"left_flap", "pitch_servo", "lamp2"};
+  h.flapping_Hz = 0;
+  h.imu.gyro = false, h.imu.gyro_noise_rad_s = 0, h.imu.gyro_bias_sd_rad_s = {0, 0, 0};
+  h.power->currents = false, h.power->current_noise_A = 0;
+  h.wings.reset();
+  h.attitude = {100, 1.0 / 300, 0.02};
+  flightlog::CommandStream& c = log.command;
+  c.declared = {c.left_voltage_V, c.right_voltage_V, flightlog::Column(5, 65535)};
+  c.left_voltage_V.clear(), c.right_voltage_V.clear(), c.inputs.reset(), c.phase_rad.reset();
+  flightlog::ImuStream& u = log.imu;
+  for (flightlog::Column* gyro : {&u.gyro_x_rad_s, &u.gyro_y_rad_s, &u.gyro_z_rad_s}) gyro->clear();
+  log.power->left_current_A.clear(), log.power->right_current_A.clear();
+  log.wings.reset();
+  const flightlog::MocapStream& m = log.mocap;
+  log.attitude = flightlog::AttitudeStream{m.t_s, m.qx, m.qw, m.qy, m.qz};
+  return log;
+}
+
+TEST(FlightLog, OfDeclaredInputsReadsBackExactly) {
+  flightlog::FlightLog log = log_of_inputs();
+  EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(log), "log"), log);
+  EXPECT_EQ(flight_log_files(log).at("command.csv").substr(0, 31), "t_s,left_flap,pitch_servo,lamp2");
+  log.header.imu = {};
+  log.imu = {};
+  log.header.flapping_Hz = 14.7;
+  log.header.attitude.reset();
+  log.attitude.reset();
+  EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(log), "log"), log);
+  EXPECT_EQ(flight_log_files(log).size(), 4u);
+}
+
+TEST(FlightLog, OfDeclaredInputsIsRefusedWhereItIsFaulty) {
+  const auto edited = [](const std::string& name, const std::string& old, const std::string& fresh) {
+    flightlog::LogFiles files = flight_log_files(log_of_inputs());
+    const std::size_t at = files.at(name).find(old);
+    if (at == std::string::npos) return "\"" + old + "\" is not in " + name;
+    files[name].replace(at, old.size(), fresh);
+    return message([&] { flightlog::parse_flight_log(files, "log"); });
+  };
+  const auto header = [&](const std::string& old, const std::string& fresh) {
+    return edited("flight.toml", old, fresh);
+  };
+  const std::string names = "; accepted: names of columns, of letters, digits and _";
+  const std::string inputs = R"(["left_flap", "pitch_servo", "lamp2"])";
+  EXPECT_EQ(header(inputs, "[]"), "log/flight.toml:13:10: command.inputs: is empty" + names);
+  EXPECT_EQ(header("lamp2", "lamp,2"),
+            "log/flight.toml:13:10: command.inputs: \"lamp,2\" is no name of an input" + names);
+  EXPECT_EQ(header("lamp2", "t_s"), "log/flight.toml:13:10: command.inputs: \"t_s\" is no name of an input" + names);
+  EXPECT_EQ(header("lamp2", "left_flap"),
+            "log/flight.toml:13:10: command.inputs: \"left_flap\" is there twice; accepted: each input once");
+  EXPECT_EQ(header("[command]\ninputs = " + inputs, ""),
+            "log/flight.toml: flapping_Hz: is missing; accepted: a number above 0, at most 1000");
+  EXPECT_EQ(header("[command]\ninputs = " + inputs, "[command]"),
+            "log/flight.toml:12:1: command.inputs: is missing; accepted: an array of strings");
+  EXPECT_EQ(edited("command.csv", "lamp2", "lamp"),
+            "log/command.csv:1: lamp: unknown column; accepted: t_s, left_flap, pitch_servo, lamp2; did you mean "
+            "\"lamp2\"?");
+  EXPECT_EQ(edited("command.csv", "65535", "6553500"),
+            "log/command.csv:2: lamp2: 6553500 is out of range; accepted: a number from -1e+06 to 1e+06");
+  EXPECT_EQ(header("gyro = false", "gyro = true"),
+            "log/flight.toml:21:1: imu.gyro_noise_rad_s: is missing; accepted: a number from 0 to 10");
+  EXPECT_EQ(edited("imu.csv", "accel_x_m_s2", "gyro_x_rad_s"),
+            "log/imu.csv:1: gyro_x_rad_s: unknown column; accepted: t_s, accel_x_m_s2, accel_y_m_s2, accel_z_m_s2");
+  EXPECT_EQ(header("[attitude]\nrate_hz = 100.0\nlatency_s = 0.0033333333333333335\nnoise_rad = 0.02\n", ""),
+            "log/attitude.csv: is there, but flight.toml has no [attitude]; accepted: [attitude], or no attitude.csv");
+  flightlog::LogFiles files = flight_log_files(log_of_inputs());
+  files.erase("imu.csv");
+  EXPECT_EQ(message([&] { flightlog::parse_flight_log(files, "log"); }),
+            "log/imu.csv: is missing; accepted: a folder with flight.toml, command.csv, mocap.csv and imu.csv");
+  // A log with voltages has all of these.
+  flightlog::LogFiles plain = flight_log_files(sample_log());
+  plain["flight.toml"].replace(plain["flight.toml"].find("[imu]\n"), 6, "[imu]\ngyro = false\n");
+  EXPECT_EQ(message([&] { flightlog::parse_flight_log(plain, "log"); }),
+            "log/flight.toml:20:8: imu.gyro: is false in a log with voltages; accepted: true, or [command] inputs");
+  EXPECT_EQ(message([&] { flightlog::require_voltages(log_of_inputs(), "log"); }),
+            "log: is driven by left_flap, pitch_servo, lamp2; accepted: a flight driven by left_voltage_V and "
+            "right_voltage_V");
+  EXPECT_EQ(message([&] { flightlog::require_voltages(sample_log(), "log"); }), "accepted");
+}
+
 TEST(FlightLog, KeepsUnitQuaternionsToTheLastDigit) {
   flightlog::FlightLog log = sample_log();
   flightlog::MocapStream& m = log.mocap;
@@ -134,10 +218,10 @@ TEST(FlightLog, RefusesFaultyHeaders) {
   EXPECT_EQ(header("schema = 1", "schema = 2"),
             "log/flight.toml:1:10: schema: 2 is read by a newer flappy than this one; accepted: 1");
   EXPECT_EQ(header("schema = 1", "schema = 0"), "log/flight.toml:1:10: schema: 0 is read by no flappy; accepted: 1");
-  EXPECT_EQ(
-      header("gravity_m_s2", "gravity"),
-      "log/flight.toml:5:1: gravity: unknown key; accepted: ambient, flapping_Hz, gravity_m_s2, imu, mocap, power, "
-      "schema, vehicle, vehicle_sha256, wings");
+  EXPECT_EQ(header("gravity_m_s2", "gravity"),
+            "log/flight.toml:5:1: gravity: unknown key; accepted: ambient, attitude, command, flapping_Hz, "
+            "gravity_m_s2, imu, "
+            "mocap, power, schema, vehicle, vehicle_sha256, wings");
   EXPECT_EQ(header("gravity_m_s2 = 9.8", "# "),
             "log/flight.toml: gravity_m_s2: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(header("flapping_Hz = 34.0", "flapping_Hz = -34.0"),
@@ -356,8 +440,8 @@ TEST_F(FlightLogFolder, RefusesWhatIsNotThere) {
   EXPECT_EQ(flightlog::read_flight_log(folder_), sample_log());
   fs::rename(folder_ / "power.csv", folder_ / "Power.csv");
   EXPECT_EQ(read_message(folder_), (folder_ / "Power.csv").string() +
-                                       ": is no stream of a flight log; accepted: power.csv or "
-                                       "wings.csv; did you mean \"power.csv\"?");
+                                       ": is no stream of a flight log; accepted: imu.csv, power.csv, wings.csv, "
+                                       "attitude.csv; did you mean \"power.csv\"?");
   fs::remove(folder_ / "Power.csv");
   testing::internal::CaptureStderr();
   const flightlog::FlightLog without = flightlog::read_flight_log(folder_);

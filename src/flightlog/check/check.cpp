@@ -23,9 +23,9 @@ void check_stream(const StreamStatistics& s, double flapping_Hz, Findings& findi
   if (missing > 0.01)
     warn(format("%zu samples missing (%.1f %%), at most 1 %% expected: dropouts", s.missing, 100 * missing));
   // Three beats unseen cannot be bridged: the body's motion within a beat is not smooth.
-  if (s.longest_gap_s > std::max(10 * interval, 3 / flapping_Hz))
-    warn(format("a gap of %.3g s, at most %.3g s expected: lost tracking or a lost link", s.longest_gap_s,
-                std::max(10 * interval, 3 / flapping_Hz)));
+  const double longest_s = std::max(10 * interval, flapping_Hz > 0 ? 3 / flapping_Hz : 0);
+  if (s.longest_gap_s > longest_s)
+    warn(format("a gap of %.3g s, at most %.3g s expected: lost tracking or a lost link", s.longest_gap_s, longest_s));
   // Beyond this, samples begin to change places.
   if (s.jitter_s > 0.3 * interval)
     warn(format("intervals vary by %.2g ms of %.2g ms: arrival times are not evenly spaced; a buffered link?",
@@ -59,6 +59,7 @@ void check_latencies(const FlightHeader& h, Findings& findings) {
   look("mocap.latency_s", h.mocap.latency_s);
   look("imu.latency_s", h.imu.latency_s);
   if (h.power) look("power.latency_s", h.power->latency_s);
+  if (h.attitude) look("attitude.latency_s", h.attitude->latency_s);
   if (wrong.empty()) findings.push_back({"latencies", Verdict::ok, "declared ones are plausible", {}});
   else findings.push_back({"latencies", Verdict::warning, wrong + ": at most 0.1 s expected: milliseconds?", {}});
 }
@@ -139,19 +140,24 @@ CheckReport check_flight(const FlightLog& log) {
   };
   add("command", log.command.t_s, std::nullopt);
   add("mocap", log.mocap.t_s, h.mocap.rate_hz);
-  add("imu", log.imu.t_s, h.imu.rate_hz);
+  if (h.imu.rate_hz > 0) add("imu", log.imu.t_s, h.imu.rate_hz);
   if (log.power) add("power", log.power->t_s, h.power->rate_hz);
   if (log.wings) add("wings", log.wings->t_s, h.wings->rate_hz);
+  if (log.attitude) add("attitude", log.attitude->t_s, h.attitude->rate_hz);
   const MocapStream& m = log.mocap;
   check_repeats("mocap", {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz}, h.mocap.position_noise_m,
                 report.findings);
+  check_latencies(h, report.findings);
+  check_space(log, report.findings);
+  if (!h.inputs.empty()) {
+    report.findings.push_back({"motion", Verdict::not_tested, "inputs are declared in place of voltages", {}});
+    return report;
+  }
   const ImuStream& i = log.imu;
   check_repeats("imu",
                 {&i.gyro_x_rad_s, &i.gyro_y_rad_s, &i.gyro_z_rad_s, &i.accel_x_m_s2, &i.accel_y_m_s2, &i.accel_z_m_s2},
                 h.imu.gyro_noise_rad_s, report.findings);
-  check_latencies(h, report.findings);
   check_motion(log, report.findings);
-  check_space(log, report.findings);
   check_command(log, report.findings);
   check_beat(log, report.findings);
   check_power(log, report.findings);

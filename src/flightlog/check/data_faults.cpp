@@ -30,16 +30,16 @@ double command_rate_hz(const Column& t_s) {
   return 1 / io::order_statistic(std::move(intervals), tenth);
 }
 
-/// Voltages, motion capture and IMU, which every diagnosis needs, then the others.
+/// Commands, motion capture and, of a flight with voltages, IMU, which every diagnosis needs, then the others.
 std::vector<DeclaredStream> streams_of(const FlightLog& log) {
   const MocapStream& m = log.mocap;
   const ImuStream& s = log.imu;
   const FlightHeader& h = log.header;
   std::vector<DeclaredStream> list = {{kCommand, &log.command.t_s, command_rate_hz(log.command.t_s), {}},
-                                      {kMocap, &m.t_s, h.mocap.rate_hz, {}},
-                                      {kImu, &s.t_s, h.imu.rate_hz, {}}};
+                                      {kMocap, &m.t_s, h.mocap.rate_hz, {}}};
   if (h.mocap.position_noise_m > 0) list[1].measured = {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz};
-  if (h.imu.gyro_noise_rad_s > 0) list[2].measured = {&s.gyro_x_rad_s, &s.gyro_y_rad_s, &s.gyro_z_rad_s};
+  if (h.imu.rate_hz > 0) list.push_back({kImu, &s.t_s, h.imu.rate_hz, {}});
+  if (h.imu.gyro_noise_rad_s > 0) list.back().measured = {&s.gyro_x_rad_s, &s.gyro_y_rad_s, &s.gyro_z_rad_s};
   if (log.power) {
     list.push_back({kPower, &log.power->t_s, h.power->rate_hz, {}});
     if (h.power->current_noise_A > 0) list.back().measured = {&log.power->left_current_A, &log.power->right_current_A};
@@ -60,7 +60,8 @@ bool repeats(const DeclaredStream& s, std::size_t i) {
 /// the third does.
 std::pair<double, double> flight_of(const std::vector<DeclaredStream>& streams) {
   std::vector<double> begins, ends;
-  for (std::size_t k = 0; k < 3; ++k) begins.push_back(streams[k].begin_s()), ends.push_back(streams[k].end_s());
+  for (std::size_t k = 0; k < std::min<std::size_t>(3, streams.size()); ++k)
+    begins.push_back(streams[k].begin_s()), ends.push_back(streams[k].end_s());
   return {io::median(begins), io::median(ends)};
 }
 
@@ -91,9 +92,9 @@ std::vector<DataFault> missing(const std::vector<DeclaredStream>& streams) {
   return faults;
 }
 
-std::vector<DataFault> too_short(const std::vector<DeclaredStream>& all, double flapping_Hz) {
-  const std::vector<DeclaredStream> streams(all.begin(), all.begin() + 3);
-  const double least_s = std::max(kLeastBeats / flapping_Hz, kLeastTime_s);
+std::vector<DataFault> too_short(std::vector<DeclaredStream> streams, double flapping_Hz, bool voltages) {
+  streams.erase(streams.begin() + (voltages ? 3 : 2), streams.end());
+  const double least_s = std::max(flapping_Hz > 0 ? kLeastBeats / flapping_Hz : 0, kLeastTime_s);
   const auto& last = *std::ranges::max_element(streams, {}, &DeclaredStream::begin_s);
   const auto& first = *std::ranges::min_element(streams, {}, &DeclaredStream::end_s);
   const double common_s = first.end_s() - last.begin_s();
@@ -103,8 +104,8 @@ std::vector<DataFault> too_short(const std::vector<DeclaredStream>& all, double 
   const double shortest_s = shortest.end_s() - shortest.begin_s();
   if (shortest_s < least_s)
     return {{shortest.file, shortest.last_line(),
-             format("the flight lasts %.3g s, at least %.3g s (%.0f beats) are needed", shortest_s, least_s,
-                    least_s * flapping_Hz)}};
+             format("the flight lasts %.3g s, at least %.3g s", shortest_s, least_s) +
+                 (flapping_Hz > 0 ? format(" (%.0f beats)", least_s * flapping_Hz) : "") + " are needed"}};
   return {
       {last.file, 2,
        format("begins at %.6g s, %s ends at %.6g s: streams overlap by %.3g s, at least %.3g s needed; another clock, "
@@ -164,7 +165,7 @@ std::vector<DataFault> data_faults(const FlightLog& log, const CheckReport& repo
   const std::vector<DeclaredStream> streams = streams_of(log);
   // What is not there cannot be judged further.
   std::vector<DataFault> faults = missing(streams);
-  if (faults.empty()) faults = too_short(streams, log.header.flapping_Hz);
+  if (faults.empty()) faults = too_short(streams, log.header.flapping_Hz, log.header.inputs.empty());
   if (faults.empty()) {
     faults = wrong_clocks(log, report);
     const bool clocks_off = !faults.empty();  // so currents go with other voltages

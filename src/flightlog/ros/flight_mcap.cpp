@@ -178,6 +178,9 @@ class FlightFile {
 
 }  // namespace
 
-void write_flight_mcap(const std::filesystem::path& path, const FlightLog& log) { FlightFile(path, log).write(); }
+void write_flight_mcap(const std::filesystem::path& path, const FlightLog& log) {
+  require_voltages(log, path.string());
+  FlightFile(path, log).write();
+}
 
 }  // namespace flappy::flightlog::ros

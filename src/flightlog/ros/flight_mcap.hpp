@@ -16,7 +16,7 @@
 
 namespace flappy::flightlog::ros {
 
-/// InputError where the file cannot be written.
+/// InputError where the file cannot be written, or the flight has no voltages.
 void write_flight_mcap(const std::filesystem::path& path, const FlightLog& log);
 
 }  // namespace flappy::flightlog::ros
