@@ -192,16 +192,17 @@ class Flight {
   /// What the recorder has made of the period: angles, if it has none, are true ones.
   void show_recorded() {
     const flightlog::FlightLog& log = recorder_->so_far();
-    const auto& [t_s, left_V, right_V, inputs, phase_rad] = log.command;
-    for (; applied_ < t_s.size(); ++applied_) {
+    const flightlog::CommandStream& c = log.command;
+    for (; applied_ < c.t_s.size(); ++applied_) {
       const std::size_t k = applied_;
+      const flightlog::BeatInputs& inputs = *c.inputs;
       topics_.write(
-          AppliedSample{t_s[k],
+          AppliedSample{c.t_s[k],
                         k,
-                        {inputs->amplitude_V[k], inputs->difference_V[k], inputs->bias_V[k], inputs->split_cycle[k]},
-                        left_V[k],
-                        right_V[k],
-                        (*phase_rad)[k]});
+                        {inputs.amplitude_V[k], inputs.difference_V[k], inputs.bias_V[k], inputs.split_cycle[k]},
+                        c.left_voltage_V[k],
+                        c.right_voltage_V[k],
+                        (*c.phase_rad)[k]});
     }
     for (; log.power && batteries_ < log.power->t_s.size(); ++batteries_) {
       const flightlog::PowerStream& p = *log.power;
