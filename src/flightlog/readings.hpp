@@ -24,13 +24,14 @@ std::vector<PoseReading> pose_readings(const FlightLog& log);
 /// those of arrival: a line through them, gaps counted. Left as they are where no such clock is found.
 FlightLog on_its_clocks(FlightLog log);
 
-/// A sample of the IMU, in B.
+/// A sample of the IMU, in B; its rate is 0 where there is no gyro.
 struct ImuReading {
   Eigen::Vector3d rate_rad_s, force_m_s2;
 };
 inline ImuReading imu_reading(const ImuStream& s, std::size_t i) {
-  return {{s.gyro_x_rad_s[i], s.gyro_y_rad_s[i], s.gyro_z_rad_s[i]},
-          {s.accel_x_m_s2[i], s.accel_y_m_s2[i], s.accel_z_m_s2[i]}};
+  const Eigen::Vector3d force(s.accel_x_m_s2[i], s.accel_y_m_s2[i], s.accel_z_m_s2[i]);
+  if (s.gyro_x_rad_s.empty()) return {Eigen::Vector3d::Zero(), force};
+  return {{s.gyro_x_rad_s[i], s.gyro_y_rad_s[i], s.gyro_z_rad_s[i]}, force};
 }
 
 /// Index of the last of increasing `times` not after a time; 0 before the first.

@@ -20,8 +20,10 @@ Json run_import(const ImportCommand& command) {
     warnings.push_back(command.mapping.string() + ": " + warning);
   for (const std::string& warning : warnings) io::log(io::LogLevel::warning, warning);
   write_flight_log(command.out, imported.log);
-  std::printf("%s: %s, %g Hz\n%s", command.out.c_str(), imported.log.header.vehicle.c_str(),
-              imported.log.header.flapping_Hz, report_text(imported.report).c_str());
+  const flightlog::FlightHeader& h = imported.log.header;
+  const std::string beat = h.flapping_Hz > 0 ? ", " + io::shortest_digits(h.flapping_Hz) + " Hz" : "";
+  std::printf("%s: %s%s\n%s", command.out.c_str(), h.vehicle.c_str(), beat.c_str(),
+              report_text(imported.report).c_str());
   Json json = json_of(imported.report);
   json["folder"] = command.out.string();
   json["warnings"] = warnings;

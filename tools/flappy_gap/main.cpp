@@ -48,7 +48,8 @@ struct Checked {
 
 void print(const std::string& folder, const Checked& checked) {
   const auto& [header, report, faults] = checked;
-  std::printf("%s: %s, %g Hz\n", folder.c_str(), header.vehicle.c_str(), header.flapping_Hz);
+  const std::string beat = header.flapping_Hz > 0 ? ", " + io::shortest_digits(header.flapping_Hz) + " Hz" : "";
+  std::printf("%s: %s%s\n", folder.c_str(), header.vehicle.c_str(), beat.c_str());
   std::printf("  %-8s %9s %9s %9s %9s %12s %17s %10s\n", "stream", "samples", "s", "Hz", "declared", "longest ms",
               "missing", "jitter ms");
   for (const flightlog::StreamStatistics& s : report.streams) print(s);

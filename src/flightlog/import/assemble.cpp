@@ -34,7 +34,7 @@ const Channel& channel_of(const Channels& channels, const StreamMapping& s, cons
 
 /// Whether a stream that a log need not have is not recorded.
 bool left_out(const Channels& channels, const StreamMapping& s) {
-  return (s.name == "power" || s.name == "wings") && !channels.find(s.channel);
+  return (s.name == "power" || s.name == "wings" || s.name == "attitude") && !channels.find(s.channel);
 }
 
 const std::vector<double>& field_of(const Channel& channel, const io::Table& table, const std::string& key,
@@ -166,7 +166,8 @@ struct Stream {
       for (const char* name : {"gyro_y_rad_s", "gyro_z_rad_s", "accel_y_m_s2", "accel_z_m_s2"})
         if (const auto c = columns.find(name); c != columns.end())
           for (double& value : c->second) value = -value;
-    if (mapping.name != "mocap" || (!mapping.frd && !mapping.ned)) return;
+    if (!columns.contains("qw") || (!mapping.frd && !mapping.ned)) return;
+    const bool placed = columns.contains("x_m");
     Column &x = columns["x_m"], &y = columns["y_m"], &z = columns["z_m"];
     Column &qw = columns["qw"], &qx = columns["qx"], &qy = columns["qy"], &qz = columns["qz"];
     constexpr double kHalf = std::numbers::sqrt2 / 2;
@@ -177,28 +178,57 @@ struct Stream {
       if (mapping.ned) q = kFromNed * q;
       if (mapping.frd) q = q * kFromFlu;
       qw[i] = q.w, qx[i] = q.x, qy[i] = q.y, qz[i] = q.z;
-      if (!mapping.ned) continue;
+      if (!mapping.ned || !placed) continue;
       std::swap(x[i], y[i]);
       z[i] = -z[i];
     }
   }
 };
 
+/// Angles become the quaternion that they stand for.
+void turn_angles(Stream& s) {
+  if (!s.columns.contains("roll_rad")) return;
+  const Column roll = s.columns["roll_rad"], pitch = s.columns["pitch_rad"], yaw = s.columns["yaw_rad"];
+  constexpr double kMost_rad = 2 * std::numbers::pi + 0.1;
+  for (const auto& [name, angles] : {std::pair("roll_rad", &roll), std::pair("pitch_rad", &pitch)})
+    for (const double angle : *angles)
+      if (std::abs(angle) > kMost_rad)
+        s.mapping.table.table("columns").fail(
+            name, "reaches " + io::shortest_digits(angle) + ": likely in degrees",
+            "rad: beside it " + s.mapping.name + ".scale." + name + " = 0.017453292519943295");
+  for (const char* name : {"roll_rad", "pitch_rad", "yaw_rad"}) s.columns.erase(name);
+  for (std::size_t i = 0; i < roll.size(); ++i) {
+    const auto about = [](double angle, double x, double y, double z) {
+      const double sine = std::sin(angle / 2);
+      return Quaternion{std::cos(angle / 2), sine * x, sine * y, sine * z};
+    };
+    const Quaternion q = about(yaw[i], 0, 0, 1) * about(pitch[i], 0, 1, 0) * about(roll[i], 1, 0, 0);
+    s.columns["qw"].push_back(q.w), s.columns["qx"].push_back(q.x);
+    s.columns["qy"].push_back(q.y), s.columns["qz"].push_back(q.z);
+  }
+}
+
 bool is_rotation(const Stream& s, std::size_t i) {
-  if (s.mapping.name != "mocap") return true;
+  if (!s.columns.contains("qw")) return true;
   double square = 0;
   for (const char* name : {"qw", "qx", "qy", "qz"}) square += std::pow(s.columns.at(name)[i], 2);
   return std::abs(std::sqrt(square) - 1) <= kQuaternionTolerance;
 }
 
+/// The time that a log is to have, by the receiver's clock.
+struct Span {
+  std::int64_t from_ns = std::numeric_limits<std::int64_t>::min(), to_ns = std::numeric_limits<std::int64_t>::max();
+};
+
 /// Drops what is unusable, counts what is out of order and puts it in order, drops what came twice.
-void tidy(Stream& s, const std::vector<double>* sequence) {
+void tidy(Stream& s, const std::vector<double>* sequence, const Span& span) {
   std::vector<std::size_t> rows;
   std::int64_t latest = kNoTime;
   for (std::size_t i = 0; i < s.t_ns.size(); ++i) {
     std::size_t finite = 0;
     for (const auto& [name, column] : s.columns) finite += std::isfinite(column[i]);
     if (finite == 0) continue;  // another's row on the same channel
+    if (s.t_ns[i] != kNoTime && (s.t_ns[i] < span.from_ns || s.t_ns[i] > span.to_ns)) continue;
     if (finite < s.columns.size() || s.t_ns[i] == kNoTime || !is_rotation(s, i)) {
       ++s.report.unusable;
       continue;
@@ -254,7 +284,24 @@ void count_delays(Stream& s, const Channel& channel, const ClockLine& quickest) 
   s.report.delay_median_s = io::median(delays_s);
 }
 
-Stream read_stream(const Channels& channels, const StreamMapping& mapping, const Clocks& clocks) {
+/// While the robot flew.
+Span flown(const Channels& channels, const StreamMapping& command, const Clocks& clocks) {
+  if (command.flown_field.empty()) return {};
+  const Channel& channel = channel_of(channels, command, command.channel, "channel");
+  const std::vector<double>& says = field_of(channel, command.table.table("flown"), "field", command.flown_field);
+  const Timed own = timed(channel, command, clocks);
+  Span span;
+  std::swap(span.from_ns, span.to_ns);
+  for (std::size_t i = 0; i < says.size(); ++i)
+    if (says[i] > command.flown_above && own.t_ns[i] != kNoTime)
+      span = {std::min(span.from_ns, own.t_ns[i]), std::max(span.to_ns, own.t_ns[i])};
+  if (span.from_ns >= span.to_ns)
+    command.table.table("flown").fail("above", "\"" + command.flown_field + "\" is never above it",
+                                      "what it exceeds while the robot flies");
+  return span;
+}
+
+Stream read_stream(const Channels& channels, const StreamMapping& mapping, const Clocks& clocks, const Span& span) {
   const Channel& channel = channel_of(channels, mapping, mapping.channel, "channel");
   if (all_missing(raw_times(channel, mapping)) && !channel.received_ns().empty())
     mapping.table.fail("time",
@@ -281,8 +328,9 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
     s.columns[c.column] = std::move(column);
   }
   if (mapping.time != TimeOf::received) count_delays(s, channel, clocks.quickest(mapping));
+  turn_angles(s);
   const std::string& counted = mapping.sequence;
-  tidy(s, counted.empty() ? nullptr : &field_of(channel, mapping.table, "sequence", counted));
+  tidy(s, counted.empty() ? nullptr : &field_of(channel, mapping.table, "sequence", counted), span);
   if (s.t_ns.size() < 2)
     mapping.table.fail("channel",
                        "\"" + mapping.channel + "\" has " + std::to_string(s.t_ns.size()) + " usable samples, " +
@@ -305,6 +353,9 @@ void put(FlightLog& log, Stream& s, std::int64_t start_ns) {
   Columns& c = s.columns;
   if (s.mapping.name == "command") {
     CommandStream& to = log.command;
+    to.t_s = t_s;
+    for (const std::string& name : log.header.inputs) to.declared.push_back(c[name]);
+    if (!log.header.inputs.empty()) return;
     to = {t_s, c["left_voltage_V"], c["right_voltage_V"], {}, {}};
     if (c.contains("amplitude_V"))
       to.inputs = BeatInputs{c["amplitude_V"], c["difference_V"], c["bias_V"], c["split_cycle"]};
@@ -324,6 +375,9 @@ void put(FlightLog& log, Stream& s, std::int64_t start_ns) {
   } else if (s.mapping.name == "power") {
     log.power = PowerStream{t_s, c["battery_V"], c["left_current_A"], c["right_current_A"]};
     if (s.mapping.measures_rate) log.header.power->rate_hz = rate_hz;
+  } else if (s.mapping.name == "attitude") {
+    log.attitude = AttitudeStream{t_s, c["qw"], c["qx"], c["qy"], c["qz"]};
+    if (s.mapping.measures_rate) log.header.attitude->rate_hz = rate_hz;
   } else {
     log.wings =
         WingsStream{t_s, c["left_stroke_rad"], c["left_rotation_rad"], c["right_stroke_rad"], c["right_rotation_rad"]};
@@ -338,14 +392,16 @@ Imported assemble(const Channels& channels, const Mapping& mapping) {
   std::vector<Stream> streams;
   Imported out;
   out.log.header = mapping.header;
+  const Span span = flown(channels, mapping.streams.front(), clocks);
   for (const StreamMapping& s : mapping.streams) {
     if (!left_out(channels, s)) {
-      streams.push_back(read_stream(channels, s, clocks));
+      streams.push_back(read_stream(channels, s, clocks, span));
       continue;
     }
     out.report.warnings.push_back(s.name + ": " + s.channel + " is not recorded: done without");
     if (s.name == "power") out.log.header.power.reset();
-    else out.log.header.wings.reset();
+    else if (s.name == "wings") out.log.header.wings.reset();
+    else out.log.header.attitude.reset();
   }
   out.report.clocks = clocks.reports();
   if (mapping.from_first) {

@@ -37,7 +37,7 @@ struct ImportReport {
   std::int64_t start_ns = 0;  ///< the log's 0 s by the receiver's clock
   std::vector<StreamReport> streams;
   std::vector<ClockReport> clocks;
-  std::vector<std::string> warnings;  ///< of power and wings that are not recorded
+  std::vector<std::string> warnings;  ///< of power, wings and attitude that are not recorded
 };
 
 struct Imported {

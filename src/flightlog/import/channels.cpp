@@ -51,7 +51,7 @@ std::vector<std::string> Channel::fields() const {
 }
 
 bool Channels::wants(const std::string& channel) const {
-  return wanted_.empty() || wanted_.contains(channel) ||
+  return wanted_.empty() || wanted_.contains(channel) || wanted_.contains(kOnlyChannel) ||
          (channel.ends_with(kFirst) && wanted_.contains(channel.substr(0, channel.size() - kFirst.size())));
 }
 
@@ -60,6 +60,7 @@ void Channels::add(const std::string& channel) {
   auto wanted = wanted_.find(channel);
   if (wanted == wanted_.end() && channel.ends_with(kFirst))
     wanted = wanted_.find(channel.substr(0, channel.size() - kFirst.size()));
+  if (wanted == wanted_.end()) wanted = wanted_.find(kOnlyChannel);
   channels_.emplace(channel, Channel(wanted == wanted_.end() ? std::set<std::string>() : wanted->second));
 }
 
@@ -74,6 +75,7 @@ void Channels::add(const std::string& channel, std::int64_t received_ns, std::in
 }
 
 const Channel* Channels::find(const std::string& name) const {
+  if (name == kOnlyChannel) return channels_.size() == 1 ? &channels_.begin()->second : nullptr;
   auto found = channels_.find(name);
   if (found == channels_.end()) found = channels_.find(name + kFirst);
   return found == channels_.end() ? nullptr : &found->second;

@@ -21,6 +21,9 @@ struct Item {
 };
 using Row = std::vector<Item>;
 
+/// In place of a channel's name: whichever there is, of a recording that has one.
+inline const std::string kOnlyChannel = "*";
+
 /// Fields by channel.
 using Wanted = std::map<std::string, std::set<std::string>>;
 
@@ -57,7 +60,7 @@ class Channels {
   /// Makes a channel known, though no row of it may come.
   void add(const std::string& channel);
   void add(const std::string& channel, std::int64_t received_ns, std::int64_t stamp_ns, const Row& row);
-  /// `name`, or else `name`[0]; null where it is not there.
+  /// `name`, or else `name`[0], or kOnlyChannel; null where it is not there.
   const Channel* find(const std::string& name) const;
   std::vector<std::string> names() const;
 

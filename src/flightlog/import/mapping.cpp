@@ -46,7 +46,27 @@ const std::vector<StreamKeys> kStreams = {
      {"noise_rad"},
      false,
      false},
+    {"attitude", {"qw", "qx", "qy", "qz"}, {}, {"latency_s", "noise_rad"}, true, true},
 };
+const Names kAngles = {"roll_rad", "pitch_rad", "yaw_rad"};
+
+/// What a stream has of a table, where the table says that it has less, or something else.
+StreamKeys narrowed(StreamKeys keys, const io::Table& table, bool declared_inputs) {
+  const auto drop = [](Names& names, std::string_view part) {
+    std::erase_if(names, [&](const std::string& name) { return name.find(part) != std::string::npos; });
+  };
+  if (keys.name == "command" && declared_inputs) keys.columns = read_inputs(table), keys.optional_columns.clear();
+  if (keys.name == "imu" && !read_gyro(table, declared_inputs)) drop(keys.columns, "gyro"), drop(keys.declared, "gyro");
+  if (keys.name == "power" && !read_currents(table, declared_inputs))
+    drop(keys.columns, "current"), drop(keys.declared, "current");
+  if (!keys.has_world) return keys;
+  const auto columns = table.optional_table("columns");
+  if (columns && std::ranges::any_of(kAngles, [&](const std::string& name) { return columns->has(name); })) {
+    std::erase_if(keys.columns, [](const std::string& name) { return name.starts_with('q'); });
+    keys.columns.insert(keys.columns.end(), kAngles.begin(), kAngles.end());
+  }
+  return keys;
+}
 
 void read_columns(const StreamKeys& keys, StreamMapping& stream) {
   const io::Table& table = stream.table;
@@ -71,22 +91,30 @@ void read_columns(const StreamKeys& keys, StreamMapping& stream) {
     stream.columns.push_back(std::move(column));
   }
   Names given, missing;
-  if (keys.name == "command")
+  if (!keys.optional_columns.empty())
     for (const char* input : {"amplitude_V", "difference_V", "bias_V", "split_cycle"})
       (columns.has(input) ? given : missing).emplace_back(input);
   if (!given.empty() && !missing.empty())
     columns.fail(given.front(), "is given without " + io::joined(missing), "all four inputs of the wing beat, or none");
 }
 
-StreamMapping read_stream(const StreamKeys& keys, const io::Table& table) {
+StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bool declared_inputs) {
+  const StreamKeys keys = narrowed(all_keys, table, declared_inputs);
   Names accepted = {"channel",  "time",    "time_field", "time_unit", "clock", "late_s",
                     "sequence", "columns", "scale",      "offset",    "from"};
   accepted.insert(accepted.end(), keys.declared.begin(), keys.declared.end());
   if (keys.has_frame) accepted.emplace_back("frame");
   if (keys.has_world) accepted.emplace_back("world");
   if (keys.name != "command") accepted.emplace_back("rate_hz");
+  else accepted.insert(accepted.end(), {"inputs", "flown"});
+  if (keys.name == "imu") accepted.emplace_back("gyro");
+  if (keys.name == "power") accepted.emplace_back("currents");
   table.accept(accepted);
   StreamMapping s{.name = keys.name, .table = table};
+  if (const auto flown = keys.name == "command" ? table.optional_table("flown") : std::nullopt) {
+    s.flown_field = flown->string("field");
+    s.flown_above = flown->number("above");
+  }
   s.channel = table.string("channel");
   const std::string time = table.choice_or("time", "stamp", {"stamp", "received", "field"});
   s.time = time == "stamp" ? TimeOf::stamp : time == "received" ? TimeOf::received : TimeOf::field;
@@ -115,19 +143,32 @@ StreamMapping read_stream(const StreamKeys& keys, const io::Table& table) {
 void read_declared(const io::Table& root, FlightHeader& h) {
   const io::Range rate = positive(1e6), latency = non_negative(10);
   const auto rate_of = [&](const io::Table& table) { return table.number_or("rate_hz", 0, rate); };
-  const io::Table mocap = root.table("mocap"), imu = root.table("imu");
+  const bool declared = !h.inputs.empty();
+  const io::Table mocap = root.table("mocap");
   h.mocap = {rate_of(mocap), mocap.number("latency_s", latency), mocap.number("position_noise_m", non_negative(1)),
              mocap.number("attitude_noise_rad", non_negative(1))};
-  h.imu.rate_hz = rate_of(imu);
-  h.imu.latency_s = imu.number("latency_s", latency);
-  h.imu.bandwidth_hz = imu.number("bandwidth_hz", rate);
-  std::ranges::copy(imu.numbers("position_m", 3, {-1, 1}), h.imu.position_m.begin());
-  h.imu.gyro_noise_rad_s = imu.number("gyro_noise_rad_s", non_negative(10));
-  std::ranges::copy(imu.numbers("gyro_bias_sd_rad_s", 3, non_negative(10)), h.imu.gyro_bias_sd_rad_s.begin());
-  h.imu.accel_noise_m_s2 = imu.number("accel_noise_m_s2", non_negative(1e3));
-  if (const auto power = root.optional_table("power"))
+  if (!declared || root.has("imu")) {
+    const io::Table imu = root.table("imu");
+    h.imu.rate_hz = rate_of(imu);
+    h.imu.latency_s = imu.number("latency_s", latency);
+    h.imu.bandwidth_hz = imu.number("bandwidth_hz", rate);
+    std::ranges::copy(imu.numbers("position_m", 3, {-1, 1}), h.imu.position_m.begin());
+    h.imu.accel_noise_m_s2 = imu.number("accel_noise_m_s2", non_negative(1e3));
+    h.imu.gyro = read_gyro(imu, declared);
+    if (h.imu.gyro) {
+      h.imu.gyro_noise_rad_s = imu.number("gyro_noise_rad_s", non_negative(10));
+      std::ranges::copy(imu.numbers("gyro_bias_sd_rad_s", 3, non_negative(10)), h.imu.gyro_bias_sd_rad_s.begin());
+    }
+  }
+  if (const auto power = root.optional_table("power")) {
     h.power = {power->number("battery_nominal_V", positive(100)), rate_of(*power), power->number("latency_s", latency),
-               power->number("voltage_noise_V", non_negative(10)), power->number("current_noise_A", non_negative(10))};
+               power->number("voltage_noise_V", non_negative(10))};
+    h.power->currents = read_currents(*power, declared);
+    if (h.power->currents) h.power->current_noise_A = power->number("current_noise_A", non_negative(10));
+  }
+  if (const auto attitude = root.optional_table("attitude"))
+    h.attitude = {rate_of(*attitude), attitude->number("latency_s", latency),
+                  attitude->number("noise_rad", non_negative(1))};
   if (const auto wings = root.optional_table("wings"))
     h.wings = {rate_of(*wings), wings->number("noise_rad", non_negative(1))};
 }
@@ -140,6 +181,7 @@ Wanted Mapping::wanted() const {
     std::set<std::string>& own = wanted[s.channel];
     if (!s.time_field.empty()) own.insert(s.time_field);
     if (!s.sequence.empty()) own.insert(s.sequence);
+    if (!s.flown_field.empty()) own.insert(s.flown_field);
     for (const ColumnMapping& c : s.columns) {
       wanted[c.channel].insert(c.field);
       if (!s.time_field.empty()) wanted[c.channel].insert(s.time_field);
@@ -160,14 +202,17 @@ Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::s
   FlightHeader& h = m.header;
   h.vehicle = root.string("vehicle");
   h.vehicle_sha256 = root.string_or("vehicle_sha256", "");
-  h.flapping_Hz = root.number("flapping_Hz", positive(1e3));
+  const io::Table command = root.table("command");
+  if (command.has("inputs")) h.inputs = read_inputs(command);
+  h.flapping_Hz = read_flapping(root, h.inputs);
   h.gravity_m_s2 = root.number("gravity_m_s2", non_negative(100));
   m.from_first = root.choice_or("start", "first", {"first", "clock"}) == "first";
   h.ambient = read_ambient(root.table("ambient"));
   for (const StreamKeys& keys : kStreams) {
-    const bool optional = keys.name == "power" || keys.name == "wings";
-    if (optional && !root.has(keys.name)) continue;
-    m.streams.push_back(read_stream(keys, root.table(keys.name)));
+    const bool declared = !h.inputs.empty(),
+               needed = keys.name == "command" || keys.name == "mocap" || (keys.name == "imu" && !declared);
+    if (!needed && !root.has(keys.name)) continue;
+    m.streams.push_back(read_stream(keys, root.table(keys.name), declared));
   }
   read_declared(root, h);
   m.dds = io::read_dds_config(root);

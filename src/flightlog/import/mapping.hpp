@@ -17,7 +17,8 @@
 //   offset_s = 0.0                           # optional: the receiver's time less this clock's
 //
 //   [command]
-//   channel = "/wing_input"                  # a topic; a CSV's is the stem of its name
+//   channel = "/wing_input"                  # a topic; a CSV's is the stem of its name; "*": the only one of the recording
+//   inputs = ["left_flap", "tail"]           # optional: columns in place of voltages; [imu] and flapping_Hz are then optional
 //   time = "stamp"                           # default; "received", or "field"
 //   time_field = "timestamp"                 # with time = "field": where it is, and
 //   time_unit = "us"                         # ... in what: "s" (default), "ms", "us", "ns"
@@ -34,7 +35,12 @@
 //   [command.from]                           # optional: columns whose field is of another channel, as it last was
 //   right_voltage_V = "/right_wing_input"
 //
-//   [mocap]                                  # channel, time and columns as above, and
+//   [command.flown]                          # optional: the log lasts from the first to the last sample at which
+//   field = "thrust"                         # ... this field of the channel
+//   above = 0.0                              # ... is above this
+//
+//   [mocap]                                  # channel, time and columns as above, roll_rad, pitch_rad, yaw_rad in place of qw to qz where
+//                                            # the recording has angles, and
 //   world = "enu"                            # default; or "ned": the frame of position and attitude, turned to z up
 //   frame = "flu"                            # default; or "frd": the body's, turned to x forward, y left, z up
 //   rate_hz = 200                            # optional everywhere: measured
@@ -44,12 +50,20 @@
 //
 //   [imu]                                    # frame as above; columns are specific force and rate
 //   latency_s, bandwidth_hz, position_m, gyro_noise_rad_s, gyro_bias_sd_rad_s, accel_noise_m_s2
+//   gyro = true                              # default; false beside inputs: no gyro, nor its noise and bias
 //   [power]                                  # optional
 //   battery_nominal_V, latency_s, voltage_noise_V, current_noise_A
+//   currents = true                          # default; false beside inputs: battery_V alone
 //   [wings]                                  # optional
 //   noise_rad
+//   [attitude]                               # optional; world and frame as above: a second estimator's
+//   latency_s, noise_rad
 //
 //   [dds]                                    # for flappy-record: io/dds_config.hpp
+//
+// Angles turn W to B about z by yaw, then about the new y by pitch, then about the new x by roll (Diebel, Representing Attitude, 2006,
+// sequence 1-2-3). As y points left, pitch > 0 is nose down: the scale of an angle that is nose up, or in degrees, says so,
+// pitch_rad = -0.017453292519943295. With world = "ned" and frame = "frd" they are as in aviation, nose up.
 //
 // A joint's value is "position[left_stroke]", a transform's "transforms[torso].transform.translation.x".
 #pragma once
@@ -84,6 +98,8 @@ struct StreamMapping {
   std::string sequence;  ///< empty: none
   std::vector<ColumnMapping> columns;
   bool frd = false, ned = false, measures_rate = false;
+  std::string flown_field;  ///< of the command's: what says that the robot flies; empty: all of it does
+  double flown_above = 0;
   io::Table table;  ///< where faults are
 };
 
@@ -95,7 +111,7 @@ struct Mapping {
   bool from_first = true;
   std::map<std::string, double> offsets_s;  ///< of clocks, where given
   io::DdsConfig dds;                        ///< where a recorder finds the robot
-  std::vector<StreamMapping> streams;       ///< command, mocap, imu, and power and wings where mapped
+  std::vector<StreamMapping> streams;       ///< command, mocap, and imu, power, wings and attitude where mapped
 
   /// What a recording is read for.
   Wanted wanted() const;

@@ -1,8 +1,10 @@
 #include "flightlog/import/sources.hpp"
 
+#include <algorithm>
 #include <map>
 #include <optional>
 
+#include "flightlog/import/gzip.hpp"
 #include "flightlog/import/message_rows.hpp"
 #include "flightlog/import/ulog.hpp"
 #include "flightlog/ros/bag.hpp"
@@ -50,11 +52,24 @@ void read_bag(const fs::path& file, Channels& channels, std::vector<std::string>
                          " messages left out, the first because " + reader.first_fault);
 }
 
-void read_table(const fs::path& file, Channels& channels) {
-  const std::string channel = file.stem().string();
+/// Without a last line that its writer did not finish.
+std::string_view whole_lines(std::string_view text) {
+  const auto cells = [](std::string_view line) { return std::ranges::count(line, ','); };
+  const std::size_t last = text.rfind('\n');
+  if (last == std::string_view::npos || last + 1 == text.size()) return text;
+  return cells(text.substr(last)) < cells(text.substr(0, text.find('\n'))) ? text.substr(0, last + 1) : text;
+}
+
+void read_table(const fs::path& file, std::string_view bytes, Channels& channels, std::vector<std::string>& warnings) {
+  const bool packed = is_gzip(bytes);
+  // "camera" of "camera.csv" and of "camera.csv.gz"
+  const std::string channel = (packed && file.extension() == ".gz" ? file.stem() : file).stem().string();
   channels.add(channel);
   if (!channels.wants(channel)) return;
-  const io::CsvTable table = io::read_csv(file);
+  const std::string unpacked = packed ? gunzipped(bytes, file.string(), warnings) : "";
+  const std::string_view text = packed ? unpacked : bytes, whole = whole_lines(text);
+  if (whole.size() < text.size()) warnings.push_back(file.string() + ": its last line was cut off: left out");
+  const io::CsvTable table = io::parse_csv(whole, file.string(), io::Missing::nan);
   Row row;
   for (const std::string& name : table.names) row.push_back({name, 0});
   for (std::size_t i = 0; i < table.columns.front().size(); ++i) {
@@ -74,7 +89,7 @@ void read_source(const fs::path& file, Channels& channels, std::vector<std::stri
     if (file.extension() == ending)
       throw io::InputError(file.string() + ": does not begin as a " + ending +
                            " file; accepted: a bag, a ULog or a CSV");
-  read_table(file, channels);
+  read_table(file, mapped.bytes(), channels, warnings);
 }
 
 }  // namespace flappy::flightlog

@@ -489,5 +489,85 @@ TEST(Import, ReportsInLines) {
       << text;
 }
 
+/// One table of a robot that is known by its inputs, as its logger wrote it: it stands, flies from 0.10 s to 0.30 s, and stands.
+std::string table_of_inputs() {
+  std::string text =
+      "timeTick, roll, pitch, yaw, accX, accY, accZ, m1, m2, m3, m4, thrust, vbat, otX0, otY0, otZ0, otRoll0, "
+      "otPitch0, "
+      "otYaw0\n";
+  for (int i = 0; i < 40; ++i) {
+    const bool flies = i >= 10 && i <= 30;
+    const std::string lost = i == 20 ? "nan" : "0.5";
+    text += std::to_string(5000 + 10 * i) + ", 0, 90, 0, 0, 0, 1, 65535, 0, 0, 6553.5, " + (flies ? "9" : "0") +
+            ", 8, " + lost + ", " + std::to_string(i) + ", 1, 0, 0, 90\n";
+  }
+  return text;
+}
+
+TEST(Import, MakesALogOfInputs) {
+  const io::TemporaryFolder folder;
+  std::ofstream(folder / "flight.csv") << table_of_inputs();
+  const auto imported = [&](const Lines& overrides) {
+    const Mapping mapping = mapping_of("flapper_nimble.toml", overrides);
+    Channels channels(mapping.wanted());
+    Lines warnings;
+    read_source(folder / "flight.csv", channels, warnings);
+    return assemble(channels, mapping);
+  };
+  const Imported out = imported({});
+  const FlightLog& log = out.log;
+  EXPECT_EQ(log.header.inputs, (Lines{"left_flap", "right_flap", "pitch_servo", "yaw_servo"}));
+  ASSERT_EQ(log.command.declared.size(), 4u);
+  EXPECT_EQ(log.command.t_s.size(), 21u);
+  EXPECT_EQ(log.command.t_s.front(), 0);
+  EXPECT_EQ(log.command.t_s.back(), 0.2);
+  EXPECT_DOUBLE_EQ(log.command.declared[0][5], 1);
+  EXPECT_DOUBLE_EQ(log.command.declared[1][5], 0.1);
+  EXPECT_TRUE(log.command.left_voltage_V.empty());
+  // A cell that is no number is a sample that is not there.
+  EXPECT_EQ(log.mocap.t_s.size(), 20u);
+  EXPECT_EQ(out.report.streams[1].unusable, 1u);
+  EXPECT_EQ(out.report.streams[1].lost, 1u);
+  EXPECT_EQ(log.mocap.y_m.front(), 10);
+  EXPECT_NEAR(log.header.mocap.rate_hz, 100, 1e-9);
+  // A yaw of 90 degrees turns x to y. A pitch of 90 degrees nose up turns x to z: about -y.
+  const double half = std::numbers::sqrt2 / 2;
+  EXPECT_NEAR(log.mocap.qw[3], half, 1e-12);
+  EXPECT_NEAR(log.mocap.qz[3], half, 1e-12);
+  EXPECT_NEAR(log.attitude->qw[3], half, 1e-12);
+  EXPECT_NEAR(log.attitude->qy[3], -half, 1e-12);
+  EXPECT_TRUE(log.imu.gyro_x_rad_s.empty());
+  EXPECT_DOUBLE_EQ(log.imu.accel_z_m_s2[0], 9.81);
+  EXPECT_TRUE(log.power->left_current_A.empty());
+  EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(log), "log"), log);
+
+  const std::string mapping = (kMappings / "flapper_nimble.toml").string();
+  EXPECT_EQ(test::refusal([&] { imported({"command.flown.above=9"}); }),
+            "--set command.flown.above=9: command.flown.above: \"thrust\" is never above it; accepted: what it exceeds "
+            "while the robot flies");
+  EXPECT_EQ(test::refusal([&] { imported({"attitude.scale.pitch_rad=-1"}); }),
+            mapping +
+                ":95:13: attitude.columns.pitch_rad: reaches -90: likely in degrees; accepted: rad: beside it "
+                "attitude.scale.pitch_rad = 0.017453292519943295");
+  EXPECT_EQ(test::refusal([&] { imported({"imu.channel=flights"}); }),
+            "--set imu.channel=flights: imu.channel: \"flights\" is not recorded; accepted: flight; did you mean "
+            "\"flight\"?");
+}
+
+/// Yaw, then pitch about the new y, then roll about the new x, worked out by hand for yaw 90, roll 90: x goes to y, y to z, z to x.
+TEST(Import, TurnsAnglesInTheirOrder) {
+  const io::TemporaryFolder folder;
+  std::string text = table_of_inputs();
+  for (std::size_t at = 0; (at = text.find("1, 0, 0, 90\n", at)) != std::string::npos;)
+    text.replace(at, 11, "1, 90, 0, 90");
+  std::ofstream(folder / "flight.csv") << text;
+  const Mapping mapping = mapping_of("flapper_nimble.toml");
+  Channels channels(mapping.wanted());
+  Lines warnings;
+  read_source(folder / "flight.csv", channels, warnings);
+  const MocapStream m = assemble(channels, mapping).log.mocap;
+  for (const Column* component : {&m.qw, &m.qx, &m.qy, &m.qz}) EXPECT_NEAR(component->front(), 0.5, 1e-12);
+}
+
 }  // namespace
 }  // namespace flappy::flightlog

@@ -31,10 +31,10 @@ TEST(Mapping, ShippedOnesAreRead) {
   for (const auto& entry : fs::directory_iterator(kMappings)) {
     const Mapping m = read_mapping(entry.path());
     EXPECT_GE(m.streams.size(), 3u) << entry.path();
-    EXPECT_EQ(m.header.vehicle, "hummingbird_nominal.toml");
+    EXPECT_EQ(m.header.vehicle, m.header.inputs.empty() ? "hummingbird_nominal.toml" : entry.path().filename());
     ++count;
   }
-  EXPECT_EQ(count, 4);
+  EXPECT_EQ(count, 6);
 }
 
 TEST(Mapping, WantsTheFieldsOfItsColumns) {
@@ -85,6 +85,37 @@ TEST(Mapping, RefusesFaults) {
             "m.toml:26:13: command.scale.phase_rad: has no such column; accepted: columns of command.columns");
   EXPECT_EQ(edited("latency_s = 0.0", "latency_s = -1.0"),
             "m.toml:30:13: mocap.latency_s: -1 is out of range; accepted: a number from 0 to 10");
+}
+
+/// What a person sees of a mapping of declared inputs with `old` in it replaced.
+std::string edited_inputs(const std::string& old, const std::string& fresh) {
+  const io::TemporaryFolder folder;
+  std::string text = io::read_text(kMappings / "flapper_nimble.toml");
+  const std::size_t at = text.find(old);
+  if (at == std::string::npos) return "\"" + old + "\" is not there";
+  text.replace(at, old.size(), fresh);
+  std::ofstream(folder / "m.toml") << text;
+  const std::string line = test::refusal([&] { read_mapping(folder / "m.toml"); });
+  const std::string place = folder.path().string() + "/";
+  return line.starts_with(place) ? line.substr(place.size()) : line;
+}
+
+TEST(Mapping, OfInputsRefusesFaults) {
+  EXPECT_EQ(edited_inputs("left_flap = \"m1\"\n", ""),
+            "m.toml:21:1: command.columns.left_flap: is missing; accepted: a string");
+  EXPECT_EQ(edited_inputs("left_flap = \"m1\"", "left_flop = \"m1\""),
+            "m.toml:22:1: command.columns.left_flop: unknown key; accepted: left_flap, pitch_servo, right_flap, "
+            "yaw_servo; did you mean \"left_flap\"?");
+  EXPECT_EQ(edited_inputs("above = 0.0\n", ""), "m.toml:31:1: command.flown.above: is missing; accepted: a number");
+  EXPECT_EQ(edited_inputs("yaw_rad = \"otYaw0\"\n", ""),
+            "m.toml:43:1: mocap.columns.yaw_rad: is missing; accepted: a string");
+  EXPECT_EQ(edited_inputs("yaw_rad = \"otYaw0\"", "yaw_rad = \"otYaw0\"\nqw = \"w\""),
+            "m.toml:50:1: mocap.columns.qw: unknown key; accepted: pitch_rad, roll_rad, x_m, y_m, yaw_rad, z_m");
+  EXPECT_EQ(edited_inputs("gyro = false", "gyro_noise_rad_s = 0.1\ngyro = false").substr(0, 48),
+            "m.toml:60:1: imu.gyro_noise_rad_s: unknown key; ");
+  EXPECT_EQ(
+      edited_inputs("inputs = [\"left_flap\", \"right_flap\", \"pitch_servo\", \"yaw_servo\"]\n", "").substr(0, 39),
+      "m.toml:21:1: command.columns.left_flap:");
 }
 
 }  // namespace

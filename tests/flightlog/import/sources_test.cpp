@@ -1,7 +1,9 @@
 #include "flightlog/import/sources.hpp"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
+#include <cmath>
 #include <fstream>
 
 #include "flightlog/import/ulogs.hpp"
@@ -61,6 +63,62 @@ TEST(Sources, ReadATable) {
   const Channels channels = read(folder / "camera.csv");
   EXPECT_EQ(*channels.find("camera")->column("x"), (std::vector<double>{1, 2}));
   EXPECT_EQ(channels.find("camera")->stamp_ns(), (std::vector<std::int64_t>{kNoTime, kNoTime}));
+}
+
+TEST(Sources, ReadATableWithGapsThatWasCutOff) {
+  const io::TemporaryFolder folder;
+  std::ofstream(folder / "camera.csv") << "t,  x,  y\n0.5,  1,  nan\n0.6, , 3\n0.7, 4, 5\n0.8, 6";
+  Lines warnings;
+  const Channels channels = read(folder / "camera.csv", &warnings, {{"*", {"t", "x", "y"}}});
+  const std::vector<double>&x = *channels.find("*")->column("x"), &y = *channels.find("camera")->column("y");
+  ASSERT_EQ(x.size(), 3u);
+  EXPECT_TRUE(x[0] == 1 && std::isnan(x[1]) && x[2] == 4);
+  EXPECT_TRUE(std::isnan(y[0]) && y[1] == 3 && y[2] == 5);
+  EXPECT_EQ(warnings, (Lines{(folder / "camera.csv").string() + ": its last line was cut off: left out"}));
+  // The last line may want its end, but not its cells.
+  std::ofstream(folder / "whole.csv") << "t,x\n0.5,1\n0.6,2";
+  EXPECT_EQ(read(folder / "whole.csv").find("whole")->column("x")->size(), 2u);
+  std::ofstream(folder / "torn.csv") << "t,x\n0.5\n0.6,2\n";
+  EXPECT_EQ(test::refusal([&] { read(folder / "torn.csv"); }),
+            (folder / "torn.csv").string() + ":2:4: row has 1 cells; accepted: 2, as in the header");
+}
+
+std::string gzipped(const std::string& text) {
+  z_stream stream = {};
+  EXPECT_EQ(deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  std::string packed(deflateBound(&stream, text.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
+  stream.avail_in = static_cast<uInt>(text.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  return packed;
+}
+
+TEST(Sources, ReadATableMadeSmaller) {
+  const io::TemporaryFolder folder;
+  std::string text = "t,x\n";
+  for (int i = 0; i < 100000; ++i) text += std::to_string(i) + "," + std::to_string(i % 977) + "\n";
+  const std::string packed = gzipped(text);
+  std::ofstream(folder / "camera.csv.gz") << packed;
+  const Channels channels = read(folder / "camera.csv.gz");
+  ASSERT_NE(channels.find("camera"), nullptr);
+  EXPECT_EQ(channels.find("camera")->column("x")->size(), 100000u);
+  EXPECT_EQ(channels.find("camera")->column("x")->at(99999), 99999 % 977);
+  // Two files one after the other are one; a part of one is read as far as it goes.
+  std::ofstream(folder / "two.csv.gz") << gzipped("t,x\n1,2\n") << gzipped("3,4\n");
+  EXPECT_EQ(*read(folder / "two.csv.gz").find("two")->column("x"), (std::vector<double>{2, 4}));
+  std::ofstream(folder / "part.csv.gz") << packed.substr(0, packed.size() / 2);
+  Lines warnings;
+  const Channels part = read(folder / "part.csv.gz", &warnings);
+  EXPECT_GT(part.find("part")->column("x")->size(), 30000u);
+  ASSERT_EQ(warnings.size(), 2u);
+  EXPECT_EQ(warnings[0], (folder / "part.csv.gz").string() + ": is damaged or was cut off: read as far as it goes");
+  std::ofstream(folder / "none.csv.gz") << packed.substr(0, 5);
+  EXPECT_EQ(test::refusal([&] { read(folder / "none.csv.gz"); }),
+            (folder / "none.csv.gz").string() + ": is no whole file of gzip; accepted: what gzip made");
 }
 
 TEST(Sources, ReadAUlogWhateverItIsCalled) {
