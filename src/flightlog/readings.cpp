@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "io/statistics.hpp"
 
@@ -11,11 +12,30 @@ namespace {
 /// No flapper turns or travels so far between two poses: markers were taken for others. They are so for some poses at most.
 constexpr double kLeap_rad = 0.5, kLeap_rad_s = 40, kLeap_m = 0.05, kLeap_m_s = 10;
 constexpr std::size_t kMostSwapped = 10;
+/// Nor do two estimators differ by so much, or by so many times what they usually differ by.
+constexpr double kTurned_rad = 0.35, kTurnedUsual = 6;
+/// Over how long their difference is one, of how many poses it is taken, and across how many missing samples.
+constexpr double kBlock_s = 10, kLongestBridged = 3.5;
+constexpr std::size_t kTried = 100;
 
 bool leaps(const PoseReading& from, const PoseReading& to) {
   const double dt_s = std::abs(to.t_s - from.t_s);
   return from.attitude().angularDistance(to.attitude()) > kLeap_rad + kLeap_rad_s * dt_s ||
          (to.position_m - from.position_m).norm() > kLeap_m + kLeap_m_s * dt_s;
+}
+
+/// Without lost ones.
+std::vector<PoseReading> fresh_poses(const FlightLog& log) {
+  const MocapStream& m = log.mocap;
+  std::vector<PoseReading> poses;
+  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
+    const PoseReading pose{
+        m.t_s[i] - log.header.mocap.latency_s, {m.x_m[i], m.y_m[i], m.z_m[i]}, {m.qw[i], m.qx[i], m.qy[i], m.qz[i]}, i};
+    const bool lost = log.header.mocap.position_noise_m > 0 && !poses.empty() &&
+                      pose.position_m == poses.back().position_m && pose.quaternion == poses.back().quaternion;
+    if (!lost) poses.push_back(pose);
+  }
+  return poses;
 }
 
 /// Without poses that leap away from those before, and back.
@@ -83,17 +103,62 @@ FlightLog on_its_clocks(FlightLog log) {
   return log;
 }
 
-std::vector<PoseReading> pose_readings(const FlightLog& log) {
-  const MocapStream& m = log.mocap;
-  std::vector<PoseReading> poses;
-  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
-    const PoseReading pose{
-        m.t_s[i] - log.header.mocap.latency_s, {m.x_m[i], m.y_m[i], m.z_m[i]}, {m.qw[i], m.qx[i], m.qy[i], m.qz[i]}};
-    const bool lost = log.header.mocap.position_noise_m > 0 && !poses.empty() &&
-                      pose.position_m == poses.back().position_m && pose.quaternion == poses.back().quaternion;
-    if (!lost) poses.push_back(pose);
+std::vector<PoseReading> pose_readings(const FlightLog& log) { return without_swaps(fresh_poses(log)); }
+
+std::vector<std::optional<Eigen::Quaterniond>> second_attitudes(const FlightLog& log) {
+  std::vector<std::optional<Eigen::Quaterniond>> all(log.mocap.t_s.size());
+  if (!log.attitude) return all;
+  const AttitudeStream& a = *log.attitude;
+  const double longest_s = kLongestBridged / log.header.attitude->rate_hz;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const double t_s = log.mocap.t_s[i] - log.header.mocap.latency_s + log.header.attitude->latency_s;
+    if (t_s < a.t_s.front() || t_s > a.t_s.back()) continue;
+    const std::size_t k = std::min(last_not_after(a.t_s, t_s), a.t_s.size() - 2);
+    const double step_s = a.t_s[k + 1] - a.t_s[k];
+    const auto at = [&](std::size_t j) { return Eigen::Quaterniond(a.qw[j], a.qx[j], a.qy[j], a.qz[j]); };
+    if (step_s <= longest_s) all[i] = at(k).slerp((t_s - a.t_s[k]) / step_s, at(k + 1));
   }
-  return without_swaps(poses);
+  return all;
+}
+
+std::vector<char> swapped_poses(const FlightLog& log) {
+  const MocapStream& m = log.mocap;
+  const std::size_t n = m.t_s.size();
+  std::vector<char> swapped(n, 0);
+  const std::vector<std::optional<Eigen::Quaterniond>> others = second_attitudes(log);
+  // How mocap's W lies in that of the other: it wanders with the other's yaw, slowly.
+  std::vector<double> angles(n, 0), known;
+  for (double begin_s = m.t_s.front(); begin_s <= m.t_s.back(); begin_s += kBlock_s) {
+    const auto row = [&](double t_s) {
+      return static_cast<std::size_t>(std::ranges::lower_bound(m.t_s, t_s) - m.t_s.begin());
+    };
+    std::vector<std::pair<std::size_t, Eigen::Quaterniond>> turns;
+    for (std::size_t i = row(begin_s); i < row(begin_s + kBlock_s); ++i)
+      if (others[i])
+        turns.emplace_back(i, Eigen::Quaterniond(m.qw[i], m.qx[i], m.qy[i], m.qz[i]) * others[i]->conjugate());
+    if (turns.empty()) continue;
+    // The one that is least far from all, of some.
+    const std::size_t stride = turns.size() / kTried + 1;
+    double least = std::numeric_limits<double>::infinity();
+    const Eigen::Quaterniond* middle = &turns.front().second;
+    for (std::size_t i = 0; i < turns.size(); i += stride) {
+      double sum = 0;
+      for (std::size_t k = 0; k < turns.size(); k += stride) sum += turns[i].second.angularDistance(turns[k].second);
+      if (sum < least) least = sum, middle = &turns[i].second;
+    }
+    for (const auto& [i, turn] : turns) known.push_back(angles[i] = middle->angularDistance(turn));
+  }
+  const double most = known.empty() ? 0 : std::max(kTurned_rad, kTurnedUsual * io::median(known));
+  for (std::size_t i = 0; i < n && !known.empty(); ++i) swapped[i] = angles[i] > most;
+  // Of the rest, those that leap are not kept.
+  std::vector<PoseReading> rest;
+  for (const PoseReading& pose : fresh_poses(log))
+    if (!swapped[pose.row]) rest.push_back(pose);
+  std::vector<char> leaping(n, 0);
+  for (const PoseReading& pose : rest) leaping[pose.row] = 1;
+  for (const PoseReading& pose : without_swaps(rest)) leaping[pose.row] = 0;
+  for (std::size_t i = 0; i < n; ++i) swapped[i] = swapped[i] || leaping[i];
+  return swapped;
 }
 
 std::size_t last_not_after(const std::vector<double>& times, double t_s) {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "flightlog/flight_log.hpp"
@@ -14,11 +15,19 @@ struct PoseReading {
   double t_s;
   Eigen::Vector3d position_m;
   std::array<double, 4> quaternion;  ///< as logged, declared w, x, y, z
+  std::size_t row;                   ///< of mocap.csv, from 0
   Eigen::Quaterniond attitude() const { return {quaternion[0], quaternion[1], quaternion[2], quaternion[3]}; }
 };
 /// Of the log, without lost ones, which repeat the pose before where noise is declared, and without those whose markers were taken for
 /// others, which leap away and back within a few frames.
 std::vector<PoseReading> pose_readings(const FlightLog& log);
+
+/// Of each pose of mocap.csv, the attitude that attitude.csv has at its instant; nothing where it has none, or a gap.
+std::vector<std::optional<Eigen::Quaterniond>> second_attitudes(const FlightLog& log);
+
+/// Of each pose of mocap.csv, whether its markers were taken for others: it leaps away and back within a few frames, or is turned
+/// against attitude.csv by far more than those around it.
+std::vector<char> swapped_poses(const FlightLog& log);
 
 /// The log with samples of motion capture, IMU and power at the instants of the regular clocks that took them, where their times are
 /// those of arrival: a line through them, gaps counted. Left as they are where no such clock is found.

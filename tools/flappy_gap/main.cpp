@@ -90,12 +90,13 @@ Json to_json(const std::string& folder, const Checked& checked) {
 
 Json check(const std::vector<std::string>& folders) {
   flightlog::check_each_once(folders);
+  std::vector<flightlog::FlightLog> logs;
+  for (const std::string& folder : folders) logs.push_back(flightlog::read_flight_log(folder));
+  std::vector<flightlog::CheckReport> reports = check_flights(logs);
   std::vector<Checked> checked;
-  for (const std::string& folder : folders) {
-    const flightlog::FlightLog log = flightlog::read_flight_log(folder);
-    flightlog::CheckReport report = check_flight(log);
-    std::vector<flightlog::DataFault> faults = data_faults(log, report, folder);
-    checked.push_back({log.header, std::move(report), std::move(faults)});
+  for (std::size_t i = 0; i < folders.size(); ++i) {
+    std::vector<flightlog::DataFault> faults = data_faults(logs[i], reports[i], folders[i]);
+    checked.push_back({logs[i].header, std::move(reports[i]), std::move(faults)});
   }
   Json flights = Json::array();
   std::size_t faults = 0, warnings = 0, not_tested = 0;

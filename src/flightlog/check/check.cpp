@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "flightlog/check/check_parts.hpp"
 #include "io/statistics.hpp"
@@ -150,7 +151,10 @@ CheckReport check_flight(const FlightLog& log) {
   check_latencies(h, report.findings);
   check_space(log, report.findings);
   if (!h.inputs.empty()) {
-    report.findings.push_back({"motion", Verdict::not_tested, "inputs are declared in place of voltages", {}});
+    check_motion(log, report.findings);
+    check_inputs_apart(log, report.findings);
+    check_power(log, report.findings);
+    check_wings(log, report.findings);
     return report;
   }
   const ImuStream& i = log.imu;
@@ -163,6 +167,24 @@ CheckReport check_flight(const FlightLog& log) {
   check_power(log, report.findings);
   check_wings(log, report.findings);
   return report;
+}
+
+std::vector<CheckReport> check_flights(const std::vector<FlightLog>& logs) {
+  std::vector<CheckReport> reports;
+  // Those of one robot: what is driven by other inputs is none of theirs.
+  std::map<std::vector<std::string>, std::vector<std::size_t>> of_inputs;
+  for (const FlightLog& log : logs) {
+    of_inputs[log.header.inputs].push_back(reports.size());
+    reports.push_back(check_flight(log));
+  }
+  for (const auto& [inputs, flights] : of_inputs) {
+    if (inputs.empty() || flights.size() < 2) continue;
+    std::vector<const FlightLog*> same;
+    std::vector<Findings*> findings;
+    for (const std::size_t i : flights) same.push_back(&logs[i]), findings.push_back(&reports[i].findings);
+    compare_inputs(same, findings);
+  }
+  return reports;
 }
 
 }  // namespace flappy::flightlog

@@ -43,4 +43,7 @@ struct CheckReport {
 
 CheckReport check_flight(const FlightLog& log);
 
+/// The same of several flights of one robot, whose declared inputs are also compared with one another.
+std::vector<CheckReport> check_flights(const std::vector<FlightLog>& logs);
+
 }  // namespace flappy::flightlog

@@ -200,6 +200,7 @@ void check_power(const FlightLog& log, Findings& findings) {
                       {{"battery_V", battery}},
                       near ? LogPlace{} : LogPlace{kPower}});
 
+  if (!h.currents) return;
   const Column* const currents[] = {&p.left_current_A, &p.right_current_A};
   const Column* const volts[] = {&log.command.left_voltage_V, &log.command.right_voltage_V};
   for (int side = 0; side < 2; ++side) {
@@ -258,7 +259,7 @@ void check_wings(const FlightLog& log, Findings& findings) {
   look("right rotation", w.right_rotation_rad);
   const double declared = log.header.flapping_Hz, per_beat = 1 / (declared * median_interval(w.t_s));
   const auto f = beat_frequency(w.t_s, w.left_stroke_rad);
-  if (per_beat < 4 || !f) {
+  if (!(declared > 0) || per_beat < 4 || !f) {
     findings.push_back({"stroke frequency", Verdict::not_tested, "too few samples a beat, or too few beats", {}});
     return;
   }

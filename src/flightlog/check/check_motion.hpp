@@ -23,6 +23,7 @@ struct Context {
   double gyro_noise;  ///< rad/s, of a window's mean rate, from the gyro
   SensorFrame frame;  ///< as found; as declared where that fits or nothing was found
   Lag lag;
+  Matrix3d accel_axes = Matrix3d::Identity();  ///< the accelerometer's, where they are others than declared
 
   void add_finding(const std::string& check, Verdict verdict, const std::string& text, Values values = {},
                    LogPlace fault = {}) {
@@ -30,6 +31,9 @@ struct Context {
   }
 };
 
+/// Attitude, accelerometer, positions and a second estimator, where inputs are declared; leaves accel_axes. False where the attitude
+/// was meant otherwise.
+bool check_frames(Context& c);
 /// Clock and gyro against the attitude; leaves frame and lag.
 void check_rotation(Context& c);
 /// Accelerometer and position, by the attitude as it was understood.

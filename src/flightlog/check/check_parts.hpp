@@ -12,7 +12,7 @@ namespace flappy::flightlog {
 /// What a deviation must exceed to be no accident, in standard deviations: one in 16,000.
 inline constexpr double kSigmas = 4;
 
-using log_file::kCommand, log_file::kImu, log_file::kMocap, log_file::kPower, log_file::kWings;
+using log_file::kAttitude, log_file::kCommand, log_file::kImu, log_file::kMocap, log_file::kPower, log_file::kWings;
 
 using Findings = std::vector<Finding>;
 
@@ -38,6 +38,10 @@ void check_space(const FlightLog& log, Findings& findings);
 void check_beat(const FlightLog& log, Findings& findings);
 /// Voltages against the frequency, inputs and phase of the beat.
 void check_command(const FlightLog& log, Findings& findings);
+/// Declared inputs, each against itself over the flight; a finding for each, "input NAME".
+void check_inputs_apart(const FlightLog& log, Findings& findings);
+/// The same inputs of several flights against one another, in those findings.
+void compare_inputs(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings);
 void check_power(const FlightLog& log, Findings& findings);
 void check_wings(const FlightLog& log, Findings& findings);
 

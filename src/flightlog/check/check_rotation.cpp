@@ -41,6 +41,8 @@ std::string describe_axes(const std::string& sensor, const Matrix3d& axes) {
 
 /// Delays up to this are an effect that a diagnosis finds (mocap_delay, 0.02 s); beyond it clocks are apart.
 constexpr double kLargestDelay_s = 0.03;
+/// Of logs with declared inputs, of which means over beats and some Hz are used, much less.
+constexpr double kLargestSlowDelay_s = 0.1;
 /// Crystals agree to 1e-4; beyond ten times that a clock is wrong.
 constexpr double kLargestDrift = 1e-3;
 
@@ -123,11 +125,14 @@ bool check_clock(Context& c) {
   const double off_s = std::abs(lag->value - filter_s);
   const bool good = off_s <= allowed_s;
   const double change_s = first && last ? last->value - first->value : 0, per_s = change_s / (end_s - begin_s);
-  const bool runs_off = drifts && std::abs(per_s) > kLargestDrift;
-  c.add_finding("clock", good ? Verdict::ok : Verdict::warning,
-                seen + expected + (good ? "" : ": clocks apart, or a wrong latency"),
-                {{"lag_s", lag->value}, {"lag_sd_s", lag->sd}, {"correlation", sync->correlation}},
-                off_s > allowed_s + kLargestDelay_s && !runs_off ? LogPlace{kImu} : LogPlace{});
+  const bool slow = !c.log.header.inputs.empty();
+  const bool runs_off =
+      drifts && std::abs(per_s) > kLargestDrift && (!slow || std::abs(change_s) > kLargestSlowDelay_s);
+  c.add_finding(
+      "clock", good ? Verdict::ok : Verdict::warning,
+      seen + expected + (good ? "" : ": clocks apart, or a wrong latency"),
+      {{"lag_s", lag->value}, {"lag_sd_s", lag->sd}, {"correlation", sync->correlation}},
+      off_s > allowed_s + (slow ? kLargestSlowDelay_s : kLargestDelay_s) && !runs_off ? LogPlace{kImu} : LogPlace{});
 
   // A millisecond over a flight is a fifth of a radian of the beat, which no check here minds.
   if (!drifts && (!first || !last || std::hypot(first->sd, last->sd) > 0.0025)) {

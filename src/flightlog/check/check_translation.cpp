@@ -32,8 +32,9 @@ std::optional<Matrix3d> check_gravity(Context& c) {
     if (turns.empty()) begin_s = at;
     end_s = at;
     turns.push_back(q->toRotationMatrix());
-    felt.push_back(c.motion.accel_m_s2()[k]);
+    felt.emplace_back(c.accel_axes * c.motion.accel_m_s2()[k]);
   }
+  if (t.empty()) return not_tested("there is no imu.csv");
   if (end_s - begin_s < 2) return not_tested("shorter than 2 s");
   if (gravity < 1) return not_tested("hardly any gravity declared");
   const double n = static_cast<double>(turns.size());
@@ -102,7 +103,7 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
   if (!correction) return not_tested("needs an accelerometer that is understood");
   const FlightHeader& h = c.log.header;
   // Second differences of the position over T against the acceleration weighted with a triangle of 2 T.
-  const double span_s = std::max(std::round(0.2 * h.flapping_Hz), 1.0) / h.flapping_Hz;
+  const double span_s = h.flapping_Hz > 0 ? std::max(std::round(0.2 * h.flapping_Hz), 1.0) / h.flapping_Hz : 0.2;
   const std::vector<double>& t = c.motion.imu_t_s();
   const Vector3d arm(h.imu.position_m[0], h.imu.position_m[1], h.imu.position_m[2]);
   const auto at_imu = [&](double at) -> std::optional<Vector3d> {
@@ -123,7 +124,7 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
       whole &= q.has_value();
       if (q)
         sum += (span_s - std::abs(t[k] - shift - middle)) * (t[k + 1] - t[k - 1]) / 2 *
-               (*q * (*correction * c.motion.accel_m_s2()[k]));
+               (*q * (*correction * (c.accel_axes * c.motion.accel_m_s2()[k])));
     }
     if (!whole) continue;
     moved.emplace_back(*after - 2 * *here + *before);

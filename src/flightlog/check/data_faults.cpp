@@ -179,4 +179,12 @@ std::vector<DataFault> data_faults(const FlightLog& log, const CheckReport& repo
   return faults;
 }
 
+std::vector<DataFault> data_faults(const std::vector<FlightLog>& logs, const std::vector<std::string>& folders) {
+  std::vector<DataFault> all;
+  const std::vector<CheckReport> reports = check_flights(logs);
+  for (std::size_t i = 0; i < logs.size(); ++i)
+    for (DataFault& fault : data_faults(logs[i], reports[i], folders[i])) all.push_back(std::move(fault));
+  return all;
+}
+
 }  // namespace flappy::flightlog

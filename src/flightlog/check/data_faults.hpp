@@ -28,4 +28,7 @@ inline std::vector<DataFault> data_faults(const FlightLog& log, const std::files
   return data_faults(log, check_flight(log), folder);
 }
 
+/// Of several flights of one robot, compared with one another as well.
+std::vector<DataFault> data_faults(const std::vector<FlightLog>& logs, const std::vector<std::string>& folders);
+
 }  // namespace flappy::flightlog

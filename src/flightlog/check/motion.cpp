@@ -75,7 +75,7 @@ SensorMotion::SensorMotion(const FlightLog& log) {
     accel_m_s2_.push_back(force);
   }
   longest_mocap_s_ = longest_bridged(mocap_t_s_);
-  longest_imu_s_ = longest_bridged(imu_t_s_);
+  longest_imu_s_ = imu_t_s_.empty() ? 0 : longest_bridged(imu_t_s_);
   gyro_integral_rad_.emplace_back(Vector3d::Zero());
   gaps_before_.push_back(0);
   for (std::size_t i = 1; i < imu_t_s_.size(); ++i) {

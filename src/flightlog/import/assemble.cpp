@@ -185,17 +185,24 @@ struct Stream {
   }
 };
 
+/// The value that is farthest from 0, of those that are there.
+double farthest(const Column& values) {
+  double most = 0;
+  for (const double v : values)
+    if (std::abs(v) > std::abs(most)) most = v;
+  return most;
+}
+
 /// Angles become the quaternion that they stand for.
 void turn_angles(Stream& s) {
   if (!s.columns.contains("roll_rad")) return;
   const Column roll = s.columns["roll_rad"], pitch = s.columns["pitch_rad"], yaw = s.columns["yaw_rad"];
   constexpr double kMost_rad = 2 * std::numbers::pi + 0.1;
   for (const auto& [name, angles] : {std::pair("roll_rad", &roll), std::pair("pitch_rad", &pitch)})
-    for (const double angle : *angles)
-      if (std::abs(angle) > kMost_rad)
-        s.mapping.table.table("columns").fail(
-            name, "reaches " + io::shortest_digits(angle) + ": likely in degrees",
-            "rad: beside it " + s.mapping.name + ".scale." + name + " = 0.017453292519943295");
+    if (const double angle = farthest(*angles); std::abs(angle) > kMost_rad)
+      s.mapping.table.table("columns").fail(
+          name, "reaches " + io::shortest_digits(angle) + ": likely in degrees",
+          "radians: " + s.mapping.name + ".scale." + name + " = 0.017453292519943295");
   for (const char* name : {"roll_rad", "pitch_rad", "yaw_rad"}) s.columns.erase(name);
   for (std::size_t i = 0; i < roll.size(); ++i) {
     const auto about = [](double angle, double x, double y, double z) {

@@ -31,11 +31,8 @@ struct Logs {
 
 Logs read_logs(const DiagnoseCommand& command) {
   Logs r;
-  for (const std::string& folder : command.flights) {
-    r.logs.push_back(flightlog::read_flight_log(folder));
-    const std::vector<flightlog::DataFault> own = data_faults(r.logs.back(), folder);
-    r.faults.insert(r.faults.end(), own.begin(), own.end());
-  }
+  for (const std::string& folder : command.flights) r.logs.push_back(flightlog::read_flight_log(folder));
+  r.faults = data_faults(r.logs, command.flights);
   return r;
 }
 

@@ -547,7 +547,7 @@ TEST(Import, MakesALogOfInputs) {
             "while the robot flies");
   EXPECT_EQ(test::refusal([&] { imported({"attitude.scale.pitch_rad=-1"}); }),
             mapping +
-                ":95:13: attitude.columns.pitch_rad: reaches -90: likely in degrees; accepted: rad: beside it "
+                ":95:13: attitude.columns.pitch_rad: reaches -90: likely in degrees; accepted: radians: "
                 "attitude.scale.pitch_rad = 0.017453292519943295");
   EXPECT_EQ(test::refusal([&] { imported({"imu.channel=flights"}); }),
             "--set imu.channel=flights: imu.channel: \"flights\" is not recorded; accepted: flight; did you mean "

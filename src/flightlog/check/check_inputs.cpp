@@ -1,0 +1,130 @@
+// Declared inputs: what they mean no check knows, but that they mean the same all the time, and in all flights of a robot.
+#include <algorithm>
+#include <cmath>
+
+#include "flightlog/check/check_parts.hpp"
+#include "io/statistics.hpp"
+
+namespace flappy::flightlog {
+namespace {
+
+/// Middle, and how far nine tenths reach.
+struct Level {
+  double middle = 0, spread = 0;
+};
+
+Level level_of(const Column& values) {
+  return {io::median(values), io::quantile(values, 0.95) - io::quantile(values, 0.05)};
+}
+
+/// Of an input in a flight: as a whole, and in each of equal parts of its samples.
+struct Levels {
+  Level all;
+  std::vector<Level> parts;
+};
+
+constexpr std::size_t kParts = 10;
+
+Levels levels_of(const Column& values) {
+  Levels levels{level_of(values), {}};
+  for (std::size_t k = 0; k < kParts; ++k) {
+    const auto at = [&](std::size_t i) {
+      return values.begin() + static_cast<std::ptrdiff_t>(values.size() * i / kParts);
+    };
+    if (at(k) < at(k + 1)) levels.parts.push_back(level_of(Column(at(k), at(k + 1))));
+  }
+  return levels;
+}
+
+/// A robot of a weight is carried by the same inputs in all its flights, but for battery, wear and wind, and for manoeuvres in a part
+/// of one; units differ by more. What is about 0 may well be used more in one flight than in another.
+constexpr double kOtherLevel = 1.5, kOtherPart = 2, kOtherSpread = 5;
+
+/// Whether a middle is far above what the input does beside it, so that it tells the scale.
+bool has_level(const Level& usual) { return std::abs(usual.middle) > usual.spread; }
+
+double ratio(double value, double usual) { return usual != 0 ? value / usual : value != 0 ? INFINITY : 1; }
+
+bool beyond(double value, double usual, double most) {
+  const double r = ratio(value, usual);
+  return !(r <= most && r >= 1 / most);
+}
+
+Level usual_of(const std::vector<Levels>& flights) {
+  std::vector<double> middles, spreads;
+  for (const Levels& l : flights) middles.push_back(l.all.middle), spreads.push_back(l.all.spread);
+  return {io::median(middles), io::median(spreads)};
+}
+
+std::string check_of(const std::string& input) { return "input " + input; }
+
+/// What is odd of a flight beside the usual of several; empty: nothing.
+std::string oddity(const Levels& flight, const Level& usual) {
+  const auto odd = [&](const char* where, double value, double expected) {
+    return format("%s%.4g, %.4g usual in these flights (%.3g x): a column in another scale", where, value, expected,
+                  ratio(value, expected));
+  };
+  if (!has_level(usual))
+    return beyond(flight.all.spread, usual.spread, kOtherSpread) ? odd("varies by ", flight.all.spread, usual.spread)
+                                                                 : "";
+  if (beyond(flight.all.middle, usual.middle, kOtherLevel))
+    return odd("in the middle ", flight.all.middle, usual.middle);
+  for (const Level& part : flight.parts)
+    if (beyond(part.middle, usual.middle, kOtherPart)) return odd("in a part ", part.middle, usual.middle);
+  return "";
+}
+
+/// A scale that changes within a flight; empty: none does. Only of an input that stands at a level all the time.
+std::string change_of_scale(const Levels& flight) {
+  for (std::size_t k = 0; k < flight.parts.size(); ++k)
+    if (!has_level(flight.parts[k])) return "";
+  for (std::size_t k = 1; k < flight.parts.size(); ++k)
+    if (const double to = flight.parts[k].middle, before = flight.parts[0].middle; beyond(to, before, kOtherSpread))
+      return format("%.4g at first, %.4g in part %zu of %zu of the flight: its scale changes", before, to, k + 1,
+                    kParts);
+  return "";
+}
+
+Finding dead(const std::string& input, double value) {
+  return {check_of(input), Verdict::warning, format("is %.4g all the time: not logged, or not used", value), {}};
+}
+
+}  // namespace
+
+void check_inputs_apart(const FlightLog& log, Findings& findings) {
+  for (std::size_t k = 0; k < log.header.inputs.size(); ++k) {
+    const Column& values = log.command.declared[k];
+    const std::string& name = log.header.inputs[k];
+    const auto [low, high] = std::ranges::minmax(values);
+    if (low == high) {
+      findings.push_back(dead(name, low));
+      continue;
+    }
+    const Levels levels = levels_of(values);
+    const std::string odd = change_of_scale(levels);
+    const std::vector<std::pair<std::string, double>> figures = {{"middle", levels.all.middle},
+                                                                 {"spread", levels.all.spread}};
+    if (odd.empty())
+      findings.push_back({check_of(name), Verdict::ok,
+                          format("%.4g in the middle, %.4g to %.4g", levels.all.middle, low, high), figures});
+    else findings.push_back({check_of(name), Verdict::warning, odd, figures, {kCommand}});
+  }
+}
+
+void compare_inputs(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings) {
+  const std::vector<std::string>& inputs = logs.front()->header.inputs;
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    std::vector<Levels> flights;
+    for (const FlightLog* log : logs) flights.push_back(levels_of(log->command.declared[k]));
+    const Level usual = usual_of(flights);
+    for (std::size_t i = 0; i < logs.size(); ++i) {
+      Finding& own = *std::ranges::find(*findings[i], check_of(inputs[k]), &Finding::check);
+      const std::string odd = oddity(flights[i], usual);
+      // Of two that differ nobody knows which is right.
+      if (!odd.empty() && own.verdict == Verdict::ok)
+        own = {own.check, Verdict::warning, odd, own.values, logs.size() > 2 ? LogPlace{kCommand} : LogPlace{}};
+    }
+  }
+}
+
+}  // namespace flappy::flightlog

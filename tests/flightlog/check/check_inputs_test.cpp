@@ -1,0 +1,92 @@
+#include <gtest/gtest.h>
+
+#include "flightlog/check/check.hpp"
+#include "flightlog/check/data_faults.hpp"
+#include "flightlog/check/inputs_log.hpp"
+
+namespace flappy::flightlog {
+namespace {
+
+const Finding& of_input(const CheckReport& report, const std::string& input) {
+  return *std::ranges::find(report.findings, "input " + input, &Finding::check);
+}
+
+/// Flights of one robot, cheap: inputs are what differs.
+std::vector<FlightLog> flights(std::size_t count) {
+  const FlightLog one = inputs_log({.duration_s = 3});
+  std::vector<FlightLog> logs(count, one);
+  for (std::size_t i = 0; i < count; ++i)
+    for (double& v : logs[i].command.declared[0]) v *= 1 + 0.1 * static_cast<double>(i);  // the battery
+  return logs;
+}
+
+TEST(CheckInputs, FindNothingInFlightsThatAreAlike) {
+  for (const CheckReport& report : check_flights(flights(4))) {
+    EXPECT_EQ(of_input(report, "motor").verdict, Verdict::ok) << of_input(report, "motor").text;
+    EXPECT_EQ(of_input(report, "servo").verdict, Verdict::ok) << of_input(report, "servo").text;
+  }
+}
+
+TEST(CheckInputs, RefuseASpoiltColumn) {
+  std::vector<FlightLog> logs = flights(4);
+  for (double& v : logs[2].command.declared[0]) v *= 1.9;
+  const std::vector<CheckReport> reports = check_flights(logs);
+  EXPECT_EQ(of_input(reports[2], "motor").verdict, Verdict::warning);
+  EXPECT_NE(of_input(reports[2], "motor").text.find("usual in these flights"), std::string::npos);
+  for (const std::size_t i : {0u, 1u, 3u}) EXPECT_EQ(of_input(reports[i], "motor").verdict, Verdict::ok);
+  const std::vector<DataFault> faults = data_faults(logs, {"a", "b", "c", "d"});
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_EQ(faults[0].file, "c/command.csv");
+  // Alone it looks like any other.
+  EXPECT_TRUE(data_faults(logs[2], "c").empty());
+}
+
+TEST(CheckInputs, RefuseASpoiltColumnThatHasNoLevel) {
+  std::vector<FlightLog> logs = flights(3);
+  for (double& v : logs[0].command.declared[1]) v *= 57.3;
+  const std::vector<CheckReport> reports = check_flights(logs);
+  EXPECT_EQ(of_input(reports[0], "servo").fault.file, "command.csv");
+  EXPECT_NE(of_input(reports[0], "servo").text.find("varies by"), std::string::npos);
+  EXPECT_EQ(of_input(reports[1], "servo").verdict, Verdict::ok);
+}
+
+/// Which of two is right nobody knows.
+TEST(CheckInputs, BlameNeitherOfTwo) {
+  std::vector<FlightLog> logs = flights(2);
+  for (double& v : logs[1].command.declared[0]) v *= 65535;
+  const std::vector<CheckReport> reports = check_flights(logs);
+  for (const CheckReport& report : reports) EXPECT_EQ(of_input(report, "motor").verdict, Verdict::warning);
+  EXPECT_TRUE(data_faults(logs, {"a", "b"}).empty());
+}
+
+TEST(CheckInputs, CompareWhatHasTheSameInputs) {
+  std::vector<FlightLog> logs = flights(4);
+  logs[3].header.inputs = {"engine", "servo"};
+  for (double& v : logs[3].command.declared[0]) v *= 65535;
+  logs.push_back(synthetic_log({.duration_s = 3}));
+  const std::vector<CheckReport> reports = check_flights(logs);
+  ASSERT_EQ(reports.size(), 5u);
+  EXPECT_EQ(of_input(reports[3], "engine").verdict, Verdict::ok);
+  EXPECT_EQ(of_input(reports[0], "motor").verdict, Verdict::ok);
+}
+
+TEST(CheckInputs, FindAScaleThatChangesInAFlight) {
+  std::vector<FlightLog> logs = flights(1);
+  Column& motor = logs[0].command.declared[0];
+  for (std::size_t i = motor.size() * 7 / 10; i < motor.size(); ++i) motor[i] *= 100;
+  const CheckReport report = check_flight(logs[0]);
+  EXPECT_NE(of_input(report, "motor").text.find("in part 8 of 10 of the flight: its scale changes"), std::string::npos)
+      << of_input(report, "motor").text;
+  EXPECT_EQ(data_faults(logs[0], report, "a").size(), 1u);
+}
+
+TEST(CheckInputs, FindADeadColumn) {
+  std::vector<FlightLog> logs = flights(3);
+  for (double& v : logs[1].command.declared[1]) v = 0.25;
+  const std::vector<CheckReport> reports = check_flights(logs);
+  EXPECT_EQ(of_input(reports[1], "servo").text.substr(0, 17), "is 0.25 all the t");
+  EXPECT_EQ(of_input(reports[0], "servo").verdict, Verdict::ok);
+}
+
+}  // namespace
+}  // namespace flappy::flightlog
