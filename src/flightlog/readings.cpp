@@ -128,12 +128,10 @@ std::vector<char> swapped_poses(const FlightLog& log) {
   const std::vector<std::optional<Eigen::Quaterniond>> others = second_attitudes(log);
   // How mocap's W lies in that of the other: it wanders with the other's yaw, slowly.
   std::vector<double> angles(n, 0), known;
-  for (double begin_s = m.t_s.front(); begin_s <= m.t_s.back(); begin_s += kBlock_s) {
-    const auto row = [&](double t_s) {
-      return static_cast<std::size_t>(std::ranges::lower_bound(m.t_s, t_s) - m.t_s.begin());
-    };
+  for (std::size_t begin = 0, end = 0; begin < n; begin = end) {
+    while (end < n && m.t_s[end] <= m.t_s[begin] + kBlock_s) ++end;
     std::vector<std::pair<std::size_t, Eigen::Quaterniond>> turns;
-    for (std::size_t i = row(begin_s); i < row(begin_s + kBlock_s); ++i)
+    for (std::size_t i = begin; i < end; ++i)
       if (others[i])
         turns.emplace_back(i, Eigen::Quaterniond(m.qw[i], m.qx[i], m.qy[i], m.qz[i]) * others[i]->conjugate());
     if (turns.empty()) continue;

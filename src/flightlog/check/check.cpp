@@ -183,6 +183,7 @@ std::vector<CheckReport> check_flights(const std::vector<FlightLog>& logs) {
     std::vector<Findings*> findings;
     for (const std::size_t i : flights) same.push_back(&logs[i]), findings.push_back(&reports[i].findings);
     compare_inputs(same, findings);
+    if (flights.size() > 2) compare_correlations(same, findings);
   }
   return reports;
 }

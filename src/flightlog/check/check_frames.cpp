@@ -111,6 +111,8 @@ Shoves shoves_of(const Context& c) {
   const double span_s = h.flapping_Hz > 0 ? std::max(std::round(0.2 * h.flapping_Hz), 1.0) / h.flapping_Hz : 0.2;
   const std::vector<double>& t = c.motion.imu_t_s();
   Shoves s;
+  // Fewer poses than shoves tell of none, and of times that are no seconds there would be no end.
+  if (c.motion.mocap_t_s().back() / span_s > static_cast<double>(c.motion.mocap_t_s().size())) return s;
   std::vector<char> known;
   for (const double t_s : t) {
     const auto q = c.motion.attitude_at(t_s, Order::wxyz);
@@ -230,7 +232,7 @@ double usual_difference(const std::vector<Pair>& pairs) {
 }
 
 /// Whether both have up where they say.
-bool check_second(Context& c, const Hypotheses& h, const Frames* meant) {
+bool check_second(Context& c, const Hypotheses& h, const Frames* meant, bool mocap_is_right) {
   if (!c.log.attitude) return true;
   const std::string name = "attitude";
   const std::vector<Pair> declared = pairs_of(c.log, meant ? *meant : h.all[0]);
@@ -249,8 +251,11 @@ bool check_second(Context& c, const Hypotheses& h, const Frames* meant) {
   constexpr double kLeast_rad = 2 * kDegree;
   const bool mirrored = least < 0.5 * usual && usual > kLeast_rad, apart = usual > 10 * kDegree;
   if (mirrored)
-    c.add_finding(name, Verdict::warning,
-                  seen + format(", by %.2g deg once, in one of them, ", least / kDegree) + h.all[best].text, values);
+    c.add_finding(
+        name, Verdict::warning,
+        seen + format(", by %.2g deg once, in %s, ", least / kDegree, mocap_is_right ? "attitude.csv" : "one of them") +
+            h.all[best].text,
+        values);
   else if (apart)
     c.add_finding(name, Verdict::warning, seen + ", below 10 expected: another body, or another clock", values);
   else c.add_finding(name, Verdict::ok, seen, values);
@@ -278,11 +283,12 @@ void check_swapped(Context& c, bool understood) {
   if (count == 0)
     return c.add_finding("markers", Verdict::ok,
                          c.log.attitude ? "no pose leaps, or is turned against attitude.csv" : "no pose leaps", values);
-  c.add_finding("markers", Verdict::warning,
-                format("%zu of %zu poses (%.2g %%), up to %zu in a row, leap or are turned against attitude.csv, from "
-                       "%.6g s on: markers taken for others",
-                       count, n, 100 * share, longest, c.log.mocap.t_s[first]),
-                values, share > kMostLost ? LogPlace{kMocap, first + 2} : LogPlace{});
+  c.add_finding(
+      "markers", Verdict::warning,
+      format("%zu of %zu poses (%.2g %%), up to %zu in a row, leap%s, from %.6g s on: markers taken for others", count,
+             n, 100 * share, longest, c.log.attitude ? " or are turned against attitude.csv" : "",
+             c.log.mocap.t_s[first]),
+      values, share > kMostLost ? LogPlace{kMocap, first + 2} : LogPlace{});
 }
 
 void check_frozen(Context& c) {
@@ -323,7 +329,7 @@ void check_frozen(Context& c) {
 bool check_frames(Context& c) {
   const Hypotheses h = hypotheses();
   const Frames* const meant = check_axes(c, h);
-  const bool alike = check_second(c, h, meant);
+  const bool alike = check_second(c, h, meant, c.findings.back().verdict == Verdict::ok);
   check_swapped(c, alike && meant == nullptr);
   check_frozen(c);
   return meant == nullptr;

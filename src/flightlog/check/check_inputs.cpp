@@ -85,6 +85,27 @@ std::string change_of_scale(const Levels& flight) {
   return "";
 }
 
+/// Means over 0.2 s: what a controller asks for faster than that is noise.
+Column slow(const Column& t_s, const Column& values) {
+  constexpr double kSlow_s = 0.2;
+  const double per_s = static_cast<double>(t_s.size() - 1) / (t_s.back() - t_s.front());
+  const auto block = static_cast<std::size_t>(std::max(std::round(kSlow_s * per_s), 1.0));
+  Column means;
+  for (std::size_t i = 0; i + block <= values.size(); i += block) means.push_back(io::mean({values.data() + i, block}));
+  return means;
+}
+
+double correlation(const Column& a, const Column& b) {
+  const double a0 = io::mean(a), b0 = io::mean(b);
+  double aa = 0, bb = 0, ab = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    aa += (a[i] - a0) * (a[i] - a0), bb += (b[i] - b0) * (b[i] - b0), ab += (a[i] - a0) * (b[i] - b0);
+  return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0;
+}
+
+/// How two inputs go along with one another depends on what is flown, but not so much.
+constexpr double kOtherCorrelation = 0.8;
+
 Finding dead(const std::string& input, double value) {
   return {check_of(input), Verdict::warning, format("is %.4g all the time: not logged, or not used", value), {}};
 }
@@ -125,6 +146,29 @@ void compare_inputs(const std::vector<const FlightLog*>& logs, const std::vector
         own = {own.check, Verdict::warning, odd, own.values, logs.size() > 2 ? LogPlace{kCommand} : LogPlace{}};
     }
   }
+}
+
+void compare_correlations(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings) {
+  const std::vector<std::string>& inputs = logs.front()->header.inputs;
+  std::vector<std::vector<Column>> columns;
+  for (const FlightLog* log : logs) {
+    columns.emplace_back();
+    for (const Column& values : log->command.declared) columns.back().push_back(slow(log->command.t_s, values));
+  }
+  for (std::size_t k = 0; k < inputs.size(); ++k)
+    for (std::size_t l = 0; l < inputs.size(); ++l) {
+      if (k == l) continue;
+      std::vector<double> all;
+      for (const std::vector<Column>& flight : columns) all.push_back(correlation(flight[k], flight[l]));
+      const double usual = io::median(all);
+      for (std::size_t i = 0; i < logs.size(); ++i) {
+        Finding& own = *std::ranges::find(*findings[i], check_of(inputs[k]), &Finding::check);
+        if (std::abs(all[i] - usual) <= kOtherCorrelation || own.verdict != Verdict::ok) continue;
+        own.verdict = Verdict::warning;
+        own.text = format("goes along with %s by %.2f, by %.2f in most of these flights: columns swapped?",
+                          inputs[l].c_str(), all[i], usual);
+      }
+    }
 }
 
 }  // namespace flappy::flightlog

@@ -42,6 +42,8 @@ void check_command(const FlightLog& log, Findings& findings);
 void check_inputs_apart(const FlightLog& log, Findings& findings);
 /// The same inputs of several flights against one another, in those findings.
 void compare_inputs(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings);
+/// How they go along with one another, of three flights or more.
+void compare_correlations(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings);
 void check_power(const FlightLog& log, Findings& findings);
 void check_wings(const FlightLog& log, Findings& findings);
 

@@ -145,6 +145,15 @@ TEST(CheckFrames, TellTwoEstimatorsApart) {
   EXPECT_TRUE(warnings(report)[0].ends_with("in one of them, pitch is inverted")) << warnings(report)[0];
   EXPECT_EQ(verdict_of(report, "markers"), "not tested: needs attitudes that are understood");
   EXPECT_TRUE(data_faults(log, report, "log").empty());
+
+  FlightLog other = inputs_log();
+  AttitudeStream& a = *other.attitude;
+  for (Column* c : {&a.qx, &a.qy, &a.qz})
+    for (double& v : *c) v *= -1;
+  const CheckReport inverse = check_flight(other);
+  ASSERT_EQ(warnings(inverse).size(), 1u);
+  EXPECT_NE(warnings(inverse)[0].find("in attitude.csv, the quaternion is inverse"), std::string::npos)
+      << warnings(inverse)[0];
 }
 
 TEST(CheckFrames, SayWhatTooLittleTiltCannotTell) {

@@ -70,6 +70,24 @@ TEST(CheckInputs, CompareWhatHasTheSameInputs) {
   EXPECT_EQ(of_input(reports[0], "motor").verdict, Verdict::ok);
 }
 
+TEST(CheckInputs, FindColumnsThatAreSwapped) {
+  // A second motor goes with the first; in one flight its column and the servo's have changed places, at the same level.
+  std::vector<FlightLog> logs = flights(3);
+  for (FlightLog& log : logs) {
+    log.header.inputs.emplace_back("other_motor");
+    log.command.declared.push_back(log.command.declared[0]);
+    for (double& v : log.command.declared[1]) v += 0.6;
+  }
+  std::swap(logs[1].command.declared[1], logs[1].command.declared[2]);
+  const std::vector<CheckReport> reports = check_flights(logs);
+  EXPECT_EQ(of_input(reports[1], "other_motor").text.substr(0, 25), "goes along with motor by ");
+  EXPECT_EQ(of_input(reports[1], "other_motor").verdict, Verdict::warning);
+  for (const std::size_t i : {0u, 2u})
+    for (const char* input : {"motor", "servo", "other_motor"})
+      EXPECT_EQ(of_input(reports[i], input).verdict, Verdict::ok) << of_input(reports[i], input).text;
+  EXPECT_TRUE(data_faults(logs, {"a", "b", "c"}).empty());  // a suspicion
+}
+
 TEST(CheckInputs, FindAScaleThatChangesInAFlight) {
   std::vector<FlightLog> logs = flights(1);
   Column& motor = logs[0].command.declared[0];
