@@ -9,7 +9,8 @@
 
 namespace flappy::flightlog {
 
-/// A flight must have this many beats seen by voltages, motion capture and IMU alike: ten in which the wings settle, and
+/// A flight must have this many beats seen by voltages, motion capture and IMU alike (by inputs and motion capture, where inputs
+/// are declared): ten in which the wings settle, and
 /// fifty of which mean, harmonics and noise are told apart. Nor does gravity show in less than the time.
 inline constexpr double kLeastBeats = 60, kLeastTime_s = 2;
 
