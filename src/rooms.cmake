@@ -27,9 +27,9 @@ function(flappy_room name)
   target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:flappy_options>)
 endfunction()
 
-# One C++ source that holds text files, by their names, in the map that a header declares.
+# One C++ source that holds text files, of this folder or by their full paths, by their names, in the map that a header declares.
 function(flappy_embed output header namespace variable)
-  list(TRANSFORM ARGN PREPEND ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/)
+  list(TRANSFORM ARGN PREPEND ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/ REGEX "^[^/]")
   file(GLOB files CONFIGURE_DEPENDS ${ARGN})
   set(script ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/deploy/embed.cmake)
   add_custom_command(OUTPUT ${output} COMMAND ${CMAKE_COMMAND} -DOUTPUT=${output} -DHEADER=${header} -DNAMESPACE=${namespace}

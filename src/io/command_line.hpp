@@ -44,7 +44,7 @@ class Command {
  public:
   explicit Command(CLI::App* app) : app_(app) {}
 
-  /// T: int, unsigned, std::uint64_t, double, std::string, std::filesystem::path, or a vector of strings or paths. A name without dashes
+  /// T: int, unsigned, std::uint64_t, double, std::string, std::filesystem::path, or a vector of strings, doubles or paths. A name without dashes
   /// is a place on the command line.
   template <class T>
   Option option(const std::string& name, T& value, const std::string& help) const;

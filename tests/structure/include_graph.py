@@ -43,6 +43,7 @@ ROOMS = {
     "blind": FLIGHT | {"flightlog"},
     "blind/c": {"io", "blind", "flightlog"},
     "benchmark": GAP | {"blind", "blind/c", "benchmark/predict"},
+    "view": ROLLOUT | {"flightlog/check", "learn"},
     "server/jobs": {"io"},
     "server/http": {"io", "server/jobs"},
     "benchmark/predict": GAP,  # answers the benchmark's questions, and knows nothing of who makes them
@@ -165,6 +166,9 @@ def self_test():
         ({"src/flight/x.cpp": "#include <torch/script.h>\n"}, "LibTorch belongs to src/policy/ and src/learn/torch/ and src/io/torch/"),
         ({"src/learn/torch/x.cpp": "#include <torch/torch.h>\n"}, None),
         ({"src/learn/x.cpp": "#include <torch/torch.h>\n"}, "LibTorch belongs to src/policy/ and src/learn/torch/ and src/io/torch/"),
+        ({"src/view/x.cpp": '#include "sim/b.hpp"\n#include "learn/d.hpp"\n', "src/learn/d.hpp": ""}, None),
+        ({"src/view/x.cpp": '#include "benchmark/d.hpp"\n', "src/benchmark/d.hpp": ""}, "not benchmark"),
+        ({"src/rollout/x.cpp": '#include "view/d.hpp"\n', "src/view/d.hpp": ""}, "not view"),
         ({"src/attic/x.cpp": ""}, "src/attic/x.cpp: no known room"),
         ({"tools/flappy_blind/main.cpp": '#include "blind/y.hpp"\n', "src/blind/y.hpp": ""}, None),
         ({"tools/flappy_gap/main.cpp": '#include "gap/diagnose/y.hpp"\n#include "command.hpp"\n', "src/gap/diagnose/y.hpp": ""}, None),

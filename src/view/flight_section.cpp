@@ -1,0 +1,288 @@
+#include "view/flight_section.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "flappy/batch.hpp"
+#include "flappy/vehicle_file.hpp"
+#include "flightlog/flight_log.hpp"
+#include "io/installation.hpp"
+#include "sim/replay.hpp"
+
+namespace flappy::view {
+namespace {
+
+namespace fs = std::filesystem;
+using flightlog::Column;
+using flightlog::FlightLog;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kWingsEvery_s = 2e-3, kHeld_s = 1e-3;  // fifteen pictures of a beat of 34 Hz; the driver's hold
+constexpr std::size_t kPointsOnPaper = 1500;
+
+/// Steps of what a page shows.
+namespace step {
+constexpr double kTime_s = 1e-6, kPlace_m = 1e-5, kQuaternion = 1e-5, kAngle_rad = 1e-3, kRate_rad_s = 1e-3,
+                 kForce_m_s2 = 1e-2, kVoltage_V = 1e-3, kSplit = 1e-5, kCurrent_A = 1e-4;
+}
+
+struct NamedColumn {
+  const char* name;
+  const Column& values;
+  double step;
+};
+
+Column thinned(const Column& values, std::size_t every) {
+  Column kept;
+  for (std::size_t i = 0; i < values.size(); i += every) kept.push_back(values[i]);
+  return kept;
+}
+
+/// Every n-th sample of a stream that is longer than kMostSamples, and a note that says so.
+Json packed(const std::string& stream, const std::vector<NamedColumn>& columns, Packing& packing, Json& notes) {
+  const std::size_t every = (columns.front().values.size() + kMostSamples - 1) / kMostSamples;
+  if (every > 1) notes.push_back(stream + ": one of " + std::to_string(every) + " samples is shown");
+  Json json;
+  for (const NamedColumn& c : columns)
+    json[c.name] = packing.add(every > 1 ? thinned(c.values, every) : c.values, c.step);
+  return json;
+}
+
+/// The vehicle that a log declares: beside it, as asked, or the shipped one of that name.
+model::Vehicle vehicle_of(const fs::path& folder, const FlightLog& log, const fs::path& asked) {
+  std::error_code none;
+  for (const fs::path& file :
+       {folder / log.header.vehicle, asked, fs::path(io::config_path("vehicles/" + log.header.vehicle))})
+    if (!file.empty() && fs::is_regular_file(file, none)) return model::read_vehicle(file);
+  throw io::InputError((folder / "flight.toml").string() + ": vehicle: there is no " + log.header.vehicle +
+                       " in the folder; accepted: --vehicle FILE");
+}
+
+/// The strokes and rotations that the recorded voltages make, the torso held as it is: its own motion changes them little, and
+/// a picture shows it less.
+flightlog::WingsStream derived_wings(const FlightLog& log, const model::Vehicle& vehicle) {
+  const Column& t = log.command.t_s;
+  const auto held = static_cast<std::size_t>(std::floor((t.back() - t.front()) / kHeld_s));
+  std::vector<double> left, right;
+  sim::step_voltages({t, log.command.left_voltage_V, log.command.right_voltage_V}, t.front(), kHeld_s, held, left,
+                     right);
+  sim::BatchOptions options;
+  options.threads = 1;
+  sim::Batch<float> wings(1, vehicle, options);
+  wings.reset(0, {}, sim::Start::welded);
+  const int steps = static_cast<int>(std::lround(kHeld_s / options.step_s));
+  const auto every = static_cast<std::size_t>(std::lround(kWingsEvery_s / kHeld_s));
+  flightlog::WingsStream stream;
+  for (std::size_t k = 0; k < held; ++k) {
+    wings.set_voltages(0, left[k], right[k]);
+    wings.step(steps);
+    if ((k + 1) % every != 0) continue;
+    const sim::FlapperState state = wings.state(0);
+    stream.t_s.push_back(t.front() + static_cast<double>(k + 1) * kHeld_s);
+    stream.left_stroke_rad.push_back(state.stroke_rad[0]);
+    stream.right_stroke_rad.push_back(state.stroke_rad[1]);
+    stream.left_rotation_rad.push_back(state.rotation_rad[0]);
+    stream.right_rotation_rad.push_back(state.rotation_rad[1]);
+  }
+  return stream;
+}
+
+Json json_of(const model::Side& s) {
+  return {{"shoulder_m", {s.shoulder_m.x, s.shoulder_m.y, s.shoulder_m.z}},
+          {"wing_length_m", s.planform.wing_length_m},
+          {"mean_chord_m", s.planform.mean_chord_m},
+          {"moments", {s.planform.r00, s.planform.r11, s.planform.r22}}};
+}
+
+Json json_of(const model::Vehicle& v) {
+  double mass_kg = v.torso.mass_kg;
+  for (const model::Side* s : {&v.left, &v.right}) mass_kg += s->leading_edge.mass_kg + s->wing.mass_kg;
+  return {{"name", v.name}, {"mass_kg", mass_kg}, {"left", json_of(v.left)}, {"right", json_of(v.right)}};
+}
+
+Json json_of(const flightlog::LogAmbient& a) {
+  Json walls = Json::array();
+  for (const flightlog::LogWall& w : a.walls) walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
+  return {{"ground_z_m", a.ground_z_m}, {"ceiling_z_m", a.ceiling_z_m}, {"walls", walls}};
+}
+
+/// What lies between an instant and its sample's time, as declared.
+Json latency_of(const flightlog::FlightHeader& h) {
+  Json json = {{"mocap", h.mocap.latency_s}, {"imu", h.imu.latency_s}};
+  if (h.power) json["power"] = h.power->latency_s;
+  return json;
+}
+
+Json streams_of(const FlightLog& log, const std::optional<flightlog::WingsStream>& wings, Packing& packing,
+                Json& notes) {
+  using namespace step;
+  Json json;
+  const flightlog::MocapStream& m = log.mocap;
+  json["mocap"] = packed("mocap.csv",
+                         {{"t_s", m.t_s, kTime_s},
+                          {"x_m", m.x_m, kPlace_m},
+                          {"y_m", m.y_m, kPlace_m},
+                          {"z_m", m.z_m, kPlace_m},
+                          {"qw", m.qw, kQuaternion},
+                          {"qx", m.qx, kQuaternion},
+                          {"qy", m.qy, kQuaternion},
+                          {"qz", m.qz, kQuaternion}},
+                         packing, notes);
+  const flightlog::ImuStream& i = log.imu;
+  json["imu"] = packed("imu.csv",
+                       {{"t_s", i.t_s, kTime_s},
+                        {"gyro_x_rad_s", i.gyro_x_rad_s, kRate_rad_s},
+                        {"gyro_y_rad_s", i.gyro_y_rad_s, kRate_rad_s},
+                        {"gyro_z_rad_s", i.gyro_z_rad_s, kRate_rad_s},
+                        {"accel_x_m_s2", i.accel_x_m_s2, kForce_m_s2},
+                        {"accel_y_m_s2", i.accel_y_m_s2, kForce_m_s2},
+                        {"accel_z_m_s2", i.accel_z_m_s2, kForce_m_s2}},
+                       packing, notes);
+  const flightlog::CommandStream& c = log.command;
+  std::vector<NamedColumn> command = {{"t_s", c.t_s, kTime_s},
+                                      {"left_voltage_V", c.left_voltage_V, kVoltage_V},
+                                      {"right_voltage_V", c.right_voltage_V, kVoltage_V}};
+  if (c.inputs) {
+    command.push_back({"amplitude_V", c.inputs->amplitude_V, kVoltage_V});
+    command.push_back({"difference_V", c.inputs->difference_V, kVoltage_V});
+    command.push_back({"bias_V", c.inputs->bias_V, kVoltage_V});
+    command.push_back({"split_cycle", c.inputs->split_cycle, kSplit});
+  }
+  json["command"] = packed("command.csv", command, packing, notes);
+  if (wings)
+    json["wings"] = packed("wings",
+                           {{"t_s", wings->t_s, kTime_s},
+                            {"left_stroke_rad", wings->left_stroke_rad, kAngle_rad},
+                            {"left_rotation_rad", wings->left_rotation_rad, kAngle_rad},
+                            {"right_stroke_rad", wings->right_stroke_rad, kAngle_rad},
+                            {"right_rotation_rad", wings->right_rotation_rad, kAngle_rad}},
+                           packing, notes);
+  if (log.power)
+    json["power"] = packed("power.csv",
+                           {{"t_s", log.power->t_s, kTime_s},
+                            {"battery_V", log.power->battery_V, kVoltage_V},
+                            {"left_current_A", log.power->left_current_A, kCurrent_A},
+                            {"right_current_A", log.power->right_current_A, kCurrent_A}},
+                           packing, notes);
+  return json;
+}
+
+/// A column over the flight's own time, with no more points than paper shows.
+Series on_paper(const std::string& name, Colour colour, bool dashed, const Column& t, const Column& values,
+                double factor = 1) {
+  Series s{.name = name, .colour = colour, .x = {}, .y = {}, .low = {}, .high = {}, .dashed = dashed};
+  const std::size_t every = values.size() / kPointsOnPaper + 1;
+  for (std::size_t i = 0; i < values.size(); i += every) {
+    s.x.push_back(t[i] - t.front());
+    s.y.push_back(factor * values[i]);
+  }
+  return s;
+}
+
+/// Roll, pitch and yaw of R = Rz Ry Rx; angles go on beyond half a turn.
+std::array<Column, 3> attitude_of(const flightlog::MocapStream& m) {
+  std::array<Column, 3> angles;
+  for (std::size_t i = 0; i < m.t_s.size(); ++i) {
+    const double w = m.qw[i], x = m.qx[i], y = m.qy[i], z = m.qz[i];
+    const std::array<double, 3> now = {std::atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+                                       std::asin(std::clamp(2 * (w * y - z * x), -1.0, 1.0)),
+                                       std::atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double before = angles[k].empty() ? now[k] : angles[k].back();
+      angles[k].push_back(before + std::remainder(now[k] - before, 2 * std::numbers::pi));
+    }
+  }
+  return angles;
+}
+
+struct ShownFlight {
+  std::string name;
+  FlightLog log;
+};
+
+void add_on_paper(Section& section, const std::vector<ShownFlight>& flights) {
+  Figure place{.id = "position",
+               .title = "Position",
+               .note = "motion capture, W",
+               .x = {.title = "time (s)"},
+               .y = {.title = "position (m)"},
+               .categories = {},
+               .series = {}};
+  Figure turn = place, volts = place;
+  turn.id = "attitude", turn.title = "Attitude", turn.y.title = "angle (deg)";
+  volts.id = "inputs", volts.title = "Inputs of the wing beat", volts.y.title = "input (V)", volts.note = "command.csv";
+  for (std::size_t k = 0; k < flights.size() && k < 2; ++k) {
+    const FlightLog& log = flights[k].log;
+    const flightlog::MocapStream& m = log.mocap;
+    const bool dashed = k > 0;
+    const std::string of = flights.size() > 1 ? ", " + flights[k].name : "";
+    place.series.push_back(on_paper("x" + of, Colour::blue, dashed, m.t_s, m.x_m));
+    place.series.push_back(on_paper("y" + of, Colour::vermillion, dashed, m.t_s, m.y_m));
+    place.series.push_back(on_paper("z" + of, Colour::green, dashed, m.t_s, m.z_m));
+    const std::array<Column, 3> angles = attitude_of(m);
+    turn.series.push_back(on_paper("roll" + of, Colour::blue, dashed, m.t_s, angles[0], kDegrees));
+    turn.series.push_back(on_paper("pitch" + of, Colour::vermillion, dashed, m.t_s, angles[1], kDegrees));
+    turn.series.push_back(on_paper("yaw" + of, Colour::green, dashed, m.t_s, angles[2], kDegrees));
+    if (!log.command.inputs) continue;
+    const flightlog::BeatInputs& u = *log.command.inputs;
+    volts.series.push_back(on_paper("amplitude" + of, Colour::blue, dashed, log.command.t_s, u.amplitude_V));
+    volts.series.push_back(on_paper("difference" + of, Colour::vermillion, dashed, log.command.t_s, u.difference_V));
+    volts.series.push_back(on_paper("bias" + of, Colour::green, dashed, log.command.t_s, u.bias_V));
+  }
+  section.add_on_paper(place);
+  section.add_on_paper(turn);
+  if (!volts.series.empty()) section.add_on_paper(volts);
+}
+
+/// The folder's own name; with that of the folder around it where another flight has the same.
+std::string name_among(const std::vector<fs::path>& folders, const fs::path& folder) {
+  const auto whole = [](const fs::path& path) {
+    const fs::path full = fs::absolute(path).lexically_normal();
+    return full.has_filename() ? full : full.parent_path();
+  };
+  const fs::path own = whole(folder);
+  const auto alike =
+      std::ranges::count_if(folders, [&](const fs::path& other) { return whole(other).filename() == own.filename(); });
+  return (alike > 1 ? own.parent_path().filename() / own.filename() : own.filename()).string();
+}
+
+}  // namespace
+
+Section flight_section(const std::vector<fs::path>& folders, const FlightOptions& options, Packing& packing) {
+  if (folders.size() > kMostFlights)
+    throw io::InputError(std::to_string(folders.size()) + " flights are more than one page shows; accepted: up to " +
+                         std::to_string(kMostFlights));
+  std::vector<ShownFlight> shown;
+  Json list = Json::array();
+  for (const fs::path& folder : folders) {
+    shown.push_back({name_among(folders, folder), flightlog::read_flight_log(folder)});
+    const FlightLog& log = shown.back().log;
+    const model::Vehicle vehicle = vehicle_of(folder, log, options.vehicle);
+    const bool derived = !log.wings;
+    Json notes = Json::array();
+    const Json streams = streams_of(log, derived ? derived_wings(log, vehicle) : log.wings, packing, notes);
+    list.push_back({{"name", shown.back().name},
+                    {"declared", log.header.vehicle},
+                    {"flapping_Hz", log.header.flapping_Hz},
+                    {"gravity_m_s2", log.header.gravity_m_s2},
+                    {"vehicle", json_of(vehicle)},
+                    {"ambient", json_of(log.header.ambient)},
+                    {"wings", derived ? "derived" : "recorded"},
+                    {"latency_s", latency_of(log.header)},
+                    {"streams", streams},
+                    {"notes", notes}});
+  }
+  std::vector<std::string> sources;
+  for (const fs::path& folder : folders) sources.push_back(folder.string());
+  std::string names;
+  for (const ShownFlight& f : shown) names += (names.empty() ? "" : ", ") + f.name;
+  Section section("flight", (shown.size() > 1 ? "Flights " : "Flight ") + names, io::joined(sources));
+  Json block = {{"kind", "flights"}, {"goal_m", nullptr}, {"flights", list}};
+  if (options.goal_m) block["goal_m"] = *options.goal_m;
+  section.add(std::move(block));
+  add_on_paper(section, shown);
+  return section;
+}
+
+}  // namespace flappy::view

@@ -1,0 +1,30 @@
+// Recorded flights as a page shows them: the robot in 3D and its streams, one beside the others.
+//
+// The block "flights": {"goal_m": [x, y, z] | null, "flights": [{"name", "flapping_Hz", "gravity_m_s2", "vehicle", "ambient",
+// "wings": "recorded" | "derived", "latency_s": {stream: declared}, "streams": {stream: {column: packed}}, "notes": [...]}]}. Columns are those of the
+// log (flightlog/flight_log.hpp), rounded well below any sensor's noise; no stream has more than kMostSamples, so that flights
+// of any length open. truth.csv is not read.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "view/page.hpp"
+
+namespace flappy::view {
+
+inline constexpr std::size_t kMostSamples = 600'000;  ///< of a stream: ten minutes of a driver's milliseconds
+inline constexpr std::size_t kMostFlights = 8;
+
+struct FlightOptions {
+  std::filesystem::path vehicle;  ///< of flights whose folder has none; empty: the shipped one of that name
+  std::optional<std::array<double, 3>> goal_m;  ///< in W
+};
+
+/// io::InputError of a log that cannot be read, a vehicle that is nowhere, more than kMostFlights.
+Section flight_section(const std::vector<std::filesystem::path>& folders, const FlightOptions& options,
+                       Packing& packing);
+
+}  // namespace flappy::view

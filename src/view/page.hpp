@@ -1,0 +1,61 @@
+// A report as one HTML file that needs nothing else: data, three.js, Chart.js and our own modules (web/) stand in it.
+//
+// A page is a list of sections, a section a list of blocks, which web/ draws by their "kind":
+//   words       {"text", "style": "lead" | "plain" | "note"}
+//   figure      figure.hpp
+//   table       {"title", "head": [...], "rows": [[cell, ...]], "note"}       a cell is a text, or {"text", "at": JSON pointer}
+//   flights     flight_section.hpp
+//   anatomy     sections.hpp
+//   matrix      {"title", "rows", "columns", "values": [[number or null]], "texts", "marked", "least", "most", "tilted", "note"}
+//   heading     {"text"}
+//   cases       sections.hpp
+// Text of others comes into the page as JSON in which no "<" stands, and becomes text nodes there, never markup.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "view/figure.hpp"
+#include "view/packing.hpp"
+
+namespace flappy::view {
+
+using Json = nlohmann::ordered_json;
+
+class Section {
+ public:
+  Section(std::string kind, std::string title, std::string source);
+
+  void say(const std::string& text, const char* style = "plain");
+  void add(const Figure& figure);
+  /// A figure for paper alone: the page has it in another form.
+  void add_on_paper(const Figure& figure) { figures_.push_back(figure); }
+  void add(Json block) { blocks_.push_back(std::move(block)); }
+
+  const std::string& kind() const { return kind_; }
+  const std::string& title() const { return title_; }
+  const std::vector<Figure>& figures() const { return figures_; }
+  Json json() const;
+
+ private:
+  std::string kind_, title_, source_;
+  Json blocks_ = Json::array();
+  std::vector<Figure> figures_;
+};
+
+/// A number with the digits that a reader wants, and where in the file of results it stands.
+Json cell(double value, const std::string& at, int digits = 3);
+Json table(const std::string& title, const std::vector<std::string>& head, Json rows, const std::string& note = "");
+
+/// The HTML text.
+std::string page_text(const std::string& title, const std::vector<Section>& sections, const Packing& packing);
+
+/// JSON that can stand within <script>: "<", ">" and "&" become \u003c, \u003e, \u0026.
+std::string json_in_html(const Json& json);
+/// Text that can stand within an element or an attribute.
+std::string text_in_html(std::string_view text);
+/// Our modules as one, each behind those that it imports, without their import lines and the word export.
+std::string joined_modules();
+
+}  // namespace flappy::view

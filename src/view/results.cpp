@@ -1,0 +1,86 @@
+#include "view/results.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "io/files.hpp"
+
+namespace flappy::view {
+
+using Json = nlohmann::ordered_json;
+
+Json read_results(const std::filesystem::path& file) {
+  const std::string text = io::read_text(file);
+  try {
+    return Json::parse(text);
+  } catch (const Json::parse_error& e) {
+    const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(e.byte, text.size()));
+    const auto line = std::count(text.begin(), end, '\n') + 1;
+    const auto newline = std::find(std::make_reverse_iterator(end), text.rend(), '\n');
+    throw io::InputError(file.string() + ":" + std::to_string(line) + ":" +
+                         std::to_string(newline - std::make_reverse_iterator(end)) +
+                         ": is no JSON; accepted: results of a program, as --json wrote them");
+  }
+}
+
+void refuse_results(const std::filesystem::path& file, const char* writer, const std::string& what) {
+  // "[json.exception.out_of_range.403] key 'where' not found"
+  const std::size_t bracket = what.find("] ");
+  throw io::InputError(file.string() + ": " + (bracket == std::string::npos ? what : what.substr(bracket + 2)) +
+                       "; accepted: what " + writer + " wrote");
+}
+
+std::string TextTable::cell(const TextRow& row, const std::string& name) const {
+  const auto at = std::ranges::find(names, name);
+  const auto k = static_cast<std::size_t>(at - names.begin());
+  return at == names.end() || k >= row.size() ? "" : row[k];
+}
+
+double TextTable::number(const TextRow& row, const std::string& name) const {
+  const std::string text = cell(row, name);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc{} && end == text.data() + text.size() ? value : std::numeric_limits<double>::quiet_NaN();
+}
+
+TextTable read_text_table(const std::filesystem::path& file) {
+  TextTable table;
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(file, none)) return table;
+  const std::string text = io::read_text(file);
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    TextRow row;
+    const std::size_t most = table.names.empty() ? std::string::npos : table.names.size();
+    for (std::size_t begin = at;;) {
+      const std::size_t comma = text.find(',', begin);
+      if (comma >= end || row.size() + 1 == most) {
+        row.push_back(text.substr(begin, end - begin));
+        break;
+      }
+      row.push_back(text.substr(begin, comma - begin));
+      begin = comma + 1;
+    }
+    if (!row.back().empty() && row.back().back() == '\r') row.back().pop_back();
+    if (table.names.empty()) table.names = std::move(row);
+    else table.rows.push_back(std::move(row));
+    at = end + 1;
+  }
+  return table;
+}
+
+std::string spoken(std::string identifier) {
+  std::ranges::replace(identifier, '_', ' ');
+  return identifier;
+}
+
+std::string spoken_list(const std::vector<std::string>& words, const char* last) {
+  std::string all;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    all += (i == 0 ? "" : i + 1 == words.size() ? std::string(" ") + last + " " : ", ") + words[i];
+  return all;
+}
+
+}  // namespace flappy::view
