@@ -54,6 +54,13 @@ const char* place_of(const std::string& effect) {
                    : kPlaces[static_cast<std::size_t>(model::effects()[static_cast<std::size_t>(index)].info.stage)];
 }
 
+/// "m/s^2" -> "m/s²".
+std::string in_print(std::string unit) {
+  for (const auto& [power, sign] : {std::pair{"^2", "²"}, {"^3", "³"}})
+    if (const std::size_t at = unit.find(power); at != std::string::npos) unit.replace(at, 2, sign);
+  return unit;
+}
+
 /// One line of residuals.csv.
 struct Place {
   std::string stage, test, channel, regime, unit;
@@ -67,7 +74,7 @@ std::vector<Place> read_places(const std::filesystem::path& file) {
   std::vector<Place> places;
   for (const TextRow& row : table.rows)
     places.push_back({table.cell(row, "stage"), table.cell(row, "test"), table.cell(row, "channel"),
-                      table.cell(row, "regime"), table.cell(row, "unit"), table.number(row, "gap"),
+                      table.cell(row, "regime"), in_print(table.cell(row, "unit")), table.number(row, "gap"),
                       table.number(row, "noise_floor"), table.cell(row, "discovered") == "1"});
   return places;
 }
@@ -383,7 +390,7 @@ class Story {
           con.push_back(spoken(name.substr(name.find('.') + 1)) + " may be 0");
       std::set<std::string> at;
       for (const std::string& e : r.effects) at.insert(place_of(e));
-      rows.push_back({r.name, cell(r.probability, r.at + "/probability", 2), spoken_list({at.begin(), at.end()}),
+      rows.push_back({r.name, cell(r.probability, r.at + "/probability"), spoken_list({at.begin(), at.end()}),
                       spoken_list(pro), spoken_list(con)});
     }
     section_.add(table("What speaks for and against", {"explanation", "probability", "acts on", "for", "against"},

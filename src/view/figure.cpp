@@ -13,7 +13,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kDraws[] = {"line", "points", "bars", "band", "interval"};
-constexpr double kColumn_cm = 8.8, kHigh_cm = 6.2, kCategory_cm = 0.42, kFrame_cm = 2.2;
+constexpr double kColumn_cm = 8.8, kHigh_cm = 5.6, kCategory_cm = 0.42, kFrame_cm = 1.6, kKey_cm = 0.35;
 
 const char* colour_of(const Series& s) { return kColours[static_cast<std::size_t>(s.colour)]; }
 
@@ -114,7 +114,9 @@ Json json_of(const Figure& f) {
 
 void draw_on_paper(const std::filesystem::path& folder, const Figure& f, Paper paper) {
   const auto categories = static_cast<double>(f.categories.size());
-  const double high_cm = f.categories.empty() ? kHigh_cm : kFrame_cm + kCategory_cm * categories;
+  const auto keys = static_cast<double>(
+      std::ranges::count_if(f.series, [](const Series& s) { return !s.name.empty() && !s.x.empty(); }));
+  const double high_cm = kKey_cm * keys + (f.categories.empty() ? kHigh_cm : kFrame_cm + kCategory_cm * categories);
   char terminal[200];
   if (paper == Paper::pdf)
     std::snprintf(terminal, sizeof terminal, "set terminal pdfcairo noenhanced size %gcm,%gcm font 'DejaVu Sans,7'\n",
@@ -127,7 +129,7 @@ void draw_on_paper(const std::filesystem::path& folder, const Figure& f, Paper p
   std::string script = terminal;
   script +=
       "set encoding utf8\nset datafile missing 'NaN'\nset border 3 lc '#444444'\nset tics nomirror\n"
-      "set grid lc '#dddddd' lt 1\nset key outside top center horizontal samplen 1.5\n" +
+      "set grid lc '#dddddd' lt 1\nset key above maxcols 1 Left reverse samplen 1.5\n" +
       range_of("x", f.x) + range_of("y", f.y);
   if (!f.categories.empty()) {
     script += "set yrange [" + io::shortest_digits(categories - 0.5) + ":-0.5]\nset ytics (";

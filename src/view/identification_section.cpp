@@ -68,7 +68,7 @@ void add_channels(Section& section, const Json& channels) {
       f.series[k].y.push_back(near_category(f.categories.size(), k, 2));
     }
     if (of[1] > 0) least = std::min(least, of[1]);
-    f.categories.push_back(spoken(name));
+    f.categories.push_back(spoken(name.substr(0, name.rfind('_'))));
     rows.push_back({spoken(name), cell(before, "/channels/" + name + "/rms_before"),
                     cell(after, "/channels/" + name + "/rms_after")});
   }
@@ -82,7 +82,7 @@ void add_map(Section& section, const Json& map) {
   const Json &measured = map.at("measured"), &after = map.at("after"), &before = map.at("before");
   for (const auto& [channel, values] : measured.items()) {
     Figure f{.id = "map_" + channel,
-             .title = spoken(channel),
+             .title = spoken(channel.substr(0, channel.rfind('_'))),
              .note = "Simulated over measured, one point for each input; on the line they agree.",
              .x = {.title = "measured (" + map.at("units").at(channel).get<std::string>() + ")"},
              .y = {.title = "simulated (" + map.at("units").at(channel).get<std::string>() + ")"},

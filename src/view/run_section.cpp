@@ -114,7 +114,7 @@ void add_seeds(Section& section, const std::vector<Run>& runs) {
   for (const Run& r : runs)
     rows.push_back({r.name, number(r, "best_success_rate", 4), number(r, "time_to_50_s"), number(r, "time_to_80_s"),
                     number(r, "time_to_90_s"), number(r, "time_to_95_s"), number(r, "wall_s"), number(r, "updates", 7),
-                    number(r, "share_simulation", 2), number(r, "share_learning", 2)});
+                    number(r, "share_simulation"), number(r, "share_learning")});
   section.add(table("Seeds",
                     {"run", "best success (share)", "to 50 % (s)", "to 80 % (s)", "to 90 % (s)", "to 95 % (s)",
                      "training (s)", "updates", "simulation (share of time)", "learning (share of time)"},

@@ -150,6 +150,27 @@ Json json_of(const ForceFit& f, const MeasuredMap& measured, const std::optional
           {"ends", ends}};
 }
 
+/// The measured map, and what the vehicle made of it before and after the fit: [channel][row].
+Json map_of(const MeasuredMap& measured, const model::Vehicle& before, const model::Vehicle& after,
+            const MapOptions& options) {
+  const auto by_channel = [](const std::vector<Wrench>& wrenches) {
+    Json json = Json::object();
+    for (std::size_t k = 0; k < kChannels; ++k) {
+      Json& column = json[channel_names()[k]] = Json::array();
+      for (const Wrench& w : wrenches) column.push_back(w[k]);
+    }
+    return json;
+  };
+  Json inputs = Json::array(), units = Json::object();
+  for (const sim::Input& input : measured.inputs) inputs.push_back(numbers_of(input));
+  for (std::size_t k = 0; k < kChannels; ++k) units[channel_names()[k]] = is_force(static_cast<int>(k)) ? "N" : "N m";
+  return {{"inputs", inputs},
+          {"units", units},
+          {"measured", by_channel(measured.wrenches)},
+          {"before", by_channel(force_map<double>(std::span(&before, 1), measured.inputs, options))},
+          {"after", by_channel(force_map<double>(std::span(&after, 1), measured.inputs, options))}};
+}
+
 /// The fitted vehicle's file, saying how it came about; no time and no path, so the same fit is the same bytes.
 std::string vehicle_file(const Settings& s, const ForceFit& f, const std::string& from,
                          const std::string& measured_sha256) {
@@ -213,6 +234,7 @@ Json run(const Settings& s) {
   io::write_atomically(s.out, vehicle_file(s, fit, vehicle.name, io::sha256(text)));
   print(fit, measured, held_error, held.size());
   Json json = json_of(fit, measured, held_error, s.fit.method);
+  json["map"] = map_of(measured, vehicle, fit.vehicle, options.map);
   json["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return json;
 }

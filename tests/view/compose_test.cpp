@@ -1,0 +1,259 @@
+// What is recognised, what its page says, and what is refused.
+#include "view/compose.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "flightlog/flight_log.hpp"
+#include "io/files.hpp"
+#include "io/temporary_folder.hpp"
+#include "refusal.hpp"
+#include "view/results.hpp"
+#include "view/sections.hpp"
+
+namespace flappy::view {
+namespace {
+
+namespace fs = std::filesystem;
+using test::refusal;
+
+const fs::path kData = FLAPPY_SOURCE_DIR "/tests/data/report";
+
+/// A second of hover with wings that beat.
+flightlog::FlightLog hover() {
+  flightlog::FlightLog log;
+  flightlog::FlightHeader& h = log.header;
+  h.vehicle = "hummingbird_nominal.toml";
+  h.flapping_Hz = 34;
+  h.mocap = {200, 0.01, 1e-4, 2e-3};
+  h.imu = {500, 1e-3, 200, {0, 0, 0}, 0.01, {0, 0, 0}, 0.3};
+  for (int i = 0; i < 1000; ++i) {
+    const double t = 1e-3 * i, v = 9.5 * std::cos(2 * M_PI * 34 * t);
+    log.command.t_s.push_back(t);
+    log.command.left_voltage_V.push_back(v);
+    log.command.right_voltage_V.push_back(v);
+    if (i % 5 == 0) {
+      flightlog::MocapStream& m = log.mocap;
+      m.t_s.push_back(t);
+      m.x_m.push_back(0.1 * t), m.y_m.push_back(0), m.z_m.push_back(0.5);
+      m.qw.push_back(1), m.qx.push_back(0), m.qy.push_back(0), m.qz.push_back(0);
+    }
+    if (i % 2 == 0) {
+      flightlog::ImuStream& u = log.imu;
+      u.t_s.push_back(t);
+      for (flightlog::Column* c : {&u.gyro_x_rad_s, &u.gyro_y_rad_s, &u.gyro_z_rad_s, &u.accel_x_m_s2, &u.accel_y_m_s2})
+        c->push_back(0);
+      u.accel_z_m_s2.push_back(9.81);
+    }
+  }
+  return log;
+}
+
+/// All cells of tables that say where in the results they stand are those results.
+void expect_cells_of(const Section& section, const Json& results, std::size_t least) {
+  std::size_t cells = 0;
+  const Json shown_section = section.json();
+  for (const Json& block : shown_section.at("blocks"))
+    if (block.at("kind") == "table")
+      for (const Json& row : block.at("rows"))
+        for (const Json& c : row)
+          if (c.is_object()) {
+            const Json& there = results.at(Json::json_pointer(c.at("at").get<std::string>()));
+            const std::string shown = c.at("text");
+            ++cells;
+            if (there.is_null()) EXPECT_EQ(shown, "–") << c;
+            else EXPECT_NEAR(std::stod(shown), there.get<double>(), 0.006 * std::abs(there.get<double>())) << c;
+          }
+  EXPECT_GE(cells, least);
+}
+
+TEST(Recognised, IsWhatItHolds) {
+  const io::TemporaryFolder folder;
+  flightlog::write_flight_log(folder.path() / "flight", hover());
+  EXPECT_EQ(recognised(folder.path() / "flight"), Kind::flight);
+  EXPECT_EQ(recognised(kData / "diagnosis"), Kind::diagnosis);
+  EXPECT_EQ(recognised(kData / "diagnosis/diagnosis.json"), Kind::diagnosis);
+  EXPECT_EQ(recognised(kData / "evaluation.json"), Kind::evaluation);
+  EXPECT_EQ(recognised(kData / "effects.json"), Kind::evaluation);
+  EXPECT_EQ(recognised(kData / "fit.json"), Kind::identification);
+  EXPECT_EQ(recognised(kData / "score.csv"), Kind::benchmark);
+  fs::create_directories(folder.path() / "runs/seed_0");
+  io::write_atomically(folder.path() / "runs/seed_0/run.json", "{}");
+  EXPECT_EQ(recognised(folder.path() / "runs/seed_0"), Kind::run);
+  EXPECT_EQ(recognised(folder.path() / "runs"), Kind::run);
+}
+
+TEST(Recognised, RefusesTheRestInOneLine) {
+  const io::TemporaryFolder folder;
+  const auto line = [&](const std::string& name, const std::string& text) {
+    const fs::path file = folder.path() / name;
+    if (!text.empty()) io::write_atomically(file, text);
+    std::string told = refusal([&] { recognised(file); });
+    const std::string accepted = "; accepted: a flight log or a folder of them, a run folder";
+    if (const std::size_t at = told.find(accepted); at != std::string::npos) told = told.substr(0, at);
+    EXPECT_EQ(told.find('\n'), std::string::npos);
+    return told.substr(folder.path().string().size() + 1);
+  };
+  EXPECT_EQ(line("none", ""), "none: there is no such file or folder");
+  EXPECT_EQ(line("broken.json", "{\"a\": 1,\n \"b\" 2}"),
+            "broken.json:2:6: is no JSON; accepted: results of a program, as --json wrote them");
+  EXPECT_EQ(line("other.json", "[1]"), "other.json: is JSON of something else");
+  EXPECT_EQ(line("notes.txt", "x"), "notes.txt: is no result");
+  EXPECT_EQ(line("table.csv", "a,b\n"), "table.csv: is no result");
+  fs::create_directories(folder.path() / "empty");
+  EXPECT_EQ(line("empty", ""), "empty: is no folder of results");
+  fs::create_directories(folder.path() / "bench");
+  EXPECT_EQ(line("bench/manifest.json", "{}"), "bench/manifest.json: is JSON of something else");
+  EXPECT_EQ(line("bench", ""), "bench: is a blind benchmark that is not scored yet");
+}
+
+TEST(Composed, RefusesWhatDoesNotFit) {
+  const io::TemporaryFolder folder;
+  const fs::path diagnosis = kData / "diagnosis";
+  Packing packing;
+  EXPECT_EQ(refusal([&] {
+              composed({diagnosis, diagnosis / "../diagnosis"}, {}, packing);
+            }),
+            (diagnosis / "../diagnosis").string() + ": is given twice; accepted: each path once");
+  EXPECT_EQ(refusal([&] {
+              FlightOptions options;
+              options.goal_m = {0, 0, 0};
+              composed({diagnosis}, options, packing);
+            }),
+            "--goal and --vehicle are of flights, and none is given; accepted: a flight log beside them");
+  io::write_atomically(folder.path() / "half.json", R"({"verdict": {}, "candidates": [], "where": []})");
+  EXPECT_EQ(
+      refusal([&] { composed({folder.path() / "half.json"}, {}, packing); }),
+      (folder.path() / "half.json").string() + ": key 'kind' not found; accepted: what flappy-gap diagnose wrote");
+  std::vector<fs::path> many;
+  for (int i = 0; i < 9; ++i) {
+    many.push_back(folder.path() / ("f" + std::to_string(i)));
+    flightlog::write_flight_log(many.back(), hover());
+  }
+  EXPECT_EQ(refusal([&] { composed(many, {}, packing); }), "9 flights are more than one page shows; accepted: up to 8");
+}
+
+TEST(Composed, PutsFlightsOnOnePage) {
+  const io::TemporaryFolder folder;
+  for (const char* name : {"logs/a", "logs/b"}) flightlog::write_flight_log(folder.path() / name, hover());
+  Packing packing;
+  const std::vector<Section> sections =
+      composed({kData / "evaluation.json", folder.path() / "logs", kData / "diagnosis"}, {}, packing);
+  ASSERT_EQ(sections.size(), 3u);
+  EXPECT_EQ(sections[0].kind(), "evaluation");
+  EXPECT_EQ(sections[1].title(), "Flights a, b");
+  EXPECT_EQ(sections[2].kind(), "diagnosis");
+}
+
+TEST(FlightSection, HasTheStreamsTheVehicleAndTheGoal) {
+  const io::TemporaryFolder folder;
+  flightlog::FlightLog log = hover();
+  flightlog::write_flight_log(folder.path() / "flight", log);
+  FlightOptions options;
+  options.goal_m = {1, 2, 3};
+  Packing packing;
+  const Json block = flight_section({folder.path() / "flight"}, options, packing).json().at("blocks")[0];
+  EXPECT_EQ(block.at("goal_m").dump(), "[1.0,2.0,3.0]");
+  const Json& f = block.at("flights")[0];
+  EXPECT_EQ(f.at("vehicle").at("name"), "hummingbird_nominal");
+  EXPECT_EQ(f.at("vehicle").at("left").at("wing_length_m"), 0.07);
+  EXPECT_NEAR(f.at("vehicle").at("mass_kg").get<double>(), 0.0124481, 1e-7);  // torso, two leading edges, two wings
+  EXPECT_EQ(f.at("latency_s").dump(), R"({"mocap":0.01,"imu":0.001})");
+  EXPECT_EQ(f.at("streams").at("mocap").at("x_m").at("count"), log.mocap.x_m.size());
+  EXPECT_EQ(f.at("streams").at("command").at("t_s").at("count"), 1000);
+  EXPECT_EQ(f.at("wings"), "derived");
+  EXPECT_EQ(f.at("streams").at("wings").at("left_stroke_rad").at("count"), 499);
+  EXPECT_TRUE(f.at("notes").empty());
+}
+
+TEST(FlightSection, RefusesAFlightWithoutItsVehicle) {
+  const io::TemporaryFolder folder;
+  flightlog::FlightLog log = hover();
+  log.header.vehicle = "bird.toml";
+  flightlog::write_flight_log(folder.path() / "flight", log);
+  Packing packing;
+  EXPECT_EQ(refusal([&] { flight_section({folder.path() / "flight"}, {}, packing); }),
+            (folder.path() / "flight/flight.toml").string() +
+                ": vehicle: there is no bird.toml in the folder; accepted: --vehicle FILE");
+  FlightOptions options;
+  options.vehicle = FLAPPY_SOURCE_DIR "/configs/vehicles/hummingbird_nominal.toml";
+  EXPECT_EQ(refusal([&] { flight_section({folder.path() / "flight"}, options, packing); }), "accepted");
+}
+
+TEST(DiagnosisSection, TellsWhatTheJsonHas) {
+  const Json json = read_results(kData / "diagnosis/diagnosis.json");
+  const Section section = diagnosis_section(kData / "diagnosis/diagnosis.json");
+  expect_cells_of(section, json, 20);
+  std::vector<std::string> questions;
+  const Json blocks = section.json().at("blocks");
+  for (const Json& block : blocks)
+    if (block.at("kind") == "heading") questions.push_back(block.at("text"));
+  EXPECT_EQ(io::joined(questions),
+            "Where is the gap?, Which effect causes it?, How far does the gap shrink?, What to fly next?");
+  EXPECT_EQ(blocks[0].at("text"), "The model lacks accelerometer misalignment and vibration rectification.");
+  for (const Figure& f : section.figures())
+    if (f.id == "loss") {
+      ASSERT_EQ(f.series[0].x.size(), 4u);
+      EXPECT_EQ(f.series[0].x[1], json.at("gap").at("refit").get<double>());
+      EXPECT_EQ(f.series[0].x[3], json.at("gap").at("noise_floor").get<double>());
+    }
+}
+
+TEST(DiagnosisSection, DoesWithoutItsTables) {
+  const io::TemporaryFolder folder;
+  fs::copy_file(kData / "diagnosis/diagnosis.json", folder.path() / "diagnosis.json");
+  expect_cells_of(diagnosis_section(folder.path() / "diagnosis.json"), read_results(kData / "diagnosis/diagnosis.json"),
+                  20);
+}
+
+TEST(EvaluationSection, TellsWhatTheJsonHas) {
+  expect_cells_of(evaluation_section(kData / "evaluation.json"), read_results(kData / "evaluation.json"), 27);
+  EXPECT_EQ(evaluation_section(kData / "effects.json").json().at("blocks")[1].at("texts")[0][0], "96.0");
+}
+
+TEST(IdentificationSection, TellsWhatTheJsonHas) {
+  const Section section = identification_section(kData / "fit.json");
+  expect_cells_of(section, read_results(kData / "fit.json"), 60);
+  EXPECT_EQ(std::ranges::count_if(section.figures(), [](const Figure& f) { return f.id.starts_with("map_"); }), 6);
+}
+
+TEST(BenchmarkSection, HasEveryCase) {
+  const Section section = benchmark_section(kData / "score.csv");
+  const Json cases = section.json().at("blocks").back().at("cases");
+  ASSERT_EQ(cases.size(), 60u);
+  EXPECT_EQ(cases[3].at("truth"), "vibration rectification");
+  EXPECT_EQ(cases[3].at("named"), "accelerometer misalignment");
+  EXPECT_EQ(cases[3].at("right"), false);
+  EXPECT_EQ(cases[3].at("probability"), 0.882);
+}
+
+TEST(Figure, IsTheSameOnPaper) {
+  Figure f{.id = "f",
+           .title = "t",
+           .note = "",
+           .x = {.title = "it's `touch stolen` (m)"},
+           .y = {.title = "y"},
+           .categories = {},
+           .series = {}};
+  f.series.push_back({.name = "a $(touch stolen) \"b\"",
+                      .colour = Colour::vermillion,
+                      .x = {0, 1, 2},
+                      .y = {1, NAN, 3},
+                      .low = {},
+                      .high = {}});
+  const io::TemporaryFolder folder;
+  draw_on_paper(folder.path(), f, Paper::svg);
+  draw_on_paper(folder.path(), f, Paper::pdf);
+  const std::string svg = io::read_text(folder.path() / "f.svg");
+  EXPECT_NE(svg.find("it's `touch stolen` (m)"), std::string::npos);
+  EXPECT_NE(svg.find("rgb(213,  94,   0)"), std::string::npos);
+  EXPECT_TRUE(io::read_text(folder.path() / "f.pdf").starts_with("%PDF"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 2);
+  const Json json = json_of(f);
+  EXPECT_EQ(json.at("series")[0].at("y").dump(), "[1.0,null,3.0]");
+  EXPECT_EQ(json.at("series")[0].at("colour"), "#d55e00");
+}
+
+}  // namespace
+}  // namespace flappy::view
