@@ -177,7 +177,8 @@ void add_cases(Section& section, const TextTable& table, const std::vector<Case>
     Json details = Json::array();
     for (const std::string& name : table.names)
       if (const std::string text = table.cell(table.rows[i], name); !text.empty())
-        details.push_back({spoken(name), text});
+
+        details.push_back({spoken(name), name == "effects" || name == "named" ? in_words(text) : text});
     list.push_back({{"number", c.number},
                     {"part", spoken(c.part)},
                     {"truth", c.truth.empty() ? "no effect" : in_words(c.truth)},

@@ -29,6 +29,16 @@ function tableElement(block) {
 }
 
 /**
+ * Black or white, whichever has the larger contrast; of one of them it is at least 4.5 to 1 (WCAG 2.1, relative luminance).
+ * @param {number[]} shade red, green, blue to 255
+ * @returns {string}
+ */
+export function inkOn(shade) {
+  const [r, g, b] = shade.map((v) => v / 255).map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b > 0.179 ? "#000000" : "#ffffff";
+}
+
+/**
  * A grid of counts or sizes, darker where there is more. Ink stays readable on every shade.
  * @param {Block} block
  * @returns {HTMLElement}
@@ -42,8 +52,8 @@ function matrixElement(block) {
       if (value === null) return element("td", {}, text);
       const share = Math.min(1, Math.max(0, (value - least) / (most - least)));
       const shade = [[241, 245, 249], [8, 65, 107]].reduce((light, dark) => light.map((v, c) => Math.round(v + (dark[c] - v) * share)));
-      const ring = block.marked?.[i]?.[k] ? " marked" : "";
-      return element("td", {class: (share > 0.5 ? "dark" : "light") + ring, style: `background: rgb(${shade.join(" ")})`}, text);
+      const ring = block.marked?.[i]?.[k] ? "marked" : "";
+      return element("td", {class: ring, style: `background: rgb(${shade.join(" ")}); color: ${inkOn(shade)}`}, text);
     })));
   const head = element("tr", {}, element("td", {}), ...block.columns.map((/** @type {string} */ name) => element("th", {scope: "col"}, element("span", {}, name))));
   const made = element("figure", {class: block.tilted ? "matrix tilted wide" : "matrix"}, element("h3", {}, block.title),

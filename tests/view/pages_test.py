@@ -1,0 +1,258 @@
+#!/usr/bin/env python3
+"""Opens every kind of page in Chromium and looks at it.
+
+pages_test.py BIN SOURCE WORK [--update]: programs, the project, a folder to use; --update takes what is seen as right from now on.
+"""
+
+import json
+import math
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from PIL import Image, ImageChops, ImageStat
+
+BIN, SOURCE, WORK = (Path(argument).resolve() for argument in sys.argv[1:4])
+UPDATE = "--update" in sys.argv
+sys.path.insert(0, str(SOURCE / "scripts"))
+from browser import Browser  # noqa: E402
+
+DATA = SOURCE / "tests" / "data" / "report"
+SCREENS = DATA / "screens"
+SMALL = (360, 240)
+TOLERANCE = 3.0  # of 255, mean over all pixels: other fonts, other rounding
+ATTACK = "<script>alert(1)</script>"
+#: Okabe and Ito, "Color Universal Design", 2008, and black and grey.
+PALETTE = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#767676"}
+
+CONTRAST = """
+const channel = (v) => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+const light = (c) => 0.2126 * channel(c[0]) + 0.7152 * channel(c[1]) + 0.0722 * channel(c[2]);
+const parsed = (text) => text.match(/[\\d.]+/g).map(Number);
+const bad = [];
+for (const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT); walker.nextNode();) {
+  const node = walker.currentNode, element = node.parentElement;
+  if (!node.textContent.trim() || !element.checkVisibility() || element.closest("script, noscript, option")) continue;
+  const style = getComputedStyle(element), ink = parsed(element.closest("svg") ? style.fill : style.color);
+  let back = [255, 255, 255];
+  for (let e = element; e; e = e.parentElement) {
+    const colour = parsed(getComputedStyle(e).backgroundColor);
+    if (colour.length < 4 || colour[3] > 0.99) { back = colour; break; }
+  }
+  const [a, b] = [light(ink), light(back)], ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+  if (ratio < 4.5) bad.push(`${node.textContent.trim().slice(0, 40)}: ${ratio.toFixed(2)}`);
+}
+return bad;
+"""
+
+#: Every chart's points against those of the report that stands in the page.
+FIGURES = """
+const report = JSON.parse(document.getElementById("report").textContent), wrong = [];
+let checked = 0;
+const figures = report.sections.flatMap((s) => s.blocks).filter((b) => b.kind === "figure");
+const canvases = [...document.querySelectorAll("figure[data-figure] canvas")];
+if (figures.length !== canvases.length) wrong.push(`${canvases.length} of ${figures.length} figures`);
+figures.forEach((figure, k) => {
+  const shown = Chart.getChart(canvases[k]).data.datasets.filter((d) => d.own.draw !== "band");
+  figure.series.filter((s) => s.draw !== "band").forEach((s, i) => {
+    const points = s.x.map((x, j) => [x, s.y[j]]).filter(([x]) => s.draw === "line" || x !== null);
+    const drawn = shown[i].data.map((p) => [p.x, p.y]);
+    if (JSON.stringify(points) !== JSON.stringify(drawn)) wrong.push(`${figure.id}: ${s.name}`);
+    checked += points.length;
+  });
+});
+return [checked, wrong];
+"""
+
+#: Colours on each canvas.
+BLANK = """
+return [...document.querySelectorAll("canvas")].filter((c) => c.checkVisibility()).map((canvas) => {
+  const copy = document.createElement("canvas");
+  [copy.width, copy.height] = [120, 90];
+  const pen = copy.getContext("2d");
+  pen.drawImage(canvas, 0, 0, 120, 90);
+  return new Set(new Uint32Array(pen.getImageData(0, 0, 120, 90).data.buffer)).size;
+});
+"""
+
+
+def program(name: str, *arguments: object) -> str:
+    done = subprocess.run([str(BIN / name), *map(str, arguments)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{name} {arguments}: {done.stderr}"
+    return done.stdout
+
+
+def report(name: str, *paths: object) -> Path:
+    page = WORK / f"{name}.html"
+    program("flappy-report", *paths, "--out", page)
+    return page
+
+
+def fly(name: str, config: str, *options: object) -> Path:
+    program("flappy-fly", SOURCE / "configs" / "fly" / config, "--log", WORK / name, *options)
+    return WORK / name
+
+
+def check_page(browser: Browser, name: str, least_colours: int = 8) -> None:
+    """What holds for every page."""
+    browser.settle()
+    assert browser.complaints() == [], f"{name}: the console complains"
+    assert browser.run("return document.querySelectorAll('img, iframe, link').length") == 0, f"{name}: brings something else in"
+    colours = browser.run(BLANK)
+    assert all(n >= least_colours for n in colours), f"{name}: a canvas is blank: {colours}"
+    bad = browser.run(CONTRAST)
+    assert bad == [], f"{name}: below a contrast of 4.5 to 1: {bad}"
+    checked, wrong = browser.run(FIGURES)
+    assert wrong == [], f"{name}: figures show other numbers: {wrong}"
+    if "flight" not in name:
+        assert checked > 0 or name == "effects", f"{name}: no number was looked at"
+    used = set(browser.run("return JSON.parse(document.getElementById('report').textContent).sections.flatMap((s) => s.blocks)"
+                           ".flatMap((b) => b.series ?? []).map((s) => s.colour)"))
+    assert used <= PALETTE, f"{name}: other colours: {used - PALETTE}"
+    # everything that can be worked by the mouse can be reached by the keyboard
+    left_out = browser.run("return [...document.querySelectorAll('button, select, input, summary, a, .scroll, .view')]"
+                           ".filter((e) => e.checkVisibility() && e.tabIndex < 0).length")
+    assert left_out == 0, f"{name}: {left_out} controls are out of the keyboard's reach"
+
+
+def check_numbers(browser: Browser, results: object, least: int) -> None:
+    """Cells that say where in the results they stand show what stands there."""
+    cells = browser.run("return [...document.querySelectorAll('[data-at]')].map((e) => [e.dataset.at, e.textContent])")
+    assert len(cells) >= least, f"only {len(cells)} cells"
+    for pointer, text in cells:
+        value = results
+        for key in pointer.split("/")[1:]:
+            value = value[int(key)] if isinstance(value, list) else value[key]
+        if value is None:
+            assert text == "–", (pointer, text)
+        else:
+            assert math.isclose(float(text), value, rel_tol=0.006, abs_tol=1e-12), (pointer, text, value)
+
+
+def check_screen(browser: Browser, name: str) -> None:
+    """What is seen is what was seen, by and large."""
+    browser.shoot(WORK / f"{name}.png")
+    seen = Image.open(WORK / f"{name}.png").convert("RGB").resize(SMALL, Image.BOX)
+    if UPDATE:
+        SCREENS.mkdir(exist_ok=True)
+        seen.save(SCREENS / f"{name}.png", optimize=True)
+        return
+    before = Image.open(SCREENS / f"{name}.png").convert("RGB")
+    difference = sum(ImageStat.Stat(ImageChops.difference(seen, before)).mean) / 3
+    print(f"{name}: differs by {difference:.2f} of 255")
+    assert difference < TOLERANCE, f"{name}: looks otherwise than {SCREENS / name}.png, by {difference:.1f} of 255"
+
+
+def check_flight(browser: Browser) -> None:
+    """The cursor moves the robot; the keyboard works everything."""
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    state = "const p = players[0], r = p.scene.robots[0]; return [p.now_s, ...r.group.position.toArray(), r.wings[0].stroke.rotation.z]"
+    view = browser.driver.find_element("css selector", ".view")
+    picture = "return document.querySelector('.view canvas').toDataURL()"
+    start, first = browser.run(state), browser.run(picture)
+    plot = browser.driver.find_element("css selector", ".plot .area")
+    ActionChains(browser.driver).move_to_element_with_offset(plot, 40, 0).click().perform()
+    browser.settle()
+    there = browser.run(state)
+    assert there[0] > start[0], "a click on a plot does not go there"
+    assert there[1:4] != start[1:4], "the cursor does not move the robot"
+    assert browser.run(picture) != first, "the picture stays as it was"
+    expected = browser.run("return players[0].flights[0].positionAt(players[0].now_s)")
+    assert all(abs(a - b) < 1e-6 for a, b in zip(there[1:4], expected, strict=True)), "the robot is elsewhere than its flight"
+    text = browser.run("return document.querySelector('[data-panel=position] .value').textContent").replace("\u2212", "-")
+    assert abs(float(text) - expected[0]) <= 0.006 * abs(expected[0]) + 2e-5, f"x is shown as {text}, and is {expected[0]}"
+
+    beat = browser.run("return players[0].beat_s")
+    ActionChains(browser.driver).click(view).send_keys(Keys.ARROW_RIGHT).perform()
+    stepped = browser.run(state)
+    assert abs(stepped[0] - there[0] - beat / 20) < 1e-9, "an arrow is no twentieth of a beat"
+    assert stepped[4] != there[4], "the wings do not beat"
+    ActionChains(browser.driver).send_keys("c").perform()
+    assert browser.run("return players[0].scene.view") == "free", "C does not change the camera"
+    before = browser.run("return players[0].scene.azimuth")
+    ActionChains(browser.driver).send_keys("d").send_keys("+").perform()
+    assert browser.run("return players[0].scene.azimuth") > before, "D does not turn the camera"
+    ActionChains(browser.driver).send_keys(Keys.HOME).send_keys(" ").perform()
+    assert browser.run("return players[0].playing"), "space does not play"
+    browser.driver.execute_async_script("setTimeout(arguments[0], 400)")
+    ActionChains(browser.driver).send_keys(" ").perform()
+    assert browser.run("return players[0].now_s") > 0.05, "nothing moves while it plays"
+    for box in browser.driver.find_elements("css selector", ".choice input"):
+        if not box.is_selected():
+            box.send_keys(" ")
+    browser.run("players[0].look('chase'); players[0].timeline.show(players[0].duration_s); players[0].seek(0.2)")
+
+
+def check_cases(browser: Browser) -> None:
+    button = browser.driver.find_element("css selector", ".cases button.open")
+    button.send_keys("\n")
+    detail = browser.run("return document.querySelector('.cases tr.detail:not([hidden])').textContent")
+    assert "added mass" in detail, f"a case says nothing of itself: {detail}"
+    button.send_keys("\n")
+
+
+def main() -> None:
+    shutil.rmtree(WORK, ignore_errors=True)
+    WORK.mkdir(parents=True)
+    one = fly("pid", "escape.toml", "--set", "task.base=controller")
+    two = fly("eight", "figure_eight.toml", "--set", "flight.duration_s=3.5", "--set", "flight.seed=2")
+    # a vehicle that would be a script
+    vehicle = next(p for p in one.glob("*.toml") if p.name != "flight.toml")
+    vehicle.write_text(vehicle.read_text().replace('name = "hummingbird_nominal"', f'name = "{ATTACK}"'))
+    assert ATTACK in vehicle.read_text(), "the vehicle has another name"
+    header = one / "flight.toml"
+    evil = one / (ATTACK.replace("/", "\u2215") + ".toml")
+    vehicle.rename(evil)
+    header.write_text("\n".join(f"vehicle = '{evil.name}'" if line.startswith("vehicle =") else line for line in header.read_text().splitlines()
+                                if not line.startswith("vehicle_sha256")) + "\n")
+    sixty = fly("sixty", "hover.toml", "--set", "flight.duration_s=60")
+    program("flappy-train", SOURCE / "configs/train/escape.toml", "--seeds", "0-1", "--out", WORK / "runs", "--set", "learn.updates=600", "--set",
+            "evaluate.every=100", "--set", "evaluate.vehicles=50", "--set", "collect.flappers=128", "--set", "collect.vehicles=128")
+
+    with Browser() as browser:
+        browser.open(report("flight", one, "--goal", "0,0,0"))
+        check_page(browser, "flight")
+        assert browser.run("return players[0].flights[0].json.vehicle.name") == ATTACK
+        check_flight(browser)
+        check_page(browser, "flight, all plots")
+        check_screen(browser, "flight")
+
+        browser.open(report("flights", one, two))
+        check_page(browser, "flights")
+        browser.run("players[0].seek(0.3)")
+        check_screen(browser, "flights")
+
+        page = report("sixty", sixty)
+        weight, first_ms = page.stat().st_size / 1e6, browser.open(page)
+        print(f"60 s of flight: {weight:.2f} MB, first frame after {first_ms:.0f} ms")
+        assert weight < 15
+        assert first_ms < 2000
+        check_page(browser, "flight of 60 s")
+
+        for name, path, least in (("diagnosis", DATA / "diagnosis", 20), ("evaluation", DATA / "evaluation.json", 27), ("effects", DATA / "effects.json", 0),
+                                  ("identification", DATA / "fit.json", 60)):
+            browser.open(report(name, path))
+            check_page(browser, name)
+            check_numbers(browser, json.loads((path / "diagnosis.json" if path.is_dir() else path).read_text()), least)
+            check_screen(browser, name)
+
+        browser.open(report("benchmark", DATA / "score.csv"))
+        check_page(browser, "benchmark")
+        check_cases(browser)
+        check_screen(browser, "benchmark")
+
+        browser.open(report("run", WORK / "runs"))
+        check_page(browser, "run")
+        check_numbers(browser, {run.name: json.loads((run / "summary.json").read_text()) for run in (WORK / "runs").glob("seed_*")}, 10)
+        changed = browser.run("return [...document.querySelectorAll('article .table')].at(-1).textContent")
+        assert "learn.updates" in changed and "60000" in changed and "600" in changed, f"the configuration's difference is {changed}"
+        browser.open(report("all", DATA / "diagnosis", DATA / "evaluation.json", one))
+        check_page(browser, "flight among others")
+        assert browser.run("return document.querySelectorAll('nav a').length") == 3
+    print("all pages are as they should be")
+
+
+main()
