@@ -300,6 +300,7 @@ Json score_bench(const ScoreCommand& command) {
   io::make_folder(out);
   io::write_atomically(out / "score.md", text);
   io::write_atomically(out / "score.csv", lines);
+  std::printf("%s\n", io::shown_by(out.string()).c_str());
   json["undetectable"] = undetectable;
   json["never_fly"] = never;
   json["drawn_again"] = drawn_again;

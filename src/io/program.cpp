@@ -114,8 +114,15 @@ Ranks* Program::ranks(const std::string& agreed) {
   return ranks_.get();
 }
 
+void Program::write_shown_json(const nlohmann::ordered_json& result) const {
+  write_json(result);
+  if (!json_path_.empty() && writes()) std::printf("%s\n", shown_by(json_path_).c_str());
+}
+
 void Program::write_json(const nlohmann::ordered_json& result) const {
   if (!json_path_.empty() && writes()) write_atomically(json_path_, result.dump(2) + "\n");
 }
+
+std::string shown_by(const std::string& path) { return "shown by: flappy-report " + path + " --out report.html"; }
 
 }  // namespace flappy::io

@@ -18,6 +18,9 @@ std::string commit();
 /// A hash as results show it: 16 digits.
 std::string hexadecimal(std::uint64_t value);
 
+/// What shows results that lie at `path`: a program's last words.
+std::string shown_by(const std::string& path);
+
 class Program {
  public:
   /// `facts`: further lines of --version, as "name value".
@@ -36,6 +39,8 @@ class Program {
   bool writes() const { return rank_.rank == 0; }
   /// Writes `result` where --json asked for it; nothing otherwise.
   void write_json(const nlohmann::ordered_json& result) const;
+  /// The same, of results that flappy-report shows, which is said then.
+  void write_shown_json(const nlohmann::ordered_json& result) const;
 
  private:
   std::unique_ptr<CLI::App> app_;

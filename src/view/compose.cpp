@@ -47,8 +47,9 @@ Kind recognised_json(const fs::path& path) {
   refuse(path, "is JSON of something else");
 }
 
-/// A folder of flight logs, as flappy-fly --log leaves for several, stands for all of them, in the order of their names.
-std::vector<fs::path> expanded(const std::vector<fs::path>& paths) {
+/// A folder of flight logs, as flappy-fly --log leaves for several, stands for the first of them, in the order of their names.
+/// `notes` says of those that are left out.
+std::vector<fs::path> expanded(const std::vector<fs::path>& paths, std::string& notes) {
   std::vector<fs::path> all;
   for (const fs::path& path : paths) {
     std::vector<fs::path> flights;
@@ -57,6 +58,11 @@ std::vector<fs::path> expanded(const std::vector<fs::path>& paths) {
       for (const auto& entry : fs::directory_iterator(path, error))
         if (fs::exists(entry.path() / "flight.toml", error)) flights.push_back(entry.path());
     std::ranges::sort(flights);
+    if (flights.size() > kMostFlights) {
+      notes += "Of " + std::to_string(flights.size()) + " flights in " + path.string() + " the first " +
+               std::to_string(kMostFlights) + " are shown. ";
+      flights.resize(kMostFlights);
+    }
     if (flights.empty()) flights.push_back(path);
     all.insert(all.end(), flights.begin(), flights.end());
   }
@@ -75,7 +81,8 @@ Kind recognised(const fs::path& path) {
 }
 
 std::vector<Section> composed(const std::vector<fs::path>& given, const FlightOptions& options, Packing& packing) {
-  const std::vector<fs::path> paths = expanded(given);
+  std::string left_out;
+  const std::vector<fs::path> paths = expanded(given, left_out);
   std::vector<Kind> kinds;
   std::vector<fs::path> flights;
   for (std::size_t i = 0; i < paths.size(); ++i) {
@@ -93,7 +100,9 @@ std::vector<Section> composed(const std::vector<fs::path>& given, const FlightOp
     const fs::path& path = paths[i];
     switch (kinds[i]) {
       case Kind::flight:
-        if (!std::exchange(flown, true)) sections.push_back(flight_section(flights, options, packing));
+        if (std::exchange(flown, true)) break;
+        sections.push_back(flight_section(flights, options, packing));
+        if (!left_out.empty()) sections.back().say(left_out, "note");
         break;
       case Kind::run:
         sections.push_back(run_section(path));

@@ -17,7 +17,7 @@ enum class Kind { flight, run, evaluation, diagnosis, identification, benchmark 
 /// flappy-identify forces or flappy-blind score (its folder, or score.csv). InputError where it is none of these.
 Kind recognised(const std::filesystem::path& path);
 
-/// A folder of flight logs stands for all of them. Sections in the order of the paths; flights share the place of the first. A path that is given twice is refused, as whatever
+/// A folder of flight logs stands for the first kMostFlights of them. Sections in the order of the paths; flights share the place of the first. A path that is given twice is refused, as whatever
 /// a section refuses.
 std::vector<Section> composed(const std::vector<std::filesystem::path>& paths, const FlightOptions& options,
                               Packing& packing);

@@ -1,5 +1,6 @@
 #include "view/page.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <set>
@@ -39,6 +40,7 @@ void Section::say(const std::string& text, const char* style) {
 }
 
 void Section::add(const Figure& figure) {
+  if (std::ranges::all_of(figure.series, [](const Series& s) { return s.x.empty(); })) return;
   blocks_.push_back(json_of(figure));
   figures_.push_back(figure);
 }

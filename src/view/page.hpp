@@ -28,6 +28,7 @@ class Section {
   Section(std::string kind, std::string title, std::string source);
 
   void say(const std::string& text, const char* style = "plain");
+  /// Nothing where it has no point.
   void add(const Figure& figure);
   /// A figure for paper alone: the page has it in another form.
   void add_on_paper(const Figure& figure) { figures_.push_back(figure); }

@@ -202,9 +202,9 @@ Section run_section(const fs::path& folder) {
     add_seeds(section, runs);
     add_difference(section, runs[0]);
     section.say(
-        "What the policy does: flappy-report beside a flight of it, as flappy-fly --set actor=RUN/best.json --log "
-        "FLIGHT "
-        "leaves it, and by how much: beside flappy-eval RUN --json EVALUATION.json.",
+        "To see what the policy does, give flappy-report a flight of it (flappy-fly CONFIG --set actor=RUN/best.json "
+        "--log FLIGHT) "
+        "and its evaluation (flappy-eval RUN --json EVALUATION.json), too.",
         "note");
     return section;
   });

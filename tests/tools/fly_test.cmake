@@ -12,7 +12,7 @@ expect_equal("exit code" "${code}" 0)
 expect_match("stdout" "${out}" "^2 flights of 1 s, task hover, seed 1, double\n")
 foreach(row IN ITEMS "from 0.5 s on( +[0-9.]+)+\n" "with take-off( +[0-9.]+)+\n"
     "paper, experiment +1.76 +3.95 +5.23 +34.9 +37.2 +24.4\n" "paper, simulation +1.60 +3.86 +4.79 +36.5 +38.7 +26.9\n"
-    "never farther than 0.3 m: 100.00 %; crashed: 0\n" "2 logs in " "hash [0-9a-f]+\n")
+    "never farther than 0.3 m: 100.00 %; crashed: 0\n" "2 logs in " "hash [0-9a-f]+\n" "\nshown by: flappy-report ${WORK}/logs --out report.html\n$")
   expect_match("stdout" "${out}" "${row}")
 endforeach()
 file(READ ${WORK}/hover.json json)

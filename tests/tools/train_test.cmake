@@ -17,7 +17,8 @@ expect_equal("exit code" "${code}" 0)
 expect_match("stdout" "${out}" "^${WORK}/whole: seed 0, 1 threads, [0-9]+ MB of memory, at most [0-9]+ MB on disk\n")
 foreach(row IN ITEMS "trained: seed 0, 120000 updates in [0-9.]+ s .and [0-9.]+ s of evaluation., [0-9.]+ million environment steps\n"
     "best success on validation vehicles: [0-9.]+ %, at update [0-9]+\n" "time to 50, 80, 90, 95 % success:( [-0-9.s]+)+\n"
-    "simulation [0-9]+ %, learning [0-9]+ %, the rest [0-9]+ %" "policy ${WORK}/whole/best.json, last checkpoint's payload [0-9a-f]+\n")
+    "simulation [0-9]+ %, learning [0-9]+ %, the rest [0-9]+ %" "policy ${WORK}/whole/best.json, last checkpoint's payload [0-9a-f]+\n"
+    "\nshown by: flappy-report ${WORK}/whole --out report.html\n$")
   expect_match("stdout" "${out}" "${row}")
 endforeach()
 set(figures seed=NUMBER wall_s=NUMBER env_steps=NUMBER updates=NUMBER time_to_95_s=NULL share_simulation=NUMBER

@@ -132,6 +132,10 @@ TEST(Composed, RefusesWhatDoesNotFit) {
     flightlog::write_flight_log(many.back(), hover());
   }
   EXPECT_EQ(refusal([&] { composed(many, {}, packing); }), "9 flights are more than one page shows; accepted: up to 8");
+  const Section first = composed({folder.path()}, {}, packing)[0];
+  EXPECT_EQ(first.title(), "Flights f0, f1, f2, f3, f4, f5, f6, f7");
+  EXPECT_EQ(first.json().at("blocks").back().at("text"),
+            "Of 9 flights in " + folder.path().string() + " the first 8 are shown. ");
 }
 
 TEST(Composed, PutsFlightsOnOnePage) {

@@ -368,16 +368,16 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
   for (const double size : kSizes) std::printf("%8g", size);
   std::printf("\n  %-28s%s\n", "none", percent(without).c_str());
   for (const std::string& row : rows) std::printf("%s\n", row.c_str());
-  program.write_json({{"policy", request.policy},
-                      {"task", config.fleet.task.name},
-                      {"seed", request.seed},
-                      {"vehicles", request.stream},
-                      {"episodes", request.episodes},
-                      {"stopped", over},
-                      {"success_rate", without ? Json(without->success.value) : Json(nullptr)},
-                      {"hash", without ? Json(io::hexadecimal(without->hash)) : Json(nullptr)},
-                      {"effects", list},
-                      {"commit", io::commit()}});
+  program.write_shown_json({{"policy", request.policy},
+                            {"task", config.fleet.task.name},
+                            {"seed", request.seed},
+                            {"vehicles", request.stream},
+                            {"episodes", request.episodes},
+                            {"stopped", over},
+                            {"success_rate", without ? Json(without->success.value) : Json(nullptr)},
+                            {"hash", without ? Json(io::hexadecimal(without->hash)) : Json(nullptr)},
+                            {"effects", list},
+                            {"commit", io::commit()}});
 }
 
 void evaluate(Request request, io::Program& program) {
@@ -415,7 +415,7 @@ void evaluate(Request request, io::Program& program) {
   for (const auto& [name, controller] : alone)
     if (!columns.back().stopped) columns.push_back(evaluation.fly_alone(name, controller));
   print(request, config, columns);
-  program.write_json(json_of(request, config, columns));
+  program.write_shown_json(json_of(request, config, columns));
 }
 
 }  // namespace

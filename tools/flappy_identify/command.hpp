@@ -14,6 +14,7 @@ using Json = nlohmann::ordered_json;
 struct Command {
   io::Command app;
   std::function<Json()> run;
+  bool shown = false;  ///< by flappy-report
 };
 
 Command add_forces(const io::Command& program);

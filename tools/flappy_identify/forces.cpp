@@ -252,7 +252,7 @@ Command add_forces(const io::Command& program) {
       .range(0, 1'000'000)
       .excludes(table);
   s->fit.add(app);
-  return {app, [s] { return run(*s); }};
+  return {app, [s] { return run(*s); }, true};
 }
 
 }  // namespace flappy::identify

@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   program.takes_ranks();
   return program.run(argc, argv, [&] {
     for (const identify::Command& command : commands)
-      if (command.app.given()) program.write_json(command.run());
+      if (command.app.given())
+        command.shown ? program.write_shown_json(command.run()) : program.write_json(command.run());
   });
 }

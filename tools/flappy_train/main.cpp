@@ -72,6 +72,7 @@ void print(const fs::path& folder, const TrainSummary& s) {
                 100 * s.exchange_s / s.wall_s);
   std::printf("  policy %s, last checkpoint's payload %s\n", (folder / "best.json").c_str(), s.payload_sha256.c_str());
   if (s.stopped) std::printf("  go on: flappy-train --resume %s\n", folder.c_str());
+  std::printf("%s\n", io::shown_by(folder.string()).c_str());
 }
 
 /// The configuration that a run was started with.
@@ -154,7 +155,8 @@ void train_seeds(io::Program& program, const std::vector<std::uint64_t>& seeds, 
   const LearningCurve curve = learning_curve(curves);
   write_curve_csv(folder / "curve.csv", curve);
   write_curve_svg(folder / "curve.svg", curve, "success_rate");
-  std::printf("%s and curve.svg: learning curve of %zu seeds\n", (folder / "curve.csv").c_str(), curves.size());
+  std::printf("%s and curve.svg: learning curve of %zu seeds\n%s\n", (folder / "curve.csv").c_str(), curves.size(),
+              io::shown_by(folder.string()).c_str());
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "io/files.hpp"
 #include "io/installation.hpp"
 #include "io/log.hpp"
+#include "io/program.hpp"
 #include "io/progress.hpp"
 #include "model/effects/registry.hpp"
 #include "model/posterior.hpp"
@@ -197,6 +198,7 @@ Json run_diagnose(const DiagnoseCommand& command) {
   if (out.empty()) return json;
   io::write_atomically(out / kJson, json.dump(2) + "\n");
   print("written to " + command.out + ": " + written);
+  print(io::shown_by(command.out));
   return json;
 }
 

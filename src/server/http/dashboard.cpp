@@ -183,7 +183,8 @@ void Dashboard::Parts::route() {
     });
   };
   page("/", "page.html", "text/html; charset=utf-8");
-  page("/page.js", "page.js", "text/javascript; charset=utf-8");
+  for (const char* script : {"/page.js", "/live.js", "/scene.js", "/geometry.js", "/three.min.js"})
+    page(script, script + 1, "text/javascript; charset=utf-8");
   page("/page.css", "page.css", "text/css; charset=utf-8");
 
   listener.Get("/api/jobs", [this](const Request&, Response& response) {

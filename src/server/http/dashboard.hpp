@@ -1,6 +1,6 @@
 // A page that shows queue, curves, logs and the watched flapper. Read only: no request changes anything.
 //
-//   GET /                       the page; page.js, page.css
+//   GET /                       the page; page.css, page.js and what it imports; three.min.js
 //   GET /api/jobs               the newest jobs, newest first
 //   GET /api/jobs/ID/curve      {"update": [...], "success_rate": [...], "return_mean": [...]} of a training
 //   GET /api/jobs/ID/log        the last lines of its log

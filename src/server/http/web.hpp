@@ -1,4 +1,4 @@
-// The files of the dashboard's page, as they stand in src/server/http/web: put into the program when it is built.
+// The files of the dashboard's page, as they stand in src/server/http/web, and what it shares with src/view/web: put into the program when it is built.
 #pragma once
 
 #include <map>

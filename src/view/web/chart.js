@@ -70,10 +70,14 @@ export function chartConfig(figure) {
     Object.assign(y.ticks, {stepSize: 1, autoSkip: false, color: kInk, callback: (/** @type {number} */ v) => wrapped(figure.categories[v] ?? "")});
     y.afterBuildTicks = (/** @type {any} */ axis) => { axis.ticks = figure.categories.map((_, value) => ({value})); };
   }
+  const x = scaleOf(figure.x);
+  // what reaches beyond the points
+  const ends = figure.series.filter((s) => s.draw === "interval").flatMap((s) => [...s.low ?? [], ...s.high ?? []]).filter((v) => v !== null).map(Number);
+  if (ends.length > 0) Object.assign(x, {suggestedMin: Math.min(...ends), suggestedMax: Math.max(...ends)});
   return {
     type: "scatter", data: {datasets}, plugins: [barsAndIntervals],
     options: {
-      animation: false, responsive: true, maintainAspectRatio: false, scales: {x: scaleOf(figure.x), y},
+      animation: false, responsive: true, maintainAspectRatio: false, scales: {x, y},
       plugins: {
         legend: {
           display: figure.series.some((s) => s.name !== ""), align: "start",

@@ -10,6 +10,7 @@ import {Timeline} from "./timeline.js";
  */
 
 const kColours = [kBlue, kVermillion, kGreen, kPurple];
+const kMoments = 8;
 const kTrailPoints = 1500;
 const kSpeeds = [["real time", 1], ["1/4", 0.25], ["1/10", 0.1], ["1/50", 0.02], ["1/200", 0.005]];
 const kViews = [["chase", "chase"], ["free", "free"], ["front", "front"], ["side", "side"], ["top", "top"]];
@@ -89,11 +90,25 @@ export class Player {
         choice(windows, "Show", (length) => this.timeline.show(Number(length)))),
       this.slider,
       element("div", {}, this.views, toggle("trail", true, (on) => { this.shown.trail = on; this.draw(); }),
-        toggle("arrows", true, (on) => { this.shown.arrows = on; this.draw(); }), ...ghosts));
+        toggle("arrows", true, (on) => { this.shown.arrows = on; this.draw(); }),
+        toggle("moments", false, (on) => this.showMoments(on)), ...ghosts));
     this.steer(this.view);
     const notes = this.notes().map((note) => element("p", {class: "note"}, note));
     return element("div", {class: "player"}, element("div", {class: "stage"}, this.view, this.readout, controls, ...notes,
       element("p", {class: "note"}, `In the view: ${kKeys}.`)), this.timeline.element);
+  }
+
+  /**
+   * The watched robot at even moments of what the plots show, all at once.
+   * @param {boolean} on
+   * @param {number} count
+   */
+  showMoments(on, count = kMoments) {
+    const {begin_s, end_s} = this.timeline, flight = this.flights[0];
+    const times = on ? Array.from({length: count}, (_, k) => begin_s + (end_s - begin_s) * k / (count - 1)) : [];
+    this.scene?.showMoments(times.map((t_s) => ({position: flight.positionAt(t_s), attitude: flight.attitudeAt(t_s), wings: flight.wingsAt(t_s),
+      velocity: [0, 0, 0], force: [0, 0, 0]})));
+    this.draw();
   }
 
   notes() {

@@ -9,6 +9,7 @@ import {rotated, wingOutline} from "./geometry.js";
  * @typedef {"chase" | "free" | "front" | "side" | "top"} View
  */
 
+const kMomentColour = "#0072b2";
 const kFar_m = 50;  // what lies farther away is not there
 const kVelocityArrow_s = 0.12, kForceArrow_m = 0.09;  // length at 1 m/s, and at the weight
 /** Height and radius of the body of a robot with wings of 70 mm; only its looks: no vehicle's file has an outline. */
@@ -26,7 +27,7 @@ class Robot {
     const size = vehicle.left.wing_length_m / 0.07;
     const outline = kBody.map(([height, radius]) => new THREE.Vector2(radius * size, height * size));
     const smooth = new THREE.SplineCurve(outline).getPoints(40);
-    const body = new THREE.Mesh(new THREE.LatheBufferGeometry(smooth, 24), new THREE.MeshStandardMaterial({color: 0x7a8590, roughness: 0.8}));
+    const body = new THREE.Mesh(new THREE.LatheBufferGeometry(smooth, 24), new THREE.MeshStandardMaterial({color: 0x8b98a5, roughness: 0.85}));
     body.rotation.x = Math.PI / 2;
     const beak = new THREE.Mesh(new THREE.ConeBufferGeometry(0.0018 * size, 0.024 * size, 10), new THREE.MeshStandardMaterial({color: 0x24292f}));
     beak.rotation.z = -Math.PI / 2;
@@ -169,7 +170,7 @@ export class Scene {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(35, 1, 0.01, 200);
     this.camera.up.set(0, 0, 1);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xb6bec7, 0.95));
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xc8d0d8, 1.25));
     const sun = new THREE.DirectionalLight(0xffffff, 0.55);
     sun.position.set(-1, -2, 4);
     this.scene.add(sun);
@@ -179,11 +180,14 @@ export class Scene {
     this.high = [0, 1, 2].map((k) => all.reduce((most, p) => Math.max(most, p[k]), -Infinity));
     this.middle = this.low.map((value, k) => (value + this.high[k]) / 2);
     this.extent = Math.max(0.25, ...this.low.map((value, k) => this.high[k] - value));
-    const radius = Math.min(0.003, 0.0005 + 0.0006 * this.extent);
+    this.trail_m = Math.min(0.003, 0.0005 + 0.0006 * this.extent);
     this.robots = robots.map(({vehicle, colour}) => new Robot(vehicle, colour));
-    this.trails = robots.map(({path, colour}) => new Trail(path, colour, radius));
+    this.trails = robots.map(({path, colour}) => new Trail(path, colour, this.trail_m));
     this.robots.forEach((robot) => this.scene.add(robot.group));
     this.trails.forEach((trail) => this.scene.add(trail.group));
+    this.watched_vehicle = robots[0].vehicle;
+    /** @type {Robot[]} */
+    this.moments = [];
     this.velocity = arrow("#009e73");
     this.force = arrow("#d55e00");
     this.scene.add(this.velocity, this.force);
@@ -259,6 +263,20 @@ export class Scene {
     }
   }
 
+  /**
+   * Another trail for a robot: of a flight that goes on.
+   * @param {number} k of the robots
+   * @param {number[][]} path
+   * @param {string} colour
+   */
+  retrace(k, path, colour) {
+    const old = this.trails[k].group;
+    this.scene.remove(old);
+    old.children.forEach((/** @type {any} */ mesh) => mesh.geometry.dispose());
+    this.trails[k] = new Trail(path, colour, this.trail_m);
+    this.scene.add(this.trails[k].group);
+  }
+
   /** Takes the size of its frame. */
   resize() {
     const {clientWidth: width, clientHeight: height} = this.frame;
@@ -289,6 +307,22 @@ export class Scene {
     this.azimuth += azimuth_rad;
     this.elevation = Math.min(1.55, Math.max(-1.55, this.elevation + elevation_rad));
     this.distance = Math.min(100, Math.max(0.08, this.distance * zoom));
+  }
+
+  /**
+   * The watched robot at several moments at once.
+   * @param {Pose[]} poses none: no longer
+   */
+  showMoments(poses) {
+    while (this.moments.length < poses.length) {
+      const copy = new Robot(this.watched_vehicle, kMomentColour);
+      this.moments.push(copy);
+      this.scene.add(copy.group);
+    }
+    this.moments.forEach((copy, k) => {
+      copy.group.visible = k < poses.length;
+      if (k < poses.length) copy.show(poses[k]);
+    });
   }
 
   /**

@@ -104,7 +104,8 @@ TEST_F(Page, ShowsWhatThereIs) {
 }
 
 TEST_F(Page, IsStrictWithContent) {
-  for (const char* path : {"/", "/page.js", "/page.css", "/api/jobs", "/none"}) {
+  for (const char* path :
+       {"/", "/page.js", "/page.css", "/live.js", "/scene.js", "/geometry.js", "/three.min.js", "/api/jobs", "/none"}) {
     const auto result = get(path);
     ASSERT_TRUE(result) << path;
     EXPECT_EQ(result->status, std::string(path) == "/none" ? 404 : 200) << path;
@@ -117,9 +118,16 @@ TEST_F(Page, IsStrictWithContent) {
   const std::string html(kWeb.at("page.html"));
   for (const char* bad : {"style=", "<style", "onclick", "onload", "http:", "https:", "javascript:"})
     EXPECT_EQ(html.find(bad), std::string::npos) << bad;
-  EXPECT_NE(html.find("<script src=\"page.js\" defer></script>"), std::string::npos);
+  EXPECT_NE(html.find("<script src=\"page.js\" type=\"module\"></script>"), std::string::npos);
   for (const char* bad : {"innerHTML", "insertAdjacentHTML", "document.write", "eval(", "https:"})
-    EXPECT_EQ(kWeb.at("page.js").find(bad), std::string_view::npos) << bad;
+    for (const char* script : {"page.js", "live.js", "scene.js", "geometry.js"})
+      EXPECT_EQ(kWeb.at(script).find(bad), std::string_view::npos) << script << " " << bad;
+  // whatever a script imports is served
+  for (const auto& [name, text] : kWeb)
+    for (std::size_t at = 0; (at = text.find(" from \"./", at)) != std::string_view::npos; ++at) {
+      const std::string_view path = text.substr(at + 8);
+      EXPECT_EQ(get(std::string(path.substr(0, path.find('"'))).c_str())->status, 200) << name;
+    }
 }
 
 TEST_F(Page, AnswersToItsOwnNamesAlone) {

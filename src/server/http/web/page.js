@@ -1,4 +1,4 @@
-"use strict";
+import {LiveView} from "./live.js";
 
 const at = (id) => document.getElementById(id);
 let jobs = [];
@@ -93,6 +93,7 @@ function showWatched(state) {
   at("watched").hidden = state === null;
   if (state === null) return;
   const numbers = (list) => list.map((value) => value.toFixed(3)).join("  ");
+  live.show(state);
   const rows = [["source", state.source], ["time", `${state.t_s.toFixed(2)} s`], ["position", `${numbers(state.position_m)} m`],
     ["attitude", numbers(state.q_WB)], ["velocity", `${numbers(state.v_WB_W_m_s)} m/s`],
     ["body rate", `${numbers(state.w_WB_B_rad_s)} rad/s`]];
@@ -100,6 +101,7 @@ function showWatched(state) {
   at("state").replaceChildren(...rows.flatMap(([name, value]) => [element("dt", name), element("dd", value)]));
 }
 
+const live = new LiveView(at("view"));
 let busy = false;
 let again = false;
 
