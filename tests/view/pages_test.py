@@ -22,6 +22,7 @@ DATA = SOURCE / "tests" / "data" / "report"
 SCREENS = DATA / "screens"
 SMALL = (360, 240)
 TOLERANCE = 3.0  # of 255, mean over all pixels: other fonts, other rounding
+BLOCKS, BLOCK_TOLERANCE = (12, 8), 16.0  # the same of the block that differs most
 ATTACK = "<script>alert(1)</script>"
 #: Okabe and Ito, "Color Universal Design", 2008, and black and grey.
 PALETTE = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#767676"}
@@ -139,9 +140,12 @@ def check_screen(browser: Browser, name: str) -> None:
         seen.save(SCREENS / f"{name}.png", optimize=True)
         return
     before = Image.open(SCREENS / f"{name}.png").convert("RGB")
-    difference = sum(ImageStat.Stat(ImageChops.difference(seen, before)).mean) / 3
-    print(f"{name}: differs by {difference:.2f} of 255")
-    assert difference < TOLERANCE, f"{name}: looks otherwise than {SCREENS / name}.png, by {difference:.1f} of 255"
+    difference = ImageChops.difference(seen, before).convert("L")
+    mean = ImageStat.Stat(difference).mean[0]
+    most = max(difference.resize(BLOCKS, Image.BOX).getdata())
+    print(f"{name}: differs by {mean:.2f} of 255, by {most} where most")
+    assert mean < TOLERANCE, f"{name}: looks otherwise than {SCREENS / name}.png, by {mean:.1f} of 255"
+    assert most < BLOCK_TOLERANCE, f"{name}: looks otherwise than {SCREENS / name}.png in one place, by {most} of 255"
 
 
 def check_flight(browser: Browser) -> None:
@@ -252,6 +256,9 @@ def main() -> None:
         browser.open(report("all", DATA / "diagnosis", DATA / "evaluation.json", one))
         check_page(browser, "flight among others")
         assert browser.run("return document.querySelectorAll('nav a').length") == 3
+    for picture in (SOURCE / "docs" / "pictures").glob("*.png"):
+        assert picture.stat().st_size <= 300_000, f"{picture} is too large"
+        assert any(f"pictures/{picture.name}" in text.read_text() for text in (SOURCE / "README.md", *(SOURCE / "docs").glob("*.md"))), f"{picture} is nowhere shown"
     print("all pages are as they should be")
 
 
