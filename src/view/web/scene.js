@@ -132,6 +132,25 @@ function label(text, colour) {
   return sprite;
 }
 
+/**
+ * Squares in the x-y plane. Each side is a line of its own: software that draws WebGL may leave out a line that begins behind the camera.
+ * @param {number} size_m
+ * @param {number} count of squares beside each other
+ * @param {number} colour
+ * @returns {any}
+ */
+function grid(size_m, count, colour) {
+  const ends = [], step = size_m / count;
+  for (let i = 0; i <= count; i++)
+    for (let k = 0; k < count; k++) {
+      const a = i * step - size_m / 2, b = k * step - size_m / 2;
+      ends.push(a, b, 0, a, b + step, 0, b, a, 0, b + step, a, 0);
+    }
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(ends, 3));
+  return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({color: colour}));
+}
+
 /** @param {string} colour @returns {any} */
 function arrow(colour) {
   const made = new THREE.Group();
@@ -218,10 +237,9 @@ export class Scene {
     const half = Math.ceil(5 * this.extent + 5) / 10 + 0.4;
     const [x, y] = [Math.round(10 * this.middle[0]) / 10, Math.round(10 * this.middle[1]) / 10];
     const count = Math.min(200, Math.round(20 * half));
-    const grid = new THREE.GridHelper(2 * half, count, 0xafb8c1, ground ? 0xd0d7de : 0xe1e6eb);
-    grid.rotation.x = Math.PI / 2;
-    grid.position.set(x, y, this.floor_m);
-    this.scene.add(grid);
+    const lines = grid(2 * half, count, ground ? 0xc4ccd4 : 0xd8dee4);
+    lines.position.set(x, y, this.floor_m);
+    this.scene.add(lines);
     const plane = (/** @type {number} */ width, /** @type {number} */ height, /** @type {number} */ colour, /** @type {number} */ opacity) =>
       new THREE.Mesh(new THREE.PlaneBufferGeometry(width, height), new THREE.MeshBasicMaterial({color: colour, transparent: true, opacity,
         side: THREE.DoubleSide, depthWrite: false}));
