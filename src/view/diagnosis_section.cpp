@@ -90,6 +90,16 @@ struct Rival {
   std::string at;  ///< JSON pointer
 };
 
+/// Effects joined by +, or a kind of hypothesis without one.
+std::string rival_words(const std::string& name) {
+  if (name == "none") return "no gap";
+  if (name == "parameters") return "parameters alone";
+  if (name == "unknown") return "something unknown";
+  std::string words = spoken(name);
+  for (std::size_t at = 0; (at = words.find('+', at)) != std::string::npos; at += 5) words.replace(at, 1, " and ");
+  return words;
+}
+
 std::vector<Rival> read_rivals(const Json& json, const TextTable& table) {
   std::vector<Rival> rivals;
   const Json& list = json.at("candidates");
@@ -100,12 +110,8 @@ std::vector<Rival> read_rivals(const Json& json, const TextTable& table) {
     r.effect = !r.effects.empty();
     std::vector<std::string> words;
     for (const std::string& e : r.effects) words.push_back(spoken(e));
-    const std::string group = c.at("group");
-    r.name = r.effect                ? spoken_list(words) + (c.at("remainder").get<bool>() ? ", and more" : "")
-             : group == "none"       ? "no gap"
-             : group == "parameters" ? "parameters alone"
-             : group == "unknown"    ? "something unknown"
-                                     : group;
+    r.name = r.effect ? spoken_list(words) + (c.at("remainder").get<bool>() ? ", and more" : "")
+                      : rival_words(c.at("group"));
     r.probability = c.at("probability");
     r.log_evidence = c.at("log_evidence");
     r.sizes = c.at("parameters");
@@ -418,9 +424,15 @@ class Story {
     const auto number = [&](const char* key) {
       return gap.at(key).is_null() ? std::numeric_limits<double>::quiet_NaN() : gap.at(key).get<double>();
     };
-    const auto best = std::ranges::find(rivals_, true, &Rival::effect);
+    // only what was fitted has a closure
+    auto best = std::ranges::find_if(rivals_, [](const Rival& r) { return r.effect && r.closure; });
+    if (best == rivals_.end()) best = std::ranges::find(rivals_, true, &Rival::effect);
     const std::string with = best == rivals_.end() ? "best effect" : best->name;
-    if (!gap.at("closure").is_null())
+    if (!gap.at("closure").is_null() && number("closure") <= 0)
+      section_.say(format(
+          "With %s the model closes nothing of what refitted parameters leave (%.0f %%, 90 %%: %.0f to %.0f %%).",
+          with.c_str(), 100 * number("closure"), 100 * number("closure_low"), 100 * number("closure_high")));
+    else if (!gap.at("closure").is_null())
       section_.say(format(
           "With %s the model closes %.0f %% of what refitted parameters leave (90 %%: %.0f to %.0f %%), on flights "
           "that the fit did not see.",
@@ -503,16 +515,49 @@ class Story {
                          "The vehicle's file and the corrected one fly the recorded path under our controller."));
   }
 
+  /// How two rivals would fly the next experiment, in what differs most.
+  void add_courses(const Json& next, const std::vector<std::string>& rivals) {
+    if (!next.contains("courses")) return;  // of a diagnosis of old
+    const double step_s = next.at("course_step_s");
+    for (std::size_t k = 0; k < std::min<std::size_t>(2, next.at("courses").size()); ++k) {
+      const Json& c = next.at("courses")[k];
+      const std::string quantity = c.at("quantity");
+      const std::size_t cut = quantity.find_last_of('_');
+      const std::string unit = quantity.ends_with("_V") ? "V" : quantity.ends_with("_m") ? "m" : "share of a beat";
+      const std::string name = spoken(unit.size() > 1 ? quantity : quantity.substr(0, cut));
+      Figure f{.id = "next_" + quantity,
+               .title = "What the next flight would show: " + name,
+               .note = "As each rival would fly it under our controller; means over a tenth of a second.",
+               .x = {.title = "time (s)"},
+               .y = {.title = name + " (" + unit + ")"},
+               .categories = {},
+               .series = {}};
+      const std::pair<const char*, Colour> kSides[] = {{"first", Colour::blue}, {"second", Colour::vermillion}};
+      for (std::size_t i = 0; i < 2; ++i) {
+        Series s{.name = "if it is " + rivals[i],
+                 .colour = kSides[i].second,
+                 .x = {},
+                 .y = c.at(kSides[i].first).get<std::vector<double>>(),
+                 .low = {},
+                 .high = {}};
+        for (std::size_t n = 0; n < s.y.size(); ++n) s.x.push_back(step_s * (static_cast<double>(n) + 0.5));
+        f.series.push_back(std::move(s));
+      }
+      section_.add(f);
+    }
+  }
+
   void tell_next() {
     ask("What to fly next?");
     const std::string kind = json_.at("verdict").at("kind");
     const Json& next = json_.at("next_experiment");
     if (!next.is_null()) {
       std::vector<std::string> rivals;
-      for (const Json& r : next.at("separates")) rivals.push_back(spoken(r.get<std::string>()));
+      for (const Json& r : next.at("separates")) rivals.push_back(rival_words(r));
       const std::string name = next.at("manoeuvre");
       section_.say(format("Of the experiments that are ready, “%s” tells %s best apart: %.3g nats are expected of it.",
                           spoken(name).c_str(), spoken_list(rivals).c_str(), next.at("expected_nats").get<double>()));
+      add_courses(next, rivals);
       section_.say("It is configs/gap/experiments/" + name + ".toml. Diagnose old and new flights together.");
     } else if (kind == "effect" || kind == "parameters") {
       section_.say(

@@ -211,6 +211,29 @@ TEST(DiagnosisSection, DoesWithoutItsTables) {
                   20);
 }
 
+TEST(DiagnosisSection, ShowsHowRivalsWouldFlyNext) {
+  const io::TemporaryFolder folder;
+  Json json = read_results(kData / "diagnosis/diagnosis.json");
+  const auto told = [&] {
+    io::write_atomically(folder.path() / "diagnosis.json", json.dump());
+    return diagnosis_section(folder.path() / "diagnosis.json");
+  };
+  const std::size_t before = told().figures().size();
+  json["next_experiment"] = {{"manoeuvre", "dash"},
+                             {"separates", {"body_drag+wind", "none"}},
+                             {"expected_nats", 12.3},
+                             {"course_step_s", 0.1},
+                             {"courses", {{{"quantity", "x_m"}, {"first", {0.0, 1.0}}, {"second", {0.5, 0.25}}}}}};
+  const Section section = told();
+  ASSERT_EQ(section.figures().size(), before + 1);
+  const Figure& f = section.figures().back();
+  EXPECT_EQ(f.y.title, "x (m)");
+  EXPECT_EQ(f.series[0].name, "if it is body drag and wind");
+  EXPECT_EQ(f.series[1].name, "if it is no gap");
+  EXPECT_EQ(f.series[1].x, (std::vector<double>{0.05, 0.1 * 1.5}));
+  EXPECT_EQ(f.series[1].y, (std::vector<double>{0.5, 0.25}));
+}
+
 TEST(EvaluationSection, TellsWhatTheJsonHas) {
   expect_cells_of(evaluation_section(kData / "evaluation.json"), read_results(kData / "evaluation.json"), 27);
   EXPECT_EQ(evaluation_section(kData / "effects.json").json().at("blocks")[1].at("texts")[0][0], "96.0");

@@ -96,12 +96,60 @@ double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
   return Evidence::posterior(reduced, chosen, prior_mean).log_evidence - with;
 }
 
+constexpr const char* kCourses[] = {"x_m", "y_m", "z_m", "amplitude_V", "difference_V", "bias_V", "split_cycle"};
+
+/// Of each of kCourses, means over kCourseStep_s; where a step has no sample, that before.
+std::vector<std::vector<double>> course_of(const flightlog::FlightLog& log) {
+  const flightlog::MocapStream& m = log.mocap;
+  const flightlog::CommandStream& c = log.command;
+  const std::pair<const flightlog::Column*, const flightlog::Column*> columns[] = {{&m.t_s, &m.x_m},
+                                                                                   {&m.t_s, &m.y_m},
+                                                                                   {&m.t_s, &m.z_m},
+                                                                                   {&c.t_s, &c.inputs->amplitude_V},
+                                                                                   {&c.t_s, &c.inputs->difference_V},
+                                                                                   {&c.t_s, &c.inputs->bias_V},
+                                                                                   {&c.t_s, &c.inputs->split_cycle}};
+  const auto steps = static_cast<std::size_t>((c.t_s.back() - c.t_s.front()) / kCourseStep_s);
+  std::vector<std::vector<double>> course;
+  for (const auto& [t_s, values] : columns) {
+    std::vector<double> sums(steps, 0), counts(steps, 0);
+    for (std::size_t i = 0; i < t_s->size(); ++i) {
+      const double at = ((*t_s)[i] - c.t_s.front()) / kCourseStep_s;
+      if (at < 0 || at >= static_cast<double>(steps)) continue;
+      sums[static_cast<std::size_t>(at)] += (*values)[i];
+      counts[static_cast<std::size_t>(at)] += 1;
+    }
+    for (std::size_t k = 0; k < steps; ++k)
+      sums[k] = counts[k] > 0 ? sums[k] / counts[k] : k > 0 ? sums[k - 1] : values->front();
+    course.push_back(std::move(sums));
+  }
+  return course;
+}
+
+std::vector<Course> courses_of(const std::vector<std::vector<double>>& first,
+                               const std::vector<std::vector<double>>& second) {
+  std::vector<std::pair<double, Course>> list;
+  for (std::size_t q = 0; q < std::size(kCourses); ++q) {
+    const std::size_t n = std::min(first[q].size(), second[q].size());
+    const Eigen::Map<const VectorXd> a(first[q].data(), static_cast<Index>(n)),
+        b(second[q].data(), static_cast<Index>(n));
+    const double own = (a.array() - a.mean()).matrix().norm(), apart = (a - b).norm();
+    list.push_back({own > 0 ? apart / own : 0, {kCourses[q], {a.begin(), a.end()}, {b.begin(), b.end()}}});
+  }
+  std::ranges::stable_sort(list, std::greater{}, &std::pair<double, Course>::first);
+  std::vector<Course> courses;
+  for (auto& [share, course] : list) courses.push_back(std::move(course));
+  return courses;
+}
+
 std::optional<NextExperiment> expected_separation(const Manoeuvre& m, const std::vector<Rival>& rivals,
                                                   const ModelDiscrepancy& discrepancy) {
   std::vector<rollout::SimulatedFlight> flown;
+  std::vector<std::vector<std::vector<double>>> shown;
   for (const Rival& r : rivals) {
     flown.push_back(std::move(simulate(m.config, r.candidate().vehicle, 1, m.config.settle_s)[0]));
     if (flown.back().lost || !flown.back().log) return {};
+    shown.push_back(course_of(*flown.back().log));
   }
   const std::vector<PredictedFlight> flight = [&] {
     std::vector<PredictedFlight> list;
@@ -116,7 +164,7 @@ std::optional<NextExperiment> expected_separation(const Manoeuvre& m, const std:
     if (!e) return {};
     expected.push_back(std::move(*e));
   }
-  NextExperiment result{m.name, {}, 0};
+  NextExperiment result{m.name, {}, 0, {}};
   double weights = 0, most = -1;
   for (std::size_t a = 0; a < rivals.size(); ++a)
     for (std::size_t b = a + 1; b < rivals.size(); ++b) {
@@ -124,7 +172,11 @@ std::optional<NextExperiment> expected_separation(const Manoeuvre& m, const std:
       const double both = 0.5 * (nats(evidence, expected[a], expected[b]) + nats(evidence, expected[b], expected[a]));
       result.expected_nats += weight * both;
       weights += weight;
-      if (weight * both > most) most = weight * both, result.separates = {rivals[a].name, rivals[b].name};
+      if (weight * both > most) {
+        most = weight * both;
+        result.separates = {rivals[a].name, rivals[b].name};
+        result.courses = courses_of(shown[a], shown[b]);
+      }
     }
   result.expected_nats /= weights;
   return result;

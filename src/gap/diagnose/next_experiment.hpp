@@ -27,11 +27,20 @@ struct Manoeuvre {
 /// The configurations (*.toml) of a folder, by name. io::InputError where there is none or one is faulty.
 std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder);
 
+/// What a flight shows of a rival: means over kCourseStep_s, from the log's begin.
+struct Course {
+  std::string quantity;               ///< x_m, ..., amplitude_V, ...
+  std::vector<double> first, second;  ///< of the two that are told apart
+};
+inline constexpr double kCourseStep_s = 0.1;
+
 struct NextExperiment {
   std::string manoeuvre;
   std::vector<std::string>
       separates;             ///< the two hypotheses that it tells apart most: effects joined by +, or their kind
   double expected_nats = 0;  ///< mean over pairs
+  std::vector<Course>
+      courses;  ///< as each of the two would fly it; first what differs most beside what it does in the flight
 };
 
 struct NextOptions {

@@ -227,6 +227,10 @@ Json diagnosis_json(const Report& r) {
                           {"closure", c.closure ? Json(c.closure->value) : Json(nullptr)}});
   }
   const auto closure = [&](double Closure::*part) { return r.closure ? Json((*r.closure).*part) : Json(nullptr); };
+  Json courses = Json::array();
+  if (r.next)
+    for (const Course& c : r.next->courses)
+      courses.push_back({{"quantity", c.quantity}, {"first", c.first}, {"second", c.second}});
   Json json = {{"schema", 1},
                {"flights", r.flights},
                {"data_faults", faults},
@@ -250,7 +254,9 @@ Json diagnosis_json(const Report& r) {
                {"closed_loop", closed_loop},
                {"next_experiment", r.next ? Json({{"manoeuvre", r.next->manoeuvre},
                                                   {"separates", r.next->separates},
-                                                  {"expected_nats", r.next->expected_nats}})
+                                                  {"expected_nats", r.next->expected_nats},
+                                                  {"course_step_s", kCourseStep_s},
+                                                  {"courses", courses}})
                                           : Json(nullptr)}};
   if (!r.complete) json["complete"] = false;
   return json;

@@ -63,6 +63,11 @@ TEST(NextExperiment, FliesWhereTheRivalsDiffer) {
     EXPECT_GT(ranked[0].expected_nats, 2) << effect;
     EXPECT_GT(ranked[0].expected_nats, 2 * ranked[1].expected_nats) << effect;
     EXPECT_EQ(ranked[0].separates, (std::vector<std::string>{effect, "parameters"}));
+    ASSERT_EQ(ranked[0].courses.size(), 7u);
+    std::size_t different = 0;
+    for (std::size_t n = 0; n < ranked[0].courses[0].first.size(); ++n)
+      different += ranked[0].courses[0].first[n] != ranked[0].courses[0].second[n];
+    EXPECT_GT(different, 10u) << effect;
   };
   best_for("ground_effect", "ground_steps");
   best_for("ceiling_effect", "ceiling_steps");
