@@ -13,7 +13,7 @@ expect_match("effects" "${out}" "^ground_effect\n.*\nmocap_delay\noutside_")
 run(${fly} --randomise ${SOURCE}/configs/randomisation/published.toml --effect wind=0.5 --power --out ${WORK}/a
   --json ${WORK}/a.json)
 expect_equal("exit code" "${code}" 0)
-expect_match("stdout" "${out}" "flight_1: 10 s, up to [0-9]+ mm off, tilted up to [0-9]+ deg\n.*flight_3: ")
+expect_match("stdout" "${out}" "flight_1: 10 s, up to [0-9]+ mm off, tilted up to [0-9]+ deg\n.*flight_3: .*\nshown by: flappy-report ${WORK}/a --out report.html\n$")
 expect_keys(${WORK}/a.json seed=NUMBER draw=NUMBER crashes=ARRAY flights=ARRAY)
 foreach(k RANGE 1 3)
   foreach(file flight.toml command.csv mocap.csv imu.csv power.csv truth.csv)

@@ -187,6 +187,7 @@ int main(int argc, char** argv) {
         throw io::InputError("--own-figures, --conventions: are of a family; accepted: with --family");
       program.write_json(of.family.empty() ? blind::fly_case(robot, of.hover ? Programme::hover : Programme::rich)
                                            : blind::fly_family(robot, of));
+      std::printf("%s\n", io::shown_by(robot.out).c_str());
     }
   });
 }

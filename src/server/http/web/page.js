@@ -51,23 +51,37 @@ const svg = (name, attributes, text) => {
   return made;
 };
 
-function showCurve(curve) {
-  const points = curve.update.map((update, i) => [update, curve.success_rate[i]]).filter((p) => p[0] !== null && p[1] !== null);
-  at("curve").hidden = points.length === 0;
+/**
+ * @param {string} id of the figure
+ * @param {number[]} updates
+ * @param {(number | null)[]} values
+ * @param {number[]} ticks of the values, ascending
+ * @param {string} unit
+ */
+function drawCurve(id, updates, values, ticks, unit) {
+  const points = updates.map((update, i) => [update, values[i]]).filter((p) => p[0] !== null && p[1] !== null);
+  at(id).hidden = points.length === 0;
   if (points.length === 0) return;
   const [left, right, top, bottom] = [44, 632, 10, 212];
-  const last = Math.max(1, points[points.length - 1][0]);
+  const last = Math.max(1, points[points.length - 1][0]), [low, high] = [ticks[0], ticks[ticks.length - 1]];
   const x = (update) => left + (right - left) * update / last;
-  const y = (rate) => bottom - (bottom - top) * rate;
+  const y = (value) => bottom - (bottom - top) * (value - low) / (high - low);
   const parts = [];
-  for (const rate of [0, 0.25, 0.5, 0.75, 1]) {
-    parts.push(svg("line", {class: "grid", x1: left, x2: right, y1: y(rate), y2: y(rate)}));
-    parts.push(svg("text", {x: left - 6, y: y(rate) + 4, "text-anchor": "end"}, `${100 * rate} %`));
+  for (const tick of ticks) {
+    parts.push(svg("line", {class: "grid", x1: left, x2: right, y1: y(tick), y2: y(tick)}));
+    parts.push(svg("text", {x: left - 6, y: y(tick) + 4, "text-anchor": "end"}, `${Number(tick.toPrecision(3))}${unit}`));
   }
   parts.push(svg("text", {x: left, y: bottom + 18}, "0"));
   parts.push(svg("text", {x: right, y: bottom + 18, "text-anchor": "end"}, last.toLocaleString()));
   parts.push(svg("polyline", {class: "curve", points: points.map((p) => `${x(p[0]).toFixed(1)},${y(p[1]).toFixed(1)}`).join(" ")}));
-  at("curve").querySelector("svg").replaceChildren(...parts);
+  at(id).querySelector("svg").replaceChildren(...parts);
+}
+
+function showCurve(curve) {
+  drawCurve("curve", curve.update, curve.success_rate.map((rate) => rate === null ? null : 100 * rate), [0, 25, 50, 75, 100], " %");
+  const returns = curve.return_mean.filter((value) => value !== null);
+  const [low, high] = [Math.min(...returns), Math.max(...returns)], step = Math.max(1e-9, (high - low) / 4);
+  drawCurve("return", curve.update, curve.return_mean, [0, 1, 2, 3, 4].map((k) => low + k * step), "");
 }
 
 async function showChosen() {
