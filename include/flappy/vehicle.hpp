@@ -3,6 +3,7 @@
 // randomisation table and identification share; `parameters()` is the one list of them.
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -95,6 +96,36 @@ struct Posterior {
   bool operator==(const Posterior&) const = default;
 };
 
+/// A robot whose wings are not modelled: what acts on it as means over beats, from its inputs and its motion
+/// (src/model/beat_averaged.hpp). Its torso is all of it; sides, driver and extent say nothing.
+struct BeatAveraged {
+  double nominal_Hz = 0;    ///< beats, about
+  double bandwidth_Hz = 0;  ///< up to which force and motion are compared, well below the beat
+  struct Input {            ///< a column of command.csv
+    std::string name;
+    double low = 0, high = 0;
+  };
+  enum class Role { flapping, stroke_plane, other };
+  struct Actuator {  ///< gain x input + offset, behind a first-order lag
+    std::string name, input;
+    Role role = Role::other;
+    double gain = 1, offset = 0, lag_s = 0;
+  };
+  struct Wrench {  ///< in B, at a point: force_x_N to moment_z_Nm as expressions, "" where there is none
+    std::string name;
+    Triple at_m;
+    std::array<std::string, 6> terms;
+  };
+  std::vector<Input> inputs;
+  std::vector<Actuator> actuators;
+  struct Coefficient {  ///< a named number of the expressions, and how well it is known, 0: exactly
+    std::string name;
+    double value = 0, sd = 0;
+  };
+  std::vector<Coefficient> coefficients;
+  std::vector<Wrench> wrenches;
+};
+
 struct Vehicle {
   std::string name;
   RigidBody torso;
@@ -104,7 +135,8 @@ struct Vehicle {
   double air_density_kg_m3 = 0;
   /// Effects beyond the base model: identifier -> parameter -> value (src/model/effects).
   std::map<std::string, std::map<std::string, double>> effects;
-  std::optional<Posterior> posterior;  ///< of the file it was read from; a vehicle drawn at random has none
+  std::optional<Posterior> posterior;         ///< of the file it was read from; a vehicle drawn at random has none
+  std::optional<BeatAveraged> beat_averaged;  ///< instead of wings and motors
 };
 
 /// One leaf of a vehicle: where it is, and what is accepted there (closed interval).

@@ -71,7 +71,7 @@ Subject::Subject(blind::Case c, std::vector<blind::RobotFlight> flights, int thr
   std::vector<double> ratios;
   for (int g = 0; g < gap::kGroups; ++g)
     if (const int channel = g / gap::kCoefficients; channel != gap::kStrokeLeft && channel != gap::kStrokeRight)
-      if (gap::has_rows(channel, g % gap::kCoefficients))
+      if (flights_.front().has_rows(channel, g % gap::kCoefficients))
         ratios.push_back(evidence_->noise_sd(g) / declared[static_cast<std::size_t>(g)]);
   std::ranges::sort(ratios);
   noise_ratio_ = ratios[ratios.size() / 2];

@@ -83,7 +83,7 @@ class Planner {
     harmless("conventions", false, false, true);
     part("withheld", rounds(detectable_, kAtLeast / 2), [&](std::size_t k, PlannedCase& c) {
       single(k, c);
-      c.withheld = model::whole_group(c.effects.front().id);
+      c.withheld = model::whole_group(model::effects(), c.effects.front().id);
     });
     part("outside", rounds(outside_, kAtLeast / 2),
          [&](std::size_t k, PlannedCase& c) { c.effects = {at_twice(outside_[k % outside_.size()])}; });
@@ -136,7 +136,7 @@ class Planner {
 
   void pair(PlannedCase& c) {
     const std::string& first = detectable_[below(detectable_.size())];
-    const Ids group = model::whole_group(first);
+    const Ids group = model::whole_group(model::effects(), first);
     Ids others = detectable_;
     std::erase_if(others, [&](const std::string& id) { return std::ranges::count(group, id) > 0; });
     if (others.empty())

@@ -70,6 +70,15 @@ class Lister {
       add(path + "." + name, *value, 1e-6, 10);
     add(path + ".rotational_damping_coefficient", w.rotational_damping_coefficient, 0, 100);
   }
+  void add(BeatAveraged& b) {
+    constexpr double kAny = 1e6;
+    for (BeatAveraged::Actuator& a : b.actuators) {
+      add("actuator." + a.name + ".gain", a.gain, -kAny, kAny);
+      list_.push_back({"actuator." + a.name + ".offset", &a.offset, -kAny, kAny, true});
+      list_.push_back({"actuator." + a.name + ".lag_s", &a.lag_s, 0, 2, true});
+    }
+    for (BeatAveraged::Coefficient& c : b.coefficients) add("coefficients." + c.name, c.value, -kAny, kAny);
+  }
   void add(const std::string& path, Side& s) {
     add(path + ".shoulder_m", s.shoulder_m);
     add(path + ".leading_edge", s.leading_edge);
@@ -99,23 +108,36 @@ std::vector<Parameter> parameters(Vehicle& v) {
   std::vector<Parameter> list;
   Lister l(list);
   l.add("air.density_kg_m3", v.air_density_kg_m3, 0, 100);
+  const auto add_effects = [&] {
+    for (const EffectEntry& e : catalogue_of(v))
+      if (const auto own = v.effects.find(e.info.id); own != v.effects.end())
+        for (const EffectParameter& p : e.parameters)
+          if (const auto value = own->second.find(p.name); value != own->second.end())
+            l.add("effects." + own->first + "." + p.name, value->second, p.low, p.high);
+  };
+  const auto add_extent = [&] {
+    l.add("extent.below_m", v.extent.below_m, 0, kLongest_m);
+    l.add("extent.above_m", v.extent.above_m, 0, kLongest_m);
+    l.add("extent.around_m", v.extent.around_m, 0, kLongest_m);
+  };
+  if (v.beat_averaged) {
+    add_extent();
+    l.add("torso", v.torso);
+    l.add(*v.beat_averaged);
+    add_effects();
+    return list;
+  }
   l.add("driver.flapping_Hz", v.driver.flapping_Hz, 0.1, 1000);
   l.add("driver.hold_s", v.driver.hold_s, 1e-6, 1);
   l.add("driver.amplitude_limit_V", v.driver.amplitude_limit_V, 0, 1e3);
   l.add("driver.difference_limit_V", v.driver.difference_limit_V, 0, 1e3);
   l.add("driver.bias_limit_V", v.driver.bias_limit_V, 0, 1e3);
   l.add("driver.split_cycle_limit", v.driver.split_cycle_limit, 0, 0.45);
-  l.add("extent.below_m", v.extent.below_m, 0, kLongest_m);
-  l.add("extent.above_m", v.extent.above_m, 0, kLongest_m);
-  l.add("extent.around_m", v.extent.around_m, 0, kLongest_m);
+  add_extent();
   l.add("torso", v.torso);
   l.add("left", v.left);
   l.add("right", v.right);
-  for (const EffectEntry& e : effects())
-    if (const auto own = v.effects.find(e.info.id); own != v.effects.end())
-      for (const EffectParameter& p : e.parameters)
-        if (const auto value = own->second.find(p.name); value != own->second.end())
-          l.add("effects." + own->first + "." + p.name, value->second, p.low, p.high);
+  add_effects();
   return list;
 }
 
@@ -126,7 +148,7 @@ std::optional<PhysicalFault> physical_fault(const Vehicle& v) {
                                                              {"right.leading_edge", &v.right.leading_edge},
                                                              {"right.wing", &v.right.wing}};
   for (const auto& [path, body] : bodies)
-    if (!possible(body->inertia_kg_m2))
+    if ((body == &v.torso || !v.beat_averaged) && !possible(body->inertia_kg_m2))
       return PhysicalFault{std::string(path) + ".inertia_kg_m2", "no rigid body has this inertia",
                            "positive principal moments, none above the sum of the other two"};
   return std::nullopt;

@@ -4,46 +4,63 @@
 
 #include "io/config.hpp"
 #include "io/toml_writer.hpp"
+#include "model/beat_averaged.hpp"
 #include "model/effects/registry.hpp"
 #include "model/posterior.hpp"
 
 namespace flappy::model {
 namespace {
 
-/// Every effect there is, for one that there is not.
-std::string known_effects(const std::string& wrong) {
+/// Every effect that such a vehicle may have, for one that there is not.
+std::string known_effects(const std::string& wrong, const Vehicle& vehicle) {
   std::vector<std::string> names;
-  for (const EffectEntry& e : effects()) names.push_back(e.info.id);
+  for (const EffectEntry& e : catalogue_of(vehicle)) names.push_back(e.info.id);
   return io::joined(names) + io::did_you_mean(wrong, names);
 }
 
 void read_effects(const io::Table& table, Vehicle& vehicle) {
   for (const std::string& id : table.keys()) {
-    const int index = effect_index(id.c_str());
-    if (index < 0) table.fail(id, "unknown effect", known_effects(id));
+    const EffectEntry* effect = find_effect(vehicle, id);
+    if (effect == nullptr) table.fail(id, "unknown effect", known_effects(id, vehicle));
     const io::Table entry = table.table(id);
-    for (const EffectParameter& p : effects()[static_cast<std::size_t>(index)].parameters)
+    for (const EffectParameter& p : effect->parameters)
       vehicle.effects[id][p.name] = entry.number_or(p.name, p.typical, {p.low, p.high});
   }
 }
 
+const std::string kMultibody = "multibody", kBeatAveraged = "beat_averaged";
+
 }  // namespace
 
-Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+Vehicle read_any_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
   const io::Table root = io::Config::load(path, overrides).root();
   root.schema(1);
   Vehicle vehicle;
-  std::vector<std::string> keys = {"schema", "name", "effects", "posterior"};
+  std::vector<std::string> keys = {"schema", "name", "model", "effects", "posterior"};
+  if (root.string_or("model", kMultibody) != kMultibody &&
+      root.choice("model", {kMultibody, kBeatAveraged}) == kBeatAveraged) {
+    vehicle.beat_averaged = read_beat_averaged(root);
+    for (const char* key : {"beat", "input", "actuator", "coefficients", "wrench"}) keys.push_back(key);
+  }
   for (const Parameter& p : parameters(vehicle)) keys.push_back(p.path.substr(0, p.path.find('.')));
   root.accept(keys);
   vehicle.name = root.string("name");
   for (const Parameter& p : parameters(vehicle))
-    *p.value = p.optional ? root.number_or(p.path, 0, {p.low, p.high}) : root.number(p.path, {p.low, p.high});
+    if (!p.path.starts_with("coefficients."))
+      *p.value = p.optional ? root.number_or(p.path, 0, {p.low, p.high}) : root.number(p.path, {p.low, p.high});
   if (const auto table = root.optional_table("effects")) read_effects(*table, vehicle);
   if (const auto table = root.optional_table("posterior")) vehicle.posterior = read_posterior(*table, vehicle);
   root.finish();
   if (const std::optional<PhysicalFault> fault = physical_fault(vehicle))
     root.fail(fault->path, fault->what, fault->accepted);
+  return vehicle;
+}
+
+Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  Vehicle vehicle = read_any_vehicle(path, overrides);
+  if (vehicle.beat_averaged)
+    io::Config::load(path).root().fail("model", "a robot that is known by the beat cannot be flown",
+                                       "a vehicle of wings and motors; flappy-gap diagnose takes both");
   return vehicle;
 }
 
@@ -58,9 +75,12 @@ Vehicle read_vehicle_for_steps(const std::filesystem::path& path, double step_s)
 
 std::string vehicle_text(const Vehicle& vehicle) {
   std::string text = "schema = 1\nname = " + io::toml_string(vehicle.name) + "\n";
+  if (vehicle.beat_averaged)
+    text += "model = " + io::toml_string(kBeatAveraged) + "\n" + beat_averaged_text(*vehicle.beat_averaged);
   Vehicle copy = vehicle;
   for (const Parameter& p : parameters(copy))
-    if (!p.optional || *p.value != 0) text += p.path + " = " + io::toml_number(*p.value) + "\n";
+    if ((!p.optional || *p.value != 0) && !p.path.starts_with("coefficients."))
+      text += p.path + " = " + io::toml_number(*p.value) + "\n";
   for (const auto& [id, values] : vehicle.effects)
     if (values.empty()) text += "effects." + id + " = {}\n";  // in force at its typical size
   if (vehicle.posterior) text += posterior_text(*vehicle.posterior);

@@ -11,6 +11,8 @@
 namespace flappy::sim {
 namespace {
 
+/// Of a figure whose file says how well it is known.
+constexpr double kDeclaredCut_sd = 4;
 constexpr std::uint32_t kIndicesPerDraw = 64;  // a cut at 1 sd is redrawn 63 times once in 1e31
 
 std::string six_digits(double value) {
@@ -25,16 +27,39 @@ Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : 
   const std::vector<model::Parameter> parameters = model::parameters(vehicle);
   std::vector<Reach> reach;
   for (const model::Parameter& p : parameters) reach.push_back({*p.value, *p.value});
-  for (const io::Table& table : config.tables("randomise")) {
-    draws_.push_back(read_draw(table, parameters));
+  const auto add = [&](const io::Table& table, Draw draw) {
+    draws_.push_back(std::move(draw));
     check_reach(table, draws_.back(), parameters, reach);
     if (draws_.back().minor) {
       minors_.push_back(0);
-      continue;
+      return;
     }
     if (++majors_ < draws_.size())
       table.fail("minor", "a draw before this one is minor", "minor draws behind all others");
     check_bodies(table, draws_.back());
+  };
+  for (const io::Table& table : config.tables("randomise")) {
+    Draw draw = read_draw(table, parameters);
+    if (!table.boolean_or("each", false)) {
+      add(table, std::move(draw));
+      continue;
+    }
+    for (const std::size_t parameter : std::exchange(draw.parameters, {})) {
+      draw.parameters = {parameter};
+      add(table, draw);
+    }
+  }
+  if (!vehicle.beat_averaged) return;
+  // what its file declares of coefficients that the table does not name
+  for (const model::BeatAveraged::Coefficient& c : vehicle.beat_averaged->coefficients) {
+    const auto at = std::ranges::find(parameters, "coefficients." + c.name, &model::Parameter::path);
+    const auto index = static_cast<std::size_t>(at - parameters.begin());
+    const bool named =
+        std::ranges::any_of(draws_, [&](const Draw& d) { return std::ranges::count(d.parameters, index) > 0; });
+    if (named || c.sd == 0) continue;
+    draws_.insert(draws_.begin() + static_cast<std::ptrdiff_t>(majors_),
+                  {{index}, Law::add_normal, 0, c.sd, kDeclaredCut_sd, false});
+    ++majors_;
   }
 }
 

@@ -6,6 +6,7 @@
 //   sd = 0.10
 //   cut_sd = 3.0                                            # draws farther out are drawn again
 //   minor = true                                            # changes little: who fits a vehicle takes it as linear
+//   each = true                                             # a draw for each of the parameters, instead of one for all
 //
 // With n a normal draw and u a uniform one: scale_normal x (1 + sd n), scale_half_normal x (1 + |sd n|),
 // replace_normal mean + sd n, add_normal + sd n, scale_uniform x u, replace_uniform u in [low, high].

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <set>
 
+#include "flappy/vehicle.hpp"
 #include "flightlog/check/check_parts.hpp"
 #include "io/files.hpp"
 #include "model/effects/registry.hpp"
@@ -18,47 +19,22 @@ using flightlog::format;
 constexpr const char* kWriter = "flappy-gap diagnose";
 constexpr std::size_t kBars = 10, kRivals = 6;
 constexpr double kLeastShown = 5e-3;
+/// More than any flights bring: what it is beside was ruled out.
+constexpr double kRuledOut_nats = 1e8;
+constexpr std::size_t kLongName = 45;
 /// Ratio of residual to noise from which on a shade is the darkest.
 constexpr double kDarkest = 10;
-
-/// In words that need no manual.
-const std::map<std::string, std::string> kChannelNames = {{"torque_x", "roll torque"},
-                                                          {"torque_y", "pitch torque"},
-                                                          {"torque_z", "yaw torque"},
-                                                          {"force_x", "forward force"},
-                                                          {"force_y", "sideways force"},
-                                                          {"force_z", "vertical force"},
-                                                          {"stroke_left", "left stroke"},
-                                                          {"stroke_right", "right stroke"},
-                                                          {"battery", "battery voltage"},
-                                                          {"current_left", "left motor's current"},
-                                                          {"current_right", "right motor's current"},
-                                                          {"path_x", "path along x, cameras against IMU"},
-                                                          {"path_y", "path along y, cameras against IMU"},
-                                                          {"path_z", "path along z, cameras against IMU"},
-                                                          {"rotate_x", "turning about x, cameras against gyro"},
-                                                          {"rotate_y", "turning about y, cameras against gyro"},
-                                                          {"rotate_z", "turning about z, cameras against gyro"}};
-
-std::string channel_words(const std::string& channel) {
-  const auto found = kChannelNames.find(channel);
-  return found == kChannelNames.end() ? spoken(channel) : found->second;
-}
 
 const char* place_of(const std::string& effect) {
   constexpr const char* kPlaces[] = {"the body",          "motors, gears and springs",
                                      "the wings' hinges", "the air at the wings",
                                      "loads on the body", "the sensors"};
-  const int index = model::effect_index(effect.c_str());
-  return index < 0 ? ""
-                   : kPlaces[static_cast<std::size_t>(model::effects()[static_cast<std::size_t>(index)].info.stage)];
-}
-
-/// "m/s^2" -> "m/s²".
-std::string in_print(std::string unit) {
-  for (const auto& [power, sign] : {std::pair{"^2", "²"}, {"^3", "³"}})
-    if (const std::size_t at = unit.find(power); at != std::string::npos) unit.replace(at, 2, sign);
-  return unit;
+  // of one kind of vehicle or the other
+  model::Vehicle vehicle;
+  const model::EffectEntry* entry = model::find_effect(vehicle, effect);
+  vehicle.beat_averaged.emplace();
+  if (entry == nullptr) entry = model::find_effect(vehicle, effect);
+  return entry == nullptr ? "" : kPlaces[static_cast<std::size_t>(entry->info.stage)];
 }
 
 /// One line of residuals.csv.
@@ -129,6 +105,18 @@ std::vector<Rival> read_rivals(const Json& json, const TextTable& table) {
   return rivals;
 }
 
+/// "right_flap velocity_y", a product -> "right flap × velocity y"; "cos heading" is one function.
+std::string function_words(const std::string& function) {
+  std::string words;
+  for (std::size_t at = 0; at < function.size();) {
+    const std::size_t end = std::min(function.find(' ', at), function.size());
+    const bool of_next = words.ends_with("cos") || words.ends_with("sin");
+    words += (words.empty() ? "" : of_next ? " " : " × ") + spoken(function.substr(at, end - at));
+    at = end + 1;
+  }
+  return words;
+}
+
 /// "height 0.5029 to 0.6074 m" -> "height, middle third": where the thirds lie differs with the beats that a channel has.
 std::string third_of(const std::string& regime) {
   const std::size_t figure = regime.find_first_of("-0123456789");
@@ -149,7 +137,11 @@ class Story {
       : json_(json),
         places_(read_places(file.parent_path() / "residuals.csv")),
         rivals_(read_rivals(json, read_text_table(file.parent_path() / "candidates.csv"))),
-        section_("diagnosis", "Diagnosis", file.string()) {}
+        section_("diagnosis", "Diagnosis", file.string()) {
+    // those that have a beat are looked at by its harmonics
+    by_the_beat_ = json.contains("validation") ||
+                   (!places_.empty() && std::ranges::find(places_, "phase", &Place::test) == places_.end());
+  }
 
   Section tell() {
     tell_verdict();
@@ -160,6 +152,7 @@ class Story {
     tell_where();
     tell_which();
     tell_how_far();
+    if (json_.contains("validation")) tell_validation(section_, json_);
     tell_next();
     return std::move(section_);
   }
@@ -251,11 +244,16 @@ class Story {
       parts.push_back(part);
     }
     if (parts.empty()) return;
-    section_.add(Json{{"kind", "anatomy"},
-                      {"parts", parts},
-                      {"note",
-                       "What is left after refitting the parameters, over noise (1×: noise alone), where it stands out "
-                       "most. Grey: within noise; orange and thick: ten times noise."}});
+    section_.add(Json{
+        {"kind", "anatomy"},
+        {"parts", parts},
+        {"wings", !by_the_beat_},
+        {"note",
+         std::string("What is left after refitting the parameters, over noise (1×: noise alone), where it stands out "
+                     "most. Grey: within noise; orange and thick: ten times noise.") +
+             (by_the_beat_
+                  ? " The vehicle is known as means over its beats: its body is a sign, and no wings are drawn."
+                  : "")}});
     add_heat("phase", "When in the beat", false,
              "Rms of residual over noise, parameters refitted. Shaded: more than chance (5 % false discoveries).");
     add_heat("regime", "While doing what", true, "The same in thirds of the beats, by what the robot did.");
@@ -384,16 +382,19 @@ class Story {
     for (const Rival& r : rivals_) {
       if (rows.size() == kRivals || (r.probability < kLeastShown && rows.size() >= 3)) break;
       std::vector<std::string> pro, con;
-      if (refit != nullptr && &r != refit && r.log_evidence > refit->log_evidence)
+      if (refit != nullptr && r.log_evidence > refit->log_evidence + kRuledOut_nats)
+        pro.push_back("parameters alone are ruled out");
+      else if (refit != nullptr && &r != refit && r.log_evidence > refit->log_evidence)
         pro.push_back(format("%.0f nats more than parameters alone", r.log_evidence - refit->log_evidence));
       if (r.closure && *r.closure > 0)
         pro.push_back(format("closes %.0f %% of what refitting leaves", 100 * *r.closure));
-      if (r.log_evidence < best) con.push_back(format("%.0f nats less than the best", best - r.log_evidence));
+      if (r.log_evidence < best - kRuledOut_nats) con.push_back("ruled out");
+      else if (r.log_evidence < best) con.push_back(format("%.0f nats less than the best", best - r.log_evidence));
       if (r.closure && *r.closure <= 0)
         con.push_back(format("closes nothing of what refitting leaves (%.0f %%)", 100 * *r.closure));
       for (const auto& [name, size] : r.sizes.items())
         if (size.at("low").get<double>() <= 0 && size.at("high").get<double>() >= 0)
-          con.push_back(spoken(name.substr(name.find('.') + 1)) + " may be 0");
+          con.push_back(size_words(name.substr(name.find('.') + 1), size.at("unit")) + " may be 0");
       std::set<std::string> at;
       for (const std::string& e : r.effects) at.insert(place_of(e));
       rows.push_back({r.name, cell(r.probability, r.at + "/probability"), spoken_list({at.begin(), at.end()}),
@@ -409,8 +410,8 @@ class Story {
       Json rows = Json::array();
       for (const auto& [name, s] : r.sizes.items()) {
         const std::string at = r.at + "/parameters/" + name;
-        rows.push_back({name, cell(s.at("value"), at + "/value"), cell(s.at("low"), at + "/low"),
-                        cell(s.at("high"), at + "/high"), s.at("unit").get<std::string>()});
+        rows.push_back({size_words(name, s.at("unit")), cell(s.at("value"), at + "/value"),
+                        cell(s.at("low"), at + "/low"), cell(s.at("high"), at + "/high"), in_print(s.at("unit"))});
       }
       if (rows.empty()) return;
       section_.add(table("Size of " + r.name, {"parameter", "value", "90 % from", "to", "unit"}, std::move(rows)));
@@ -438,9 +439,10 @@ class Story {
           "that the fit did not see.",
           with.c_str(), 100 * number("closure"), 100 * number("closure_low"), 100 * number("closure_high")));
     else section_.say("How much of the gap an effect closes cannot be told from noise.");
+    const std::string brief = with.size() > kLongName ? "these effects" : with;
     const std::vector<std::pair<std::string, const char*>> stages = {{"vehicle's file", "nominal"},
                                                                      {"parameters refitted", "refit"},
-                                                                     {"with " + with, "effect"},
+                                                                     {"with " + brief, "effect"},
                                                                      {"noise alone", "noise_floor"}};
     Figure f{
         .id = "loss",
@@ -457,7 +459,7 @@ class Story {
       f.categories.push_back(name);
     }
     section_.add(f);
-    add_channels(with);
+    add_channels(brief);
     add_closed_loop();
   }
 
@@ -559,6 +561,12 @@ class Story {
                           spoken(name).c_str(), spoken_list(rivals).c_str(), next.at("expected_nats").get<double>()));
       add_courses(next, rivals);
       section_.say("It is configs/gap/experiments/" + name + ".toml. Diagnose old and new flights together.");
+    } else if (by_the_beat_) {
+      // the experiments that are ready are flown in simulation, and nothing flies such a vehicle there
+      section_.say(kind == "effect" || kind == "parameters"
+                       ? "Predict with vehicle_corrected.toml, and see on new flights whether it holds: diagnose these "
+                         "with the same --vehicle as now."
+                       : "Fly harder manoeuvres, and diagnose old and new flights together.");
     } else if (kind == "effect" || kind == "parameters") {
       section_.say(
           "No rival is left to be told apart: train or fly on with vehicle_corrected.toml, as with flappy-train CONFIG "
@@ -572,19 +580,27 @@ class Story {
     for (std::size_t i = 0; i < terms.size(); ++i) {
       const Json& t = terms[i];
       const std::string harmonic = t.at("harmonic"), at = "/unexplained/terms/" + std::to_string(i);
-      rows.push_back({channel_words(t.at("channel")), harmonic == "0" ? "mean of the beat" : "harmonic " + harmonic,
-                      t.at("function"), cell(t.at("times_usual"), at + "/times_usual"),
-                      cell(t.at("gain_nats"), at + "/gain_nats")});
+      Json row = {channel_words(t.at("channel"))};
+      if (!by_the_beat_) row.push_back(harmonic == "0" ? "mean of the beat" : "harmonic " + harmonic);
+      row.insert(row.end(), {Json(function_words(t.at("function"))), cell(t.at("times_usual"), at + "/times_usual"),
+                             cell(t.at("gain_nats"), at + "/gain_nats")});
+      rows.push_back(std::move(row));
     }
-    section_.add(table("On what the unexplained depends",
-                       {"channel", "part of the beat", "grows with", "times the usual error", "gain (nats)"},
-                       std::move(rows)));
+    std::vector<std::string> head = {"channel", "part of the beat", "grows with", "times the usual error",
+                                     "gain (nats)"};
+    if (by_the_beat_) head.erase(head.begin() + 1);
+    std::vector<std::string> beside;
+    for (const Json& e : json_.at("unexplained").at("jointly_with")) beside.push_back(spoken(e.get<std::string>()));
+    section_.add(table("On what the unexplained depends", head, std::move(rows),
+                       beside.empty() ? "Of what is left with parameters alone refitted."
+                                      : "Of what is left beside " + spoken_list(beside) + "."));
   }
 
   const Json& json_;
   std::vector<Place> places_;
   std::vector<Rival> rivals_;
   Section section_;
+  bool by_the_beat_ = false;  ///< the robot is known as means over its beats, without wings
 };
 
 }  // namespace

@@ -38,6 +38,20 @@ std::string quoted(const std::string& text) {
   return q + "'";
 }
 
+/// A name in lines of about so many letters, as an expression of gnuplot's.
+constexpr std::size_t kLine = 40;
+std::vector<std::string> lines_of(const std::string& name) {
+  std::vector<std::string> lines = {""};
+  for (std::size_t at = 0; at < name.size();) {
+    const std::size_t end = std::min(name.find(' ', at), name.size());
+    const std::string word = name.substr(at, end - at);
+    if (!lines.back().empty() && lines.back().size() + word.size() > kLine) lines.push_back(word);
+    else lines.back() += (lines.back().empty() ? "" : " ") + word;
+    at = end + 1;
+  }
+  return lines;
+}
+
 std::string range_of(const char* axis, const Axis& a) {
   const auto end = [](const std::optional<double>& x) { return x ? io::shortest_digits(*x) : std::string("*"); };
   return std::string(a.log ? "set logscale " + std::string(axis) + "\n" : "") + "set " + axis + "range [" + end(a.low) +
@@ -83,6 +97,12 @@ std::string plot_of(const Series& s) {
   return "";
 }
 
+std::string in_lines(const std::string& name) {
+  std::string text;
+  for (const std::string& line : lines_of(name)) text += (text.empty() ? "" : ".\"\\n\".") + quoted(line);
+  return text;
+}
+
 }  // namespace
 
 double near_category(std::size_t k, std::size_t i, std::size_t of) {
@@ -114,9 +134,13 @@ Json json_of(const Figure& f) {
 
 void draw_on_paper(const std::filesystem::path& folder, const Figure& f, Paper paper) {
   const auto categories = static_cast<double>(f.categories.size());
+  double lines = 1;
+  for (const std::string& name : f.categories)
+    lines = std::max(lines, 0.75 * static_cast<double>(lines_of(name).size()));
   const auto keys = static_cast<double>(
       std::ranges::count_if(f.series, [](const Series& s) { return !s.name.empty() && !s.x.empty(); }));
-  const double high_cm = kKey_cm * keys + (f.categories.empty() ? kHigh_cm : kFrame_cm + kCategory_cm * categories);
+  const double high_cm =
+      kKey_cm * keys + (f.categories.empty() ? kHigh_cm : kFrame_cm + kCategory_cm * lines * categories);
   char terminal[200];
   if (paper == Paper::pdf)
     std::snprintf(terminal, sizeof terminal, "set terminal pdfcairo noenhanced size %gcm,%gcm font 'DejaVu Sans,7'\n",
@@ -134,7 +158,7 @@ void draw_on_paper(const std::filesystem::path& folder, const Figure& f, Paper p
   if (!f.categories.empty()) {
     script += "set yrange [" + io::shortest_digits(categories - 0.5) + ":-0.5]\nset ytics (";
     for (std::size_t k = 0; k < f.categories.size(); ++k)
-      script += (k == 0 ? "" : ", ") + quoted(f.categories[k]) + " " + std::to_string(k);
+      script += (k == 0 ? "" : ", ") + in_lines(f.categories[k]) + " " + std::to_string(k);
     script += ")\n";
   }
   std::string plots;

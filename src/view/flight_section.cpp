@@ -7,8 +7,10 @@
 #include "flappy/batch.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/flight_log.hpp"
+#include "flightlog/mean_motion.hpp"
 #include "io/installation.hpp"
 #include "sim/replay.hpp"
+#include "view/results.hpp"
 
 namespace flappy::view {
 namespace {
@@ -54,7 +56,7 @@ model::Vehicle vehicle_of(const fs::path& folder, const FlightLog& log, const fs
   std::error_code none;
   for (const fs::path& file :
        {folder / log.header.vehicle, asked, fs::path(io::config_path("vehicles/" + log.header.vehicle))})
-    if (!file.empty() && fs::is_regular_file(file, none)) return model::read_vehicle(file);
+    if (!file.empty() && fs::is_regular_file(file, none)) return model::read_any_vehicle(file);
   throw io::InputError((folder / "flight.toml").string() + ": vehicle: there is no " + log.header.vehicle +
                        " in the folder; accepted: --vehicle FILE");
 }
@@ -95,10 +97,42 @@ Json json_of(const model::Side& s) {
           {"moments", {s.planform.r00, s.planform.r11, s.planform.r22}}};
 }
 
+/// Semi-axes of the ellipsoid of even density that has the torso's mass and moments of inertia: no file says more of the shape of
+/// a vehicle whose wings are not modelled.
+Json ellipsoid_of(const model::RigidBody& torso) {
+  const model::InertiaTensor& i = torso.inertia_kg_m2;
+  const auto semi_axis = [&](double one, double other, double own) {
+    return std::sqrt(std::max(0.0, 2.5 * (one + other - own) / torso.mass_kg));
+  };
+  return {semi_axis(i.yy, i.zz, i.xx), semi_axis(i.xx, i.zz, i.yy), semi_axis(i.xx, i.yy, i.zz)};
+}
+
 Json json_of(const model::Vehicle& v) {
+  if (v.beat_averaged) return {{"name", v.name}, {"mass_kg", v.torso.mass_kg}, {"body_m", ellipsoid_of(v.torso)}};
   double mass_kg = v.torso.mass_kg;
   for (const model::Side* s : {&v.left, &v.right}) mass_kg += s->leading_edge.mass_kg + s->wing.mass_kg;
   return {{"name", v.name}, {"mass_kg", mass_kg}, {"left", json_of(v.left)}, {"right", json_of(v.right)}};
+}
+
+/// Specific force of the path that motion capture saw, up to the vehicle's bandwidth.
+flightlog::ImuStream force_of_path(const FlightLog& log, const model::Vehicle& vehicle, const fs::path& folder) {
+  const flightlog::MeanMotion m = flightlog::mean_motion(log, vehicle.beat_averaged->bandwidth_Hz, folder);
+  flightlog::ImuStream stream;
+  for (std::size_t i = 0; i < m.size(); ++i) {
+    if (!m.seen[i]) continue;
+    stream.t_s.push_back(m.t_s(i));
+    stream.accel_x_m_s2.push_back(m.force_m_s2[i].x());
+    stream.accel_y_m_s2.push_back(m.force_m_s2[i].y());
+    stream.accel_z_m_s2.push_back(m.force_m_s2[i].z());
+  }
+  return stream;
+}
+
+/// A step well below what can be told of values of an unknown unit.
+double step_of(const Column& values) {
+  double most = 0;
+  for (const double x : values) most = std::max(most, std::abs(x));
+  return most > 0 ? 1e-5 * std::pow(10, std::ceil(std::log10(most))) : 1;
 }
 
 Json json_of(const flightlog::LogAmbient& a) {
@@ -130,26 +164,31 @@ Json streams_of(const FlightLog& log, const std::optional<flightlog::WingsStream
                           {"qz", m.qz, kQuaternion}},
                          packing, notes);
   const flightlog::ImuStream& i = log.imu;
-  json["imu"] = packed("imu.csv",
-                       {{"t_s", i.t_s, kTime_s},
-                        {"gyro_x_rad_s", i.gyro_x_rad_s, kRate_rad_s},
-                        {"gyro_y_rad_s", i.gyro_y_rad_s, kRate_rad_s},
-                        {"gyro_z_rad_s", i.gyro_z_rad_s, kRate_rad_s},
-                        {"accel_x_m_s2", i.accel_x_m_s2, kForce_m_s2},
-                        {"accel_y_m_s2", i.accel_y_m_s2, kForce_m_s2},
-                        {"accel_z_m_s2", i.accel_z_m_s2, kForce_m_s2}},
-                       packing, notes);
+  std::vector<NamedColumn> imu = {{"t_s", i.t_s, kTime_s},
+                                  {"accel_x_m_s2", i.accel_x_m_s2, kForce_m_s2},
+                                  {"accel_y_m_s2", i.accel_y_m_s2, kForce_m_s2},
+                                  {"accel_z_m_s2", i.accel_z_m_s2, kForce_m_s2}};
+  if (!i.gyro_x_rad_s.empty()) {
+    imu.push_back({"gyro_x_rad_s", i.gyro_x_rad_s, kRate_rad_s});
+    imu.push_back({"gyro_y_rad_s", i.gyro_y_rad_s, kRate_rad_s});
+    imu.push_back({"gyro_z_rad_s", i.gyro_z_rad_s, kRate_rad_s});
+  }
+  if (!i.t_s.empty()) json["imu"] = packed("imu.csv", imu, packing, notes);
   const flightlog::CommandStream& c = log.command;
-  std::vector<NamedColumn> command = {{"t_s", c.t_s, kTime_s},
-                                      {"left_voltage_V", c.left_voltage_V, kVoltage_V},
-                                      {"right_voltage_V", c.right_voltage_V, kVoltage_V}};
+  std::vector<NamedColumn> command = {{"t_s", c.t_s, kTime_s}};
+  for (std::size_t k = 0; k < c.declared.size(); ++k)
+    command.push_back({log.header.inputs[k].c_str(), c.declared[k], step_of(c.declared[k])});
+  if (c.declared.empty()) {
+    command.push_back({"left_voltage_V", c.left_voltage_V, kVoltage_V});
+    command.push_back({"right_voltage_V", c.right_voltage_V, kVoltage_V});
+  }
   if (c.inputs) {
     command.push_back({"amplitude_V", c.inputs->amplitude_V, kVoltage_V});
     command.push_back({"difference_V", c.inputs->difference_V, kVoltage_V});
     command.push_back({"bias_V", c.inputs->bias_V, kVoltage_V});
     command.push_back({"split_cycle", c.inputs->split_cycle, kSplit});
   }
-  json["command"] = packed("command.csv", command, packing, notes);
+  json[c.declared.empty() ? "command" : "declared"] = packed("command.csv", command, packing, notes);
   if (wings)
     json["wings"] = packed("wings",
                            {{"t_s", wings->t_s, kTime_s},
@@ -158,13 +197,15 @@ Json streams_of(const FlightLog& log, const std::optional<flightlog::WingsStream
                             {"right_stroke_rad", wings->right_stroke_rad, kAngle_rad},
                             {"right_rotation_rad", wings->right_rotation_rad, kAngle_rad}},
                            packing, notes);
-  if (log.power)
-    json["power"] = packed("power.csv",
-                           {{"t_s", log.power->t_s, kTime_s},
-                            {"battery_V", log.power->battery_V, kVoltage_V},
-                            {"left_current_A", log.power->left_current_A, kCurrent_A},
-                            {"right_current_A", log.power->right_current_A, kCurrent_A}},
-                           packing, notes);
+  if (log.power) {
+    std::vector<NamedColumn> power = {{"t_s", log.power->t_s, kTime_s},
+                                      {"battery_V", log.power->battery_V, kVoltage_V}};
+    if (!log.power->left_current_A.empty()) {
+      power.push_back({"left_current_A", log.power->left_current_A, kCurrent_A});
+      power.push_back({"right_current_A", log.power->right_current_A, kCurrent_A});
+    }
+    json["power"] = packed("power.csv", power, packing, notes);
+  }
   return json;
 }
 
@@ -209,9 +250,10 @@ void add_on_paper(Section& section, const std::vector<ShownFlight>& flights) {
                .y = {.title = "position (m)"},
                .categories = {},
                .series = {}};
-  Figure turn = place, volts = place;
+  Figure turn = place, volts = place, inputs = place;
   turn.id = "attitude", turn.title = "Attitude", turn.y.title = "angle (deg)";
   volts.id = "inputs", volts.title = "Inputs of the wing beat", volts.y.title = "input (V)", volts.note = "command.csv";
+  inputs.id = "declared", inputs.title = "Inputs", inputs.y.title = "input (as declared)", inputs.note = "command.csv";
   for (std::size_t k = 0; k < flights.size() && k < 2; ++k) {
     const FlightLog& log = flights[k].log;
     const flightlog::MocapStream& m = log.mocap;
@@ -224,6 +266,9 @@ void add_on_paper(Section& section, const std::vector<ShownFlight>& flights) {
     turn.series.push_back(on_paper("roll" + of, Colour::blue, dashed, m.t_s, angles[0], kDegrees));
     turn.series.push_back(on_paper("pitch" + of, Colour::vermillion, dashed, m.t_s, angles[1], kDegrees));
     turn.series.push_back(on_paper("yaw" + of, Colour::green, dashed, m.t_s, angles[2], kDegrees));
+    for (std::size_t i = 0; i < log.command.declared.size(); ++i)
+      inputs.series.push_back(on_paper(spoken(log.header.inputs[i]) + of, static_cast<Colour>(i % std::size(kColours)),
+                                       dashed, log.command.t_s, log.command.declared[i]));
     if (!log.command.inputs) continue;
     const flightlog::BeatInputs& u = *log.command.inputs;
     volts.series.push_back(on_paper("amplitude" + of, Colour::blue, dashed, log.command.t_s, u.amplitude_V));
@@ -233,6 +278,7 @@ void add_on_paper(Section& section, const std::vector<ShownFlight>& flights) {
   section.add_on_paper(place);
   section.add_on_paper(turn);
   if (!volts.series.empty()) section.add_on_paper(volts);
+  if (!inputs.series.empty()) section.add_on_paper(inputs);
 }
 
 /// The folder's own name; with that of the folder around it where another flight has the same.
@@ -259,16 +305,28 @@ Section flight_section(const std::vector<fs::path>& folders, const FlightOptions
     shown.push_back({name_among(folders, folder), flightlog::read_flight_log(folder)});
     const FlightLog& log = shown.back().log;
     const model::Vehicle vehicle = vehicle_of(folder, log, options.vehicle);
-    const bool derived = !log.wings;
+    const bool winged = !vehicle.beat_averaged, derived = winged && !log.wings && log.command.declared.empty();
     Json notes = Json::array();
-    const Json streams = streams_of(log, derived ? derived_wings(log, vehicle) : log.wings, packing, notes);
+    Json streams = streams_of(log, derived ? derived_wings(log, vehicle) : log.wings, packing, notes);
+    if (!winged) {
+      const flightlog::ImuStream path = force_of_path(log, vehicle, folder);
+      streams["path"] = packed("path",
+                               {{"t_s", path.t_s, step::kTime_s},
+                                {"accel_x_m_s2", path.accel_x_m_s2, step::kForce_m_s2},
+                                {"accel_y_m_s2", path.accel_y_m_s2, step::kForce_m_s2},
+                                {"accel_z_m_s2", path.accel_z_m_s2, step::kForce_m_s2}},
+                               packing, notes);
+    }
     list.push_back({{"name", shown.back().name},
                     {"declared", log.header.vehicle},
                     {"flapping_Hz", log.header.flapping_Hz},
                     {"gravity_m_s2", log.header.gravity_m_s2},
                     {"vehicle", json_of(vehicle)},
                     {"ambient", json_of(log.header.ambient)},
-                    {"wings", derived ? "derived" : "recorded"},
+                    {"wings", !winged     ? "none"
+                              : derived   ? "derived"
+                              : log.wings ? "recorded"
+                                          : "still"},
                     {"latency_s", latency_of(log.header)},
                     {"streams", streams},
                     {"notes", notes}});

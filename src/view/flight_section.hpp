@@ -1,9 +1,11 @@
 // Recorded flights as a page shows them: the robot in 3D and its streams, one beside the others.
 //
 // The block "flights": {"goal_m": [x, y, z] | null, "flights": [{"name", "flapping_Hz", "gravity_m_s2", "vehicle", "ambient",
-// "wings": "recorded" | "derived", "latency_s": {stream: declared}, "streams": {stream: {column: packed}}, "notes": [...]}]}. Columns are those of the
-// log (flightlog/flight_log.hpp), rounded well below any sensor's noise; no stream has more than kMostSamples, so that flights
-// of any length open. truth.csv is not read.
+// "wings": "recorded" | "derived" | "still" | "none", "latency_s": {stream: declared}, "streams": {stream: {column: packed}}, "notes": [...]}]}.
+// Columns are those of the log (flightlog/flight_log.hpp), rounded well below any sensor's noise; no stream has more than kMostSamples, so
+// that flights of any length open. Declared inputs are the stream "declared" in place of "command". A vehicle that is known by the beat has
+// no wings but "body_m", the semi-axes of an ellipsoid, and its flights a stream "path": the specific force of the path that motion capture
+// saw (flightlog/mean_motion.hpp), at its instants. truth.csv is not read.
 #pragma once
 
 #include <array>

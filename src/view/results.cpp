@@ -4,12 +4,36 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "io/files.hpp"
 
 namespace flappy::view {
 
 using Json = nlohmann::ordered_json;
+
+namespace {
+
+/// In words that need no manual.
+const std::map<std::string, std::string> kChannelNames = {{"torque_x", "roll torque"},
+                                                          {"torque_y", "pitch torque"},
+                                                          {"torque_z", "yaw torque"},
+                                                          {"force_x", "forward force"},
+                                                          {"force_y", "sideways force"},
+                                                          {"force_z", "vertical force"},
+                                                          {"stroke_left", "left stroke"},
+                                                          {"stroke_right", "right stroke"},
+                                                          {"battery", "battery voltage"},
+                                                          {"current_left", "left motor's current"},
+                                                          {"current_right", "right motor's current"},
+                                                          {"path_x", "path along x, cameras against IMU"},
+                                                          {"path_y", "path along y, cameras against IMU"},
+                                                          {"path_z", "path along z, cameras against IMU"},
+                                                          {"rotate_x", "turning about x, cameras against gyro"},
+                                                          {"rotate_y", "turning about y, cameras against gyro"},
+                                                          {"rotate_z", "turning about z, cameras against gyro"}};
+
+}  // namespace
 
 Json read_results(const std::filesystem::path& file) {
   const std::string text = io::read_text(file);
@@ -81,6 +105,29 @@ std::string spoken_list(const std::vector<std::string>& words, const char* last)
   for (std::size_t i = 0; i < words.size(); ++i)
     all += (i == 0 ? "" : i + 1 == words.size() ? std::string(" ") + last + " " : ", ") + words[i];
   return all;
+}
+
+std::string channel_words(const std::string& channel) {
+  const auto found = kChannelNames.find(channel);
+  return found == kChannelNames.end() ? spoken(channel) : found->second;
+}
+
+std::string in_print(std::string unit) {
+  for (const auto& [power, sign] : {std::pair{"^2", "²"}, {"^3", "³"}})
+    if (const std::size_t at = unit.find(power); at != std::string::npos) unit.replace(at, 2, sign);
+  return unit;
+}
+
+std::string size_words(const std::string& name, const std::string& unit) {
+  // "1/s" is how "per_s" is written, "m/s^2" how "m_s2" is
+  std::string end = "_" + unit, words = spoken(name);
+  if (end.starts_with("_1/")) end.replace(1, 1, "per");
+  std::ranges::replace(end, '/', '_');
+  std::erase(end, '^');
+  if (!unit.empty() && name.ends_with(end)) words.resize(words.size() - end.size());
+  if (const std::size_t dot = words.find('.'); dot != std::string::npos)
+    words = words.substr(0, dot) + " (" + words.substr(dot + 1) + ")";
+  return words;
 }
 
 }  // namespace flappy::view

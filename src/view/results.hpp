@@ -32,6 +32,12 @@ TextTable read_text_table(const std::filesystem::path& file);
 std::string spoken(std::string identifier);
 /// "a, b and c".
 std::string spoken_list(const std::vector<std::string>& words, const char* last = "and");
+/// "force_x" -> "forward force".
+std::string channel_words(const std::string& channel);
+/// "m/s^2" -> "m/s²".
+std::string in_print(std::string unit);
+/// An effect's size without its unit: "wind.speed_m_s" in "m/s" -> "wind (speed)".
+std::string size_words(const std::string& name, const std::string& unit);
 
 template <class Make>
 auto of_results(const std::filesystem::path& file, const char* writer, Make make) {

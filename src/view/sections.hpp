@@ -10,8 +10,13 @@ namespace flappy::view {
 /// Where the gap lies, which effect causes it, how far it shrinks, what to fly next; words first, then the picture. `file`:
 /// diagnosis.json; residuals.csv and candidates.csv are read where they lie beside it.
 ///
-/// The block "anatomy": {"parts": [{"channel", "name", "short", "ratio", "text"}], "note"}: how far each channel's residual is above noise.
+/// The block "anatomy": {"parts": [{"channel", "name", "short", "ratio", "text"}], "wings", "note"}: how far each channel's residual is
+/// above noise, and whether the robot is drawn with wings.
 Section diagnosis_section(const std::filesystem::path& file);
+
+/// What a laboratory asks of an effect before it believes it, added to a section: flights held out, controls, and each flight alone. `diagnosis`: of a
+/// robot that is known by the beat, with its "validation".
+void tell_validation(Section& section, const Json& diagnosis);
 
 /// Of flappy-eval, with or without --effects.
 Section evaluation_section(const std::filesystem::path& file);

@@ -374,9 +374,9 @@ TEST_F(VehicleFile, RefusesWhatIsNoVehicle) {
             "^: air.density_kg_m3: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(edited("[torso]", "mass_kg = 10.9067e-3", "^mass_g = 10.9067"),
             "^: torso.mass_g: unknown key; accepted here with another unit: \"mass_kg\"");
-  EXPECT_EQ(
-      edited("", "[air]", "[^wind]\nspeed_m_s = 1.0\n\n[air]"),
-      "^: wind: unknown key; accepted: air, driver, effects, extent, left, name, posterior, right, schema, torso");
+  EXPECT_EQ(edited("", "[air]", "[^wind]\nspeed_m_s = 1.0\n\n[air]"),
+            "^: wind: unknown key; accepted: air, driver, effects, extent, left, model, name, posterior, right, "
+            "schema, torso");
   EXPECT_EQ(edited("[left.motor]", "gear_ratio = 10.0", "gear_ratio = 10.0\ngear_ratio = ^10.0"),
             "^: not valid TOML: Error while parsing key-value pair: cannot redefine existing floating-point "
             "'gear_ratio'");

@@ -120,7 +120,7 @@ TEST(Effects, StateTheirParameters) {
 TEST(Effects, AreDocumented) {
   std::ifstream file(test::source_path("docs/effects.md"));
   std::map<std::string, std::string> rows;
-  for (std::string line; std::getline(file, line);)
+  for (std::string line; std::getline(file, line) && !line.starts_with("## Of robots that are known by the beat");)
     if (line.starts_with("| ")) rows[line.substr(2, line.find(' ', 2) - 2)] = line;
   for (const EffectEntry& e : effects())
     for (const EffectParameter& p : e.parameters) {

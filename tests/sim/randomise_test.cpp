@@ -371,9 +371,9 @@ TEST(RandomisationTable, RefusesLawsThatDoNotExistOrFit) {
   EXPECT_EQ(mass("law = \"replace_normal\"\nsd = 0.1"),
             "r.toml:1:1: randomise[0].mean: is missing; accepted: a number");
   EXPECT_EQ(mass("law = \"scale_normal\"\nsd = 0.1\nmean = 1.0"),
-            "r.toml:5:1: randomise[0].mean: unknown key; accepted: cut_sd, law, minor, parameters, sd");
+            "r.toml:5:1: randomise[0].mean: unknown key; accepted: cut_sd, each, law, minor, parameters, sd");
   EXPECT_EQ(mass("law = \"scale_uniform\"\nlow = 0.9\nhigh = 1.1\nsd = 0.1"),
-            "r.toml:6:1: randomise[0].sd: unknown key; accepted: high, law, low, minor, parameters");
+            "r.toml:6:1: randomise[0].sd: unknown key; accepted: each, high, law, low, minor, parameters");
 }
 
 TEST(RandomisationTable, RefusesDrawsThatCouldLeaveTheAcceptedRange) {

@@ -58,7 +58,7 @@ expect_refused("${WORK}/flights/0000: its vehicle hummingbird_identified.toml is
 run(transitions ${flights} --vehicle ${vehicles}/hummingbird_nominal.toml --every 50)
 expect_equal("another vehicle" "${code}" 0)
 file(REMOVE ${WORK}/flights/0001/imu.csv)
-expect_refused("${WORK}/flights/0001/imu.csv: cannot be read: No such file or directory"
+expect_refused("${WORK}/flights/0001/imu.csv: is missing; accepted: a folder with flight.toml, command.csv, mocap.csv and imu.csv"
   transitions ${flights} --vehicle ${vehicles}/hummingbird_identified.toml)
 run(transitions ${flights} --every 0)
 expect_equal("--every 0" "${code}" 2)

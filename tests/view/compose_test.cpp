@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
+#include "flappy/vehicle_file.hpp"
 #include "flightlog/flight_log.hpp"
 #include "io/files.hpp"
 #include "io/temporary_folder.hpp"
@@ -171,6 +173,53 @@ TEST(FlightSection, HasTheStreamsTheVehicleAndTheGoal) {
   EXPECT_TRUE(f.at("notes").empty());
 }
 
+/// Six seconds of hover, of a robot that declares its inputs and has neither IMU nor beat.
+flightlog::FlightLog of_inputs() {
+  flightlog::FlightLog log;
+  flightlog::FlightHeader& h = log.header;
+  h.vehicle = "crazyflie.toml";
+  h.inputs = {"motor_1", "motor_2", "motor_3", "motor_4"};
+  h.mocap = {100, 0.01, 1e-4, 2e-3};
+  log.command.declared.resize(4);
+  for (int i = 0; i < 600; ++i) {
+    const double t = 0.01 * i;
+    log.command.t_s.push_back(t);
+    for (flightlog::Column& c : log.command.declared) c.push_back(0.5);
+    flightlog::MocapStream& m = log.mocap;
+    m.t_s.push_back(t);
+    m.x_m.push_back(0.1 * t), m.y_m.push_back(0), m.z_m.push_back(1);
+    m.qw.push_back(1), m.qx.push_back(0), m.qy.push_back(0), m.qz.push_back(0);
+  }
+  return log;
+}
+
+TEST(FlightSection, DrawsWhatDeclaredInputsLeave) {
+  const io::TemporaryFolder folder;
+  flightlog::FlightLog log = of_inputs();
+  flightlog::write_flight_log(folder.path() / "flight", log);
+  Packing packing;
+  const Section section = flight_section({folder.path() / "flight"}, {}, packing);
+  const Json f = section.json().at("blocks")[0].at("flights")[0];
+  EXPECT_EQ(f.at("wings"), "none");
+  const Json& streams = f.at("streams");
+  for (const char* absent : {"imu", "command", "wings", "power"}) EXPECT_FALSE(streams.contains(absent)) << absent;
+  EXPECT_EQ(streams.at("declared").at("motor_4").at("count"), 600);
+  EXPECT_GT(streams.at("path").at("accel_z_m_s2").at("count").get<int>(), 100);
+  // the ellipsoid has the moments of inertia of the file: m / 5 (b^2 + c^2), and so on
+  const model::Vehicle v = model::read_any_vehicle(FLAPPY_SOURCE_DIR "/configs/vehicles/crazyflie.toml");
+  const std::vector<double> body_m = f.at("vehicle").at("body_m");
+  EXPECT_NEAR(v.torso.mass_kg / 5 * (body_m[1] * body_m[1] + body_m[2] * body_m[2]), v.torso.inertia_kg_m2.xx, 1e-9);
+  EXPECT_NEAR(v.torso.mass_kg / 5 * (body_m[0] * body_m[0] + body_m[1] * body_m[1]), v.torso.inertia_kg_m2.zz, 1e-9);
+  ASSERT_EQ(section.figures().back().id, "declared");
+  EXPECT_EQ(section.figures().back().series[3].name, "motor 4");
+
+  // wings of the file, but no voltages that would move them
+  log.header.vehicle = "hummingbird_nominal.toml";
+  flightlog::write_flight_log(folder.path() / "still", log);
+  EXPECT_EQ(flight_section({folder.path() / "still"}, {}, packing).json().at("blocks")[0].at("flights")[0].at("wings"),
+            "still");
+}
+
 TEST(FlightSection, RefusesAFlightWithoutItsVehicle) {
   const io::TemporaryFolder folder;
   flightlog::FlightLog log = hover();
@@ -232,6 +281,140 @@ TEST(DiagnosisSection, ShowsHowRivalsWouldFlyNext) {
   EXPECT_EQ(f.series[1].name, "if it is no gap");
   EXPECT_EQ(f.series[1].x, (std::vector<double>{0.05, 0.1 * 1.5}));
   EXPECT_EQ(f.series[1].y, (std::vector<double>{0.5, 0.25}));
+}
+
+/// A robot that is known by the beat: two flights, one effect of two sizes that explains them and one that does not.
+Json by_the_beat() {
+  const auto error = [](double rms, double by_type) {
+    return Json{{"rms", rms}, {"low", 0.9 * rms}, {"high", 1.1 * rms}, {"by_type", by_type}};
+  };
+  const auto rung = [&](const char* added, double x, double z) {
+    return Json{{"added", added}, {"held_out", {{"force_x", error(x, 1.5 * x)}, {"force_z", error(z, z)}}}};
+  };
+  const auto size = [](double value, const char* unit) {
+    return Json{{"value", value}, {"low", value - 0.1}, {"high", value + 0.1}, {"unit", unit}};
+  };
+  Json json = read_results(kData / "diagnosis/diagnosis.json");
+  json["flights"] = {"logs/one_1", "logs/one_2"};
+  json["verdict"] = {
+      {"kind", "effect"}, {"effects", {"flapping_counter_force"}}, {"remainder", false}, {"probability", 0.99}};
+  json["where"] = {{{"channel", "force_x"},
+                    {"regime", "speed above 1 m/s"},
+                    {"gap", 2.0},
+                    {"noise_floor", 0.5},
+                    {"p_value", 0.001}}};
+  const auto candidate = [](const char* group, Json effects, double probability, double evidence, Json sizes) {
+    return Json{{"effects", std::move(effects)},
+                {"group", group},
+                {"remainder", false},
+                {"probability", probability},
+                {"log_evidence", evidence},
+                {"parameters", std::move(sizes)},
+                {"closure", nullptr}};
+  };
+  json["candidates"] = {candidate("flapping_counter_force", {"flapping_counter_force"}, 0.99, -10,
+                                  {{"flapping_counter_force.x_per_s", size(3.0, "1/s")},
+                                   {"flapping_counter_force.z_per_s", size(0.5, "1/s")}}),
+                        candidate("parameters", Json::array(), 0.01, -1e9, Json::object())};
+  json["unexplained"] = {{"jointly_with", {"flapping_counter_force"}},
+                         {"terms",
+                          {{{"channel", "force_x"},
+                            {"harmonic", "0"},
+                            {"function", "right_flap velocity_y"},
+                            {"times_usual", 3.0},
+                            {"gain_nats", 7.0}}}}};
+  json["closed_loop"] = Json::array();
+  json["next_experiment"] = nullptr;
+  const auto agreement = [](const char* name, double one, double other, double p) {
+    return Json{{"name", name}, {"value", {one, other}}, {"sd", {0.1, 0.2}}, {"p_value", p}};
+  };
+  json["validation"] = {
+      {"ladder", {rung("file", 2.0, 1.0), rung("parameters", 1.5, 0.9), rung("flapping_counter_force", 0.5, 0.25)}},
+      {"controls",
+       {{{"effect", "flapping_counter_force"}, {"channel", "force_x"}, {"gain", 0.75}, {"best_of_shifted", 0.01}}}},
+      {"agreements",
+       {agreement("flapping_counter_force.x_per_s", 2.9, 3.2, 0.4),
+        agreement("flapping_counter_force.z_per_s", 0.1, 0.9, 1e-4)}}};
+  return json;
+}
+
+std::string words_of(const Section& section) {
+  std::string words;
+  const Json json = section.json();
+  for (const Json& block : json.at("blocks"))
+    if (block.at("kind") == "words") words += block.at("text").get<std::string>() + "\n";
+  return words;
+}
+
+TEST(DiagnosisSection, TellsWhatALaboratoryAsks) {
+  const io::TemporaryFolder folder;
+  Json json = by_the_beat();
+  const auto told = [&] {
+    io::write_atomically(folder.path() / "diagnosis.json", json.dump());
+    return diagnosis_section(folder.path() / "diagnosis.json");
+  };
+  const Section section = told();
+  expect_cells_of(section, json, 24 + 6 + 8);
+  std::map<std::string, Figure> figures;
+  for (const Figure& f : section.figures()) figures[f.id] = f;
+  const Figure &ladder = figures.at("ladder_force"), &kinds = figures.at("ladder_kinds_force");
+  EXPECT_EQ(io::joined(ladder.categories), "vehicle's file, parameters refitted, + flapping counter force");
+  ASSERT_EQ(ladder.series.size(), 2u);
+  EXPECT_EQ(ladder.series[0].name, "forward force");
+  EXPECT_EQ(ladder.series[0].x, (std::vector<double>{2.0, 1.5, 0.5}));
+  EXPECT_EQ(ladder.series[0].low, (std::vector<double>{0.9 * 2.0, 0.9 * 1.5, 0.9 * 0.5}));
+  EXPECT_EQ(kinds.series[0].x, (std::vector<double>{3.0, 2.25, 0.75}));
+  EXPECT_EQ(kinds.x.high, ladder.x.high);  // side by side
+  EXPECT_EQ(*kinds.x.high, 1.05 * 3.0);
+  EXPECT_EQ(figures.at("controls").series[0].x[0], 75);
+  EXPECT_EQ(figures.at("controls").series[1].x[0], 1);
+  const Figure& agreement = figures.at("agreement_1");
+  EXPECT_EQ(io::joined(agreement.categories), "one_1, one_2");
+  ASSERT_EQ(agreement.series.size(), 4u);  // each size, and its fit to all flights
+  EXPECT_EQ(agreement.x.title, "size (1/s)");
+  EXPECT_EQ(agreement.series[0].name, "x");
+  EXPECT_EQ(agreement.series[0].x, (std::vector<double>{2.9, 3.2}));
+  EXPECT_NEAR(agreement.series[0].high[1], 3.2 + 1.645 * 0.2, 1e-12);
+  EXPECT_EQ(agreement.series[3].x, (std::vector<double>{0.5, 0.5}));
+
+  const std::string words = words_of(section);
+  const auto says = [&](const std::string& text) { return words.find(text) != std::string::npos; };
+  EXPECT_TRUE(
+      says("forward force from 2.00 to 0.50 m/s² (90 %: 0.45 to 0.55; 0.75 where all flights of a kind are held "
+           "out)"))
+      << words;
+  EXPECT_TRUE(says("each takes 75 % or more off the rms where it takes most, its shifted copies 1 % at best")) << words;
+  EXPECT_TRUE(
+      says("1 of 2 sizes are one number, as far as their errors tell. By more than that flapping counter force "
+           "(z) differs"))
+      << words;
+  EXPECT_TRUE(says("Predict with vehicle_corrected.toml")) << words;
+  EXPECT_FALSE(says("flappy-train")) << words;  // nothing flies such a vehicle
+
+  json["validation"]["controls"][0]["best_of_shifted"] = 0.8;
+  EXPECT_NE(words_of(told()).find("Shifted in time flapping counter force explains as much as at its own: do not "
+                                  "believe it."),
+            std::string::npos);
+}
+
+TEST(DiagnosisSection, DrawsNoBeatWhereNoneIsKnown) {
+  const io::TemporaryFolder folder;
+  io::write_atomically(folder.path() / "diagnosis.json", by_the_beat().dump());
+  const std::string text = diagnosis_section(folder.path() / "diagnosis.json").json().dump();
+  EXPECT_NE(text.find(R"("wings":false)"), std::string::npos);
+  EXPECT_EQ(text.find("When in the beat"), std::string::npos);
+  EXPECT_EQ(text.find("part of the beat"), std::string::npos);
+  EXPECT_NE(text.find("right flap × velocity y"), std::string::npos);
+  EXPECT_NE(text.find("parameters alone are ruled out"), std::string::npos);
+  EXPECT_NE(text.find(R"("the air at the wings")"), std::string::npos);
+  EXPECT_NE(diagnosis_section(kData / "diagnosis/diagnosis.json").json().dump().find(R"("wings":true)"),
+            std::string::npos);
+}
+
+TEST(Words, AreWithoutUnits) {
+  EXPECT_EQ(size_words("stroke_plane_actuation.shift_m_s2", "m/s^2"), "stroke plane actuation (shift)");
+  EXPECT_EQ(size_words("translational_lift.gain_per_m", "1/m"), "translational lift (gain)");
+  EXPECT_EQ(size_words("battery_thrust.gain", ""), "battery thrust (gain)");
 }
 
 TEST(EvaluationSection, TellsWhatTheJsonHas) {

@@ -148,6 +148,25 @@ test("a flight is what its log has", () => {
   near(flight.panels()[1].lines.map((line) => line.values[3]), [0, 0, 90], 1e-3);
 });
 
+test("a flight of declared inputs has neither beat nor IMU", () => {
+  const packer = new Packer(), t = Array.from({length: 201}, (_, i) => i / 100), same = (value) => t.map(() => value);
+  const columns = (names) => Object.fromEntries(Object.entries(names).map(([name, values]) => [name, packer.add(values, 1e-6)]));
+  const pose = columns({t_s: t, x_m: same(0), y_m: same(0), z_m: same(1), qw: same(Math.SQRT1_2), qx: same(0), qy: same(0), qz: same(Math.SQRT1_2)});
+  const declared = columns({t_s: t, ...Object.fromEntries(Array.from({length: 8}, (_, k) => [`motor_${k + 1}`, same(k)]))});
+  const path = columns({t_s: t, accel_x_m_s2: t.map((s) => s), accel_y_m_s2: same(0), accel_z_m_s2: same(9.81)});
+  const json = {name: "f", declared: "v", flapping_Hz: 0, gravity_m_s2: 9.81, wings: "none", notes: [], latency_s: {mocap: 0},
+    vehicle: {name: "v", mass_kg: 0.1, body_m: [0.05, 0.05, 0.01]}, ambient: {ground_z_m: 0, ceiling_z_m: 9, walls: []}, streams: {mocap: pose, declared, path}};
+  const flight = new Flight(json, Uint8Array.from(packer.bytes));
+  near(flight.beat_s, 0.1);
+  near(flight.forceAt(1.5), [0, 0.1 * 1.5, 0.1 * 9.81], 1e-5);  // at the instant: the path has no beat to take the mean of
+  near(flight.wingsAt(0.5), [0, 0, 0, 0]);
+  const panels = flight.panels();
+  assert.deepEqual(panels.map((panel) => panel.id), ["position", "attitude", "path", "declared_0", "declared_6"]);
+  assert.deepEqual(panels[4].lines.map((line) => line.name), ["motor 7", "motor 8"]);
+  assert.ok(panels.every((panel) => panel.lines.every((line) => line.colour !== undefined)));
+  assert.equal(new Flight({...json, streams: {mocap: pose, declared}}, Uint8Array.from(packer.bytes)).forceAt(1), null);
+});
+
 test("modules join to one, and make no markup of text", () => {
   const names = new Map();
   for (const file of readdirSync(kWeb).filter((name) => name.endsWith(".js"))) {

@@ -135,17 +135,21 @@ int main(int argc, char** argv) {
   gap::DiagnoseCommand command;
   diagnose.option("--vehicle", command.vehicle, "the vehicle's file, as it was believed").required();
   diagnose.option("--flights", command.flights, "folders of flight logs").required();
-  diagnose.option("--priors", command.priors, "what is uncertain of the vehicle").shows_default();
-  diagnose.option("--discrepancy", command.discrepancy, "what every model gets wrong").shows_default();
-  diagnose.option("--verdict", command.verdict, "constants of the verdict").shows_default();
+  diagnose.option("--priors", command.priors,
+                  "what is uncertain of the vehicle [configs/gap/priors.toml, as the next]");
+  diagnose.option("--discrepancy", command.discrepancy, "what every model gets wrong [model_discrepancy.toml]");
+  diagnose.option("--verdict", command.verdict, "constants of the verdict [verdict.toml]");
   diagnose.option("--manoeuvre", command.manoeuvre,
                   "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
+  diagnose.option("--channels", command.channels, "of a robot known by the beat: only these, as force_x");
   diagnose.option("--withhold", command.withheld, "entries that the catalogue is to lack");
   diagnose.option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
   diagnose.option("--threads", command.threads, "0: one for each processor").range(0, 1024);
   io::Command learn = program.app().command(
       "learn-discrepancy", "what models get wrong, from robots of which all is known that the vehicle's file says");
-  gap::LearnCommand lessons{.vehicle = {}, .priors = command.priors, .discrepancy = command.discrepancy};
+  gap::LearnCommand lessons{.vehicle = {},
+                            .priors = io::config_path("gap/priors.toml"),
+                            .discrepancy = io::config_path("gap/model_discrepancy.toml")};
   learn.option("--vehicle", lessons.vehicle, "the vehicle's file").required();
   learn.option("--robots", lessons.robots, "folders, each with the flights of one robot").required();
   learn.option("--priors", lessons.priors, "what is uncertain of the vehicle").shows_default();

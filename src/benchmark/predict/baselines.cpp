@@ -32,7 +32,7 @@ void for_rows(const std::vector<gap::PredictedFlight>& flights, const std::vecto
   for (std::size_t j = 0; j < flights[f].beats(); ++j)
     for (int g = 0; g < gap::kGroups; ++g) {
       const auto k = static_cast<std::size_t>(g);
-      if (!gap::has_rows(g / gap::kCoefficients, g % gap::kCoefficients) || !(noise_sd[k] > 0) ||
+      if (!flights[f].has_rows(g / gap::kCoefficients, g % gap::kCoefficients) || !(noise_sd[k] > 0) ||
           !flights[f].covers(j, g / gap::kCoefficients))
         continue;
       use(k, j * gap::kRowsPerBeat + k);

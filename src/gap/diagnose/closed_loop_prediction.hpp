@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/replay/reset_prediction.hpp"
+#include "gap/replay/predicted_flight.hpp"
 #include "rollout/fly_config.hpp"
 
 namespace flappy::gap {

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <optional>
 
+#include "gap/diagnose/held_out.hpp"
 #include "gap/diagnose/verdict.hpp"
 #include "gap/localise/closure.hpp"
 #include "io/parallel.hpp"
@@ -19,6 +21,10 @@ using Eigen::VectorXd;
 
 /// Sets of effects of which it is asked whether something is left beside them.
 constexpr std::size_t kMostRemainders = 3;
+/// Less than this share of what parameters leave may be chance; and the log evidence of what is refuted.
+constexpr double kLeastExplainable = 0.15, kRefuted = -1e9;
+/// A size that changes no row by so much, in its unit, cannot be told from none.
+constexpr double kNoChange = 1e-9;
 
 class Diagnoser {
  public:
@@ -50,8 +56,10 @@ class Diagnoser {
 
     std::vector<ScoredHypothesis> singles;
     const std::vector<Screened> screened = screen(evidence_, fitter_, parameters_, robot_.sizes());
+    if (!flights_.front().within_the_beat()) d.untestable = untestable();
     for (std::size_t i = 0; i < screened.size(); ++i) {
       const Screened& s = screened[i];
+      if (std::ranges::count(d.untestable, s.effect)) continue;
       ScoredHypothesis a;
       if (static_cast<int>(i) < options_.finalists && s.gain > 0 &&
           progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + s.effect))
@@ -64,7 +72,11 @@ class Diagnoser {
     if (!singles.empty() && singles.front().fitted() && counts(singles.front()) > parameters) {
       ScoredHypothesis best = singles.front();
       for (int n = 2; n <= options_.most_effects; ++n) {
-        if (!progress(0.7 + 0.1 * n, "fitting another jointly with " + best.effects.back())) break;
+        if (!progress(0.7 + 0.3 * (n - 1) / options_.most_effects,
+                      "fitting another jointly with " + best.effects.back()))
+          break;
+        // what is missing besides hides behind what models are off by with the best in force, not without it
+        robot_.take_scales(Hypothesis(uncertain_, best.effects), best.fit.point);
         const auto further = screen(evidence_, fitter_, best.fit, beside(best.effects, robot_.sizes()));
         if (further.empty() || further.front().gain < rule_.gain.further_screened_nats) break;
         std::vector<Screened> set = screened_of(best);
@@ -74,6 +86,7 @@ class Diagnoser {
         singles.push_back(more);
         best = std::move(more);
       }
+      robot_.take_scales(plain, parameters_.point);
     }
     // what leaves more than that entry's equation may
     std::ranges::sort(singles, std::greater{}, counts);
@@ -94,15 +107,17 @@ class Diagnoser {
       d.hypotheses.push_back(std::move(a));
     }
     d.complete = !stopped_;
+    d.nominal = robot_.nominal().residual;
+    hold_out(d);
+    if (rule_.refutation.least_share > 0) refute(d);
     set_probabilities(d.hypotheses, rule_);
     d.conclusion = conclude(d.hypotheses, rule_);
     const ScoredHypothesis& concluded = d.hypotheses[d.conclusion.hypothesis];
     d.sensors = concluded.fitted() ? robot_.sensors(Hypothesis(uncertain_, concluded.effects), concluded.fit)
                                    : robot_.sensors(plain, parameters_);
     d.minors = uncertain_.minors();
-    d.nominal = robot_.nominal().residual;
-    hold_out(d);
     d.noise_sd = noise_sd();
+    if (!flights_.front().within_the_beat()) d.validation = validate(robot_, flights_, d, threads_);
     return d;
   }
 
@@ -111,15 +126,6 @@ class Diagnoser {
     std::vector<double> sd;
     for (int g = 0; g < kGroups; ++g) sd.push_back(evidence_.noise_sd(g));
     return sd;
-  }
-
-  Posterior posterior(const Linearised& l, const Columns& c, const std::vector<char>& use,
-                      const BasisCoefficients& sd) const {
-    return Evidence::posterior(evidence_.reduce(l.statistics, c.columns, use, sd), c.chosen, c.mean());
-  }
-
-  static BasisCoefficients together(const BasisCoefficients& a, const BasisCoefficients& b) {
-    return (a.array().square() + b.array().square()).sqrt();
   }
 
   ScoredHypothesis weigh(ScoredHypothesis::Kind kind, const Hypothesis& h, const Linearised& l,
@@ -133,8 +139,14 @@ class Diagnoser {
   }
 
   /// Lets blocks of the discrepancy be larger than models are, wherever that pays.
-  ScoredHypothesis explain_freely(const Hypothesis& h, const Linearised& l, double log_prior) const {
-    const Weighed w = robot_.weigh(h, l, rule_.unknown.freeing_nats);
+  ScoredHypothesis explain_freely(const Hypothesis& h, const Linearised& l, double log_prior) {
+    Weighed w = robot_.weigh(h, l, rule_.unknown.freeing_nats);
+    if (freest_) {  // what hides while models may be off by little shows where they may be off by much
+      Weighed other = robot_.weigh(h, l, *freest_, rule_.unknown.freeing_nats);
+      if (other.posterior.log_evidence > w.posterior.log_evidence) w = std::move(other);
+    } else {
+      freest_ = w.scales;
+    }
     ScoredHypothesis a;
     a.kind = ScoredHypothesis::Kind::unknown;
     a.jointly_with = h.effects();
@@ -163,6 +175,22 @@ class Diagnoser {
     return a;
   }
 
+  /// Entries that have no stage for the mean of a beat, or change nothing here: as a battery's where none was logged.
+  std::vector<std::string> untestable() const {
+    std::vector<std::string> list;
+    const model::Vehicle& vehicle = uncertain_.nominal();
+    for (const model::EffectEntry& e : model::catalogue_of(vehicle)) {
+      double most = 0;
+      for (const SizeColumn& c : robot_.sizes())
+        if (c.effect == e.info.id) most = std::max(most, c.change.cwiseAbs().maxCoeff());
+      if (!(most > kNoChange)) list.emplace_back(e.info.id);
+    }
+    for (const model::EffectEntry& e : model::effects())
+      if (model::find_effect(vehicle, e.info.id) == nullptr) list.emplace_back(e.info.id);
+    std::erase_if(list, [&](const std::string& id) { return std::ranges::count(options_.withheld, id) > 0; });
+    return list;
+  }
+
   /// Columns of the effects that are not there yet; that these make them others counts for little.
   static std::vector<SizeColumn> beside(const std::vector<std::string>& effects, std::vector<SizeColumn> columns) {
     std::erase_if(columns, [&](const SizeColumn& c) { return std::ranges::count(effects, c.effect) > 0; });
@@ -174,22 +202,24 @@ class Diagnoser {
     std::vector<Screened> list;
     Index at = Hypothesis(uncertain_, {}).size();
     for (const std::string& e : a.effects) {
-      const auto n = static_cast<Index>(unknowns_of(e).size());
+      const Hypothesis alone(uncertain_, {e});
+      const Index n = alone.size() - alone.shared();
       list.push_back({e, 0, a.fit.point.at.segment(at, n)});
       at += n;
     }
     return list;
   }
 
-  /// Whether a fit left one of its effects without any size.
+  /// Whether a fit left one of its effects as the vehicle's file has it: without any size, as a rule.
   bool vanished(const ScoredHypothesis& a) const {
     if (!a.fitted()) return true;
     const Hypothesis h(uncertain_, a.effects);
+    const VectorXd file = h.start();
     for (const std::string& e : a.effects) {
       double largest = 0;
       for (Index i = h.shared(); i < h.size(); ++i) {
         const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
-        if (u.effect == e && u.size) largest = std::max(largest, std::abs(a.fit.point.at[i]));
+        if (u.effect == e && u.size) largest = std::max(largest, std::abs(a.fit.point.at[i] - file[i]));
       }
       if (largest < rule_.gain.vanished_size) return true;
     }
@@ -202,7 +232,7 @@ class Diagnoser {
     a.kind = ScoredHypothesis::Kind::effect;
     a.effects = {s.effect};
     const Hypothesis h(uncertain_, a.effects);
-    std::vector<BasisCoefficients> own(unknowns_of(s.effect).size());
+    std::vector<BasisCoefficients> own(static_cast<std::size_t>(h.size() - h.shared()));
     for (const SizeColumn& c : robot_.sizes())
       if (c.effect == s.effect) own[static_cast<std::size_t>(c.unknown)] = c.change;
     a.fit = fitter_.linear(h, parameters_, own);
@@ -219,7 +249,7 @@ class Diagnoser {
   }
 
   double log_prior_of_one() const {
-    return std::log(rule_.prior.effect / static_cast<double>(model::effects().size()));
+    return std::log(rule_.prior.effect / static_cast<double>(model::catalogue_of(uncertain_.nominal()).size()));
   }
 
   ScoredHypothesis fit_effects(const std::vector<Screened>& set) const {
@@ -242,7 +272,8 @@ class Diagnoser {
     }
     double log_prior = log_prior_of_one();
     for (std::size_t i = 1; i < set.size(); ++i)
-      log_prior += std::log(rule_.prior.further_effect / static_cast<double>(model::effects().size()));
+      log_prior +=
+          std::log(rule_.prior.further_effect / static_cast<double>(model::catalogue_of(uncertain_.nominal()).size()));
     for (Index i = h.shared(); i < h.size(); ++i) {
       const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
       if (u.size && u.low >= 0) log_prior += std::log(2.0);
@@ -254,34 +285,29 @@ class Diagnoser {
 
   /// What is left in every flight with the fit to the others; of a single flight, with its own.
   void hold_out(Diagnosis& d) const {
-    std::vector<Candidate> candidates;
-    std::vector<Residuals*> of;
-    const auto add = [&](const Hypothesis& h, const Linearised& l, const BasisCoefficients& sd, Residuals& left) {
-      const Columns c = fitter_.columns_of(l);
-      for (std::size_t f = 0; f < all_.size(); ++f) {
-        std::vector<char> others = all_;
-        if (all_.size() > 1) others[f] = 0;
-        const Posterior p = posterior(l, c, others, sd);
-        VectorXd at = l.at;
-        Index i = 0;
-        for (std::size_t k = 0; k < l.columns.size(); ++k)
-          if (l.columns[k].size() > 0) at += p.mean[i++] * l.directions.axes.col(static_cast<Index>(k));
-        candidates.push_back(h.candidate(h.bounded(at)));
-      }
-      of.push_back(&left);
-    };
-    add(Hypothesis(uncertain_, {}), parameters_.point, evidence_.discrepancy_sd(), d.refit);
+    std::vector<Fitted> fits = {{Hypothesis(uncertain_, {}), &parameters_.point}};
+    std::vector<Residuals*> of = {&d.refit};
     for (ScoredHypothesis& a : d.hypotheses)
       if (a.fitted()) {
-        const Hypothesis h(uncertain_, a.effects);
-        add(h, a.fit.point, together(evidence_.discrepancy_sd(), fitter_.form_error(h, a.fit.point)), a.left);
+        fits.push_back({Hypothesis(uncertain_, a.effects), &a.fit.point});
+        of.push_back(&a.left);
       }
-    std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
-    for (std::size_t i = 0; i < of.size(); ++i)
-      for (std::size_t f = 0; f < all_.size(); ++f) {
-        Residuals& s = rows[i * all_.size() + f];
-        of[i]->push_back(s.empty() ? Rows() : std::move(s[f]));
-      }
+    std::vector<int> each(all_.size());
+    std::iota(each.begin(), each.end(), 0);
+    std::vector<Residuals> left = held_out(robot_, flights_, fits, each, threads_);
+    for (std::size_t i = 0; i < of.size(); ++i) *of[i] = std::move(left[i]);
+  }
+
+  /// What leaves most of that which depends on the regime, in flights held out, explains it not, however probable beside its rivals.
+  void refute(Diagnosis& d) const {
+    const double plain = mean_square(robot_, flights_, d.refit);
+    const double explainable = plain - mean_square(robot_, flights_, smoothed_away(robot_, flights_, d.refit));
+    if (!(explainable > kLeastExplainable * plain)) return;
+    for (ScoredHypothesis& a : d.hypotheses) {
+      if (a.kind == ScoredHypothesis::Kind::unknown) continue;
+      const double share = a.fitted() ? (plain - mean_square(robot_, flights_, a.left)) / explainable : 0;
+      if (share < rule_.refutation.least_share) a.log_evidence = kRefuted;
+    }
   }
 
   /// Whether to go on.
@@ -301,8 +327,9 @@ class Diagnoser {
   const Fitter& fitter_ = robot_.fitter();
   const Fit& parameters_ = robot_.parameters();
   RowContext around_;
-  Losses loss_;       ///< of the parameters alone
-  double plain_ = 0;  ///< log evidence of the parameters alone
+  Losses loss_;                   ///< of the parameters alone
+  double plain_ = 0;              ///< log evidence of the parameters alone
+  std::optional<Scales> freest_;  ///< of an unknown cause alone
   bool stopped_ = false;
 };
 

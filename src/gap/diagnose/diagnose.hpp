@@ -54,14 +54,48 @@ struct Conclusion {
   bool remainder = false;            ///< beside effects something is left that no entry explains
 };
 
+/// What is left of a channel in flights that were held out.
+struct HeldOutError {
+  std::string channel;
+  double rms = 0, low = 0, high = 0;  ///< 90 % of draws of blocks with replacement lie between
+  double by_type = 0;  ///< the same with all flights of a kind held out together: those whose names differ by a number
+};
+
+/// What a laboratory asks of an effect before it believes it.
+struct Validation {
+  /// The vehicle's file, its parameters fitted, and then one effect upon the other, as they were found.
+  struct Rung {
+    std::string added;
+    std::vector<HeldOutError> errors;
+  };
+  std::vector<Rung> ladder;
+  /// Of the last rung: an effect's part in it, and copies of that part shifted in time, which should gain nothing.
+  struct Control {
+    std::string effect, channel;  ///< where it gains most
+    double gain = 0;              ///< share of the rms that it takes away
+    double best_of_shifted = 0;   ///< the same of the best copy
+  };
+  std::vector<Control> controls;
+  /// A size as each flight alone has it.
+  struct Agreement {
+    std::string name;
+    std::vector<double> value, sd;  ///< [flight]
+    double p_value = 1;             ///< that these are one number
+  };
+  std::vector<Agreement> agreements;
+};
+
 struct Diagnosis {
   bool complete = true;                      ///< false: progress had it stop before every effect was weighed
   std::vector<ScoredHypothesis> hypotheses;  ///< most probable first
   Conclusion conclusion;
+  std::vector<std::string>
+      untestable;                      ///< entries that cannot show in these logs, of a robot that is known by the beat
   Fit parameters;                      ///< without any effect
   std::vector<double> minors;          ///< variates of the vehicle's minor draws, for sim::Randomisation::set_minors
   std::vector<SensorFinding> sensors;  ///< beside what is concluded
-  Residuals nominal;                   ///< what is left of the measurement with the vehicle's file
+  std::optional<Validation> validation;  ///< of a robot that is known by the beat
+  Residuals nominal;                     ///< what is left of the measurement with the vehicle's file
   Residuals refit;               ///< with parameters alone: in each flight what is left with the fit to the others
   std::vector<double> noise_sd;  ///< [group] of the rows of noise alone, as found
 };

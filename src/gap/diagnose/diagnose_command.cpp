@@ -8,6 +8,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "gap/diagnose/diagnosis_files.hpp"
 #include "gap/diagnose/summary.hpp"
+#include "gap/replay/mean_prediction.hpp"
 #include "io/config.hpp"
 #include "io/files.hpp"
 #include "io/installation.hpp"
@@ -24,6 +25,8 @@ using Json = nlohmann::ordered_json;
 
 /// Probability of the second hypothesis from which on a flight is looked for that tells it from the first.
 constexpr double kLeastRival = 0.01;
+/// A file that knows a robot by the beat alone may lack many at once, and to fit another costs little.
+constexpr int kMostMeanEffects = 8;
 
 struct Logs {
   std::vector<flightlog::FlightLog> logs;
@@ -102,22 +105,42 @@ struct Asked {
   rollout::FlyConfig pilot;
   std::vector<Manoeuvre> manoeuvres;
   DiagnoseOptions options;
+  std::vector<int> channels;
 };
 
+std::vector<int> read_channels(const DiagnoseCommand& command, bool by_the_beat) {
+  if (!command.channels.empty() && !by_the_beat)
+    throw io::InputError("--channels: is for a vehicle that is known by the beat; accepted: all channels of this one");
+  std::vector<std::string> known;
+  for (int channel = kTorqueX; channel <= kForceZ; ++channel) known.push_back(channel_name(channel));
+  std::vector<int> list;
+  for (const std::string& name : command.channels) {
+    const auto at = std::ranges::find(known, name);
+    if (at == known.end())
+      throw io::InputError("--channels " + name + ": no such channel; accepted: " + io::joined(known) +
+                           io::did_you_mean(name, known));
+    list.push_back(static_cast<int>(at - known.begin()));
+  }
+  return list;
+}
+
 Asked read_asked(const DiagnoseCommand& command) {
-  const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kPredictionStep_s);
-  if (!vehicle.effects.empty())
+  model::Vehicle vehicle = model::read_any_vehicle(command.vehicle);
+  const bool by_the_beat = vehicle.beat_averaged.has_value();
+  if (!by_the_beat) vehicle = model::read_vehicle_for_steps(command.vehicle, kPredictionStep_s);
+  if (!by_the_beat && !vehicle.effects.empty())
     io::Config::load(command.vehicle)
         .root()
         .fail("effects", "what is missing is asked of the vehicle as it was believed", "a vehicle without effects");
   std::vector<std::string> withheld;
   std::vector<std::string> ids;
-  for (const auto& effect : model::effects()) ids.push_back(effect.info.id);
+  const std::vector<model::EffectEntry>& catalogue = model::catalogue_of(vehicle);
+  for (const auto& effect : catalogue) ids.push_back(effect.info.id);
   for (const std::string& id : command.withheld) {
-    if (model::effect_index(id.c_str()) < 0)
+    if (model::find_effect(vehicle, id) == nullptr)
       throw io::InputError("--withhold " + id + ": no such effect; accepted: identifiers of docs/effects.md" +
                            io::did_you_mean(id, ids));
-    for (std::string& member : model::whole_group(id)) withheld.push_back(std::move(member));
+    for (std::string& member : model::whole_group(catalogue, id)) withheld.push_back(std::move(member));
   }
   flightlog::check_each_once(command.flights);
   rollout::FlyConfig pilot =
@@ -127,22 +150,30 @@ Asked read_asked(const DiagnoseCommand& command) {
         command.manoeuvre +
         ": is flown by voltages alone, but what is predicted is flown by a controller; accepted: a task "
         "whose action is of kind \"wing_beat\"");
+  const auto default_of = [&](const std::string& given, const char* file) {
+    return given.empty() ? std::filesystem::path(io::config_path(by_the_beat ? std::string("gap/beat_averaged/") + file
+                                                                             : std::string("gap/") + file))
+                         : std::filesystem::path(given);
+  };
   return {vehicle,
-          sim::read_randomisation(vehicle, io::Config::load(command.priors).root()),
+          sim::read_randomisation(vehicle, io::Config::load(default_of(command.priors, "priors.toml")).root()),
           std::move(pilot),
           read_manoeuvres(io::config_path("gap/experiments")),
           {.threads = command.threads,
+           .finalists = by_the_beat ? static_cast<int>(catalogue.size()) : DiagnoseOptions().finalists,
+           .most_effects = by_the_beat ? kMostMeanEffects : DiagnoseOptions().most_effects,
            .withheld = withheld,
            .progress = {},
-           .discrepancy = read_model_discrepancy(command.discrepancy),
-           .rule = read_verdict_rule(command.verdict)}};
+           .discrepancy = read_model_discrepancy(default_of(command.discrepancy, "model_discrepancy.toml")),
+           .rule = read_verdict_rule(default_of(command.verdict, "verdict.toml"))},
+          read_channels(command, by_the_beat)};
 }
 
 /// In closed loop, and what to fly next; each left out after Ctrl-C.
 void look_ahead(const DiagnoseCommand& command, const Asked& asked, const std::vector<PredictedFlight>& flights,
                 const Diagnosis& d, const model::Vehicle& corrected, Report& report) {
   io::ProgressLine line("looking ahead");
-  if (io::interrupted()) return;
+  if (io::interrupted() || asked.vehicle.beat_averaged) return;
   line.show(0, "flying in closed loop");
   ClosedLoopOptions closed;
   closed.own_path = !command.manoeuvre.empty();
@@ -172,7 +203,10 @@ Json run_diagnose(const DiagnoseCommand& command) {
   const bool faulty = !read.faults.empty();
   std::vector<PredictedFlight> flights;
   for (std::size_t f = 0; !faulty && f < read.logs.size(); ++f)
-    flights.emplace_back(Recording(command.flights[f], std::move(read.logs[f]), asked.vehicle));
+    if (asked.vehicle.beat_averaged)
+      flights.emplace_back(
+          std::make_shared<MeanPrediction>(command.flights[f], std::move(read.logs[f]), asked.vehicle, asked.channels));
+    else flights.emplace_back(Recording(command.flights[f], std::move(read.logs[f]), asked.vehicle));
   const Diagnosis d = faulty ? Diagnosis() : diagnose_visibly(flights, asked.uncertain, asked.options);
   if (!faulty) asked.uncertain.set_minors(d.minors);
   // of an earlier diagnosis nothing stays beside this one

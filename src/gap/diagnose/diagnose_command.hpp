@@ -10,15 +10,16 @@
 namespace flappy::gap {
 
 struct DiagnoseCommand {
-  std::string vehicle, priors = io::config_path("gap/priors.toml"),
-                       discrepancy = io::config_path("gap/model_discrepancy.toml"),
-                       verdict = io::config_path("gap/verdict.toml");
+  std::string vehicle;
+  /// Empty: priors.toml, model_discrepancy.toml and verdict.toml of configs/gap, or of its beat_averaged for such a vehicle.
+  std::string priors, discrepancy, verdict;
   std::string
       manoeuvre;  ///< configuration of flappy-fly that the flights flew; empty: the recorded paths, under our hover's
   std::vector<std::string> flights, withheld;
-  std::string out;     ///< folder for all files; empty: none
-  int threads = 0;     ///< 0: one for each processor
-  bool quiet = false;  ///< prints nothing
+  std::vector<std::string> channels;  ///< that alone are looked at, of a robot that is known by the beat; none: all
+  std::string out;                    ///< folder for all files; empty: none
+  int threads = 0;                    ///< 0: one for each processor
+  bool quiet = false;                 ///< prints nothing
 };
 
 /// Diagnoses, prints, writes; the machine-readable result.

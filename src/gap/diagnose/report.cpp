@@ -64,6 +64,22 @@ std::string regime_of(const std::string& function, BasisFunction kind) {
   }
 }
 
+Json validation_json(const Validation& v) {
+  Json ladder = Json::array(), controls = Json::array(), agreements = Json::array();
+  for (const Validation::Rung& r : v.ladder) {
+    Json errors = Json::object();
+    for (const HeldOutError& e : r.errors)
+      errors[e.channel] = {{"rms", e.rms}, {"low", e.low}, {"high", e.high}, {"by_type", e.by_type}};
+    ladder.push_back({{"added", r.added}, {"held_out", errors}});
+  }
+  for (const Validation::Control& c : v.controls)
+    controls.push_back(
+        {{"effect", c.effect}, {"channel", c.channel}, {"gain", c.gain}, {"best_of_shifted", c.best_of_shifted}});
+  for (const Validation::Agreement& a : v.agreements)
+    agreements.push_back({{"name", a.name}, {"value", a.value}, {"sd", a.sd}, {"p_value", a.p_value}});
+  return {{"ladder", ladder}, {"controls", controls}, {"agreements", agreements}};
+}
+
 }  // namespace
 
 std::vector<SizeEstimate> sizes_of(const ScoredHypothesis& hypothesis, const sim::Randomisation& uncertain) {
@@ -93,11 +109,8 @@ std::string unit_of(const std::string& name) {
     const std::size_t cut = rest.rfind('_');
     const std::string word = cut == std::string::npos ? rest : rest.substr(cut + 1);
     const auto unit = std::ranges::find_if(kUnits, [&](const auto& u) { return u.first == word; });
-    if (cut == std::string::npos) {
-      if (word == "per" && !units.empty()) units.insert(units.begin(), "1");
-      break;
-    }
-    if (unit == std::end(kUnits)) break;
+    if (word == "per" && !units.empty()) units.insert(units.begin(), "1");
+    if (cut == std::string::npos || unit == std::end(kUnits)) break;
     units.insert(units.begin(), unit->second);
     rest = rest.substr(0, cut);
   }
@@ -111,6 +124,8 @@ Report verdict_report_of(const std::vector<PredictedFlight>& flights, const sim:
   Report r;
   r.complete = d.complete;
   r.conclusion = d.conclusion;
+  r.validation = d.validation;
+  r.untestable = d.untestable;
   const RowContext around = row_context_of(flights, d.noise_sd);
   r.noise_floor = huber_floor();
   const Losses refit = losses_of(around, d.refit);
@@ -258,6 +273,8 @@ Json diagnosis_json(const Report& r) {
                                                   {"course_step_s", kCourseStep_s},
                                                   {"courses", courses}})
                                           : Json(nullptr)}};
+  if (!r.untestable.empty()) json["cannot_be_tested"] = r.untestable;
+  if (r.validation) json["validation"] = validation_json(*r.validation);
   if (!r.complete) json["complete"] = false;
   return json;
 }

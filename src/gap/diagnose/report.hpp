@@ -68,6 +68,8 @@ struct Report {
   double noise_floor = 0;
   std::optional<Closure> closure;
   std::vector<double> over_noise[3];  ///< by stage: rms of residual over noise, [channel], 0 where there is none
+  std::optional<Validation> validation;
+  std::vector<std::string> untestable;
   std::vector<ClosedLoop> closed_loop;
   std::optional<NextExperiment> next;  ///< none where no two hypotheses are left
 };

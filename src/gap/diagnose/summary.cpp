@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "flightlog/check/check_parts.hpp"
+#include "io/config.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -45,12 +46,14 @@ std::string verdict_line(const Conclusion& c) {
   return "";
 }
 
-std::string next_line(const Conclusion& c, const std::string& out) {
+std::string next_line(const Report& r, const std::string& out) {
+  const Conclusion& c = r.conclusion;
   const std::string vehicle =
       (out.empty() ? "DIR" : std::filesystem::absolute(out).lexically_normal().string()) + "/vehicle_corrected.toml";
   switch (c.kind) {
     case Conclusion::Kind::effect:
     case Conclusion::Kind::parameters:
+      if (r.validation) return "next: ask new flights with what was found, --vehicle " + vehicle;
       return "next: train or fly on what was found, as with flappy-train CONFIG --set vehicle=" + vehicle;
     case Conclusion::Kind::group:
       return "next: fly so that these differ, and diagnose old and new flights together";
@@ -119,7 +122,7 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     for (std::size_t i = 0; i < r.faults.size() && i + 3 < kSummaryLines; ++i)
       lines.push_back(
           flightlog::format("  %s:%zu: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
-    lines.push_back(next_line(r.conclusion, out));
+    lines.push_back(next_line(r, out));
     return lines;
   }
   std::vector<const Reported*> ranked;
@@ -182,6 +185,23 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     lines.push_back("beside what the headers declare (90 %):");
     for (std::size_t i = 0; i < r.sensors.size() && i < kSensors; ++i) lines.push_back(sensor_line(r.sensors[i]));
   }
+  if (!r.untestable.empty()) lines.push_back("cannot be tested on these logs: " + io::joined(r.untestable));
+  if (r.validation) {
+    std::string head = "rms in flights held out (in kinds of flights):";
+    for (const HeldOutError& e : r.validation->ladder.front().errors)
+      head += flightlog::format(" %18s", e.channel.c_str());
+    lines.push_back(head);
+    for (const Validation::Rung& rung : r.validation->ladder) {
+      std::string line = flightlog::format(
+          "  %-44s",
+          ((&rung == &r.validation->ladder.front() || rung.added == "parameters" ? "" : "+ ") + rung.added).c_str());
+      for (const HeldOutError& e : rung.errors) line += flightlog::format("  %8.3f (%6.3f)", e.rms, e.by_type);
+      lines.push_back(line);
+    }
+    for (const Validation::Control& c : r.validation->controls)
+      lines.push_back(flightlog::format("  %-24s takes %4.1f %% off %s; shifted in time, at best %4.1f %%",
+                                        c.effect.c_str(), 100 * c.gain, c.channel.c_str(), 100 * c.best_of_shifted));
+  }
   if (const ClosedLoop* c = most_corrected(r.closed_loop))
     lines.push_back(
         flightlog::format("in closed loop, %s: %s recorded %.3g, by the vehicle's file %.3g, by the corrected one %.3g",
@@ -191,7 +211,7 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     lines.push_back(flightlog::format("%s and %s differ most in configs/gap/experiments/%s.toml (%.3g nats expected)",
                                       r.next->separates.front().c_str(), r.next->separates.back().c_str(),
                                       r.next->manoeuvre.c_str(), r.next->expected_nats));
-  lines.push_back(r.complete ? next_line(r.conclusion, out) : "next: the same command again, to its end");
+  lines.push_back(r.complete ? next_line(r, out) : "next: the same command again, to its end");
   return lines;
 }
 

@@ -24,10 +24,10 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
             gain.number("further_screened_nats", kNats), gain.number("vanished_size", kPositive),
             gain.strings("of_models")};
   for (const std::string& id : r.gain.of_models)
-    if (model::effect_index(id.c_str()) < 0)
-      gain.fail("of_models", "no effect \"" + id + "\"", "identifiers of docs/effects.md");
+    if (!model::is_effect(id)) gain.fail("of_models", "no effect \"" + id + "\"", "identifiers of docs/effects.md");
   r.unknown = {root.table("unknown").number("freeing_nats", kNats)};
-  r.refutation = {root.table("refutation").number("share_of_gap", kNats)};
+  const io::Table refutation = root.table("refutation");
+  r.refutation = {refutation.number("share_of_gap", kNats), refutation.number_or("least_share", 0, kShare)};
   const io::Table interval = root.table("interval");
   r.interval = {interval.number("sd_factor", kPositive), interval.number("size_error", kNats)};
   const io::Table doubt = root.table("doubt");

@@ -23,6 +23,7 @@ struct VerdictRule {
   } unknown;
   struct Refutation {
     double share_of_gap;
+    double least_share;  ///< of what smooth functions of the regime take away in flights held out; 0: not asked
   } refutation;
   struct Interval {
     double sd_factor, size_error;

@@ -49,7 +49,7 @@ Evidence::Evidence(const std::vector<PredictedFlight>& flights, ModelDiscrepancy
       double sum = 0, n = 0;
       for (const PredictedFlight& f : flights)
         for (std::size_t j = 0; j < f.beats(); ++j)
-          if (f.covers(j, channel)) sum += f.signal()[row_of(j, g)] * f.signal()[row_of(j, g)], n += 1;
+          if (f.covers(j, channel) && has_rows(g)) sum += f.signal()[row_of(j, g)] * f.signal()[row_of(j, g)], n += 1;
       groups_[static_cast<std::size_t>(g)].signal = n > 0 ? sum / n : 0;
       all += groups_[static_cast<std::size_t>(g)].signal / kCoefficients;
     }
@@ -88,6 +88,23 @@ void Evidence::learn_noise(const Residuals& residual) {
   sum_basis();
 }
 
+void Evidence::learn_remainder(const Residuals& residual) {
+  find_noise(residual, Find::remainder);
+  sum_basis();
+  scales_ = {1, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
+  held_ = true;
+}
+
+Residuals Evidence::without(Residuals residual, const BasisCoefficients& change) const {
+  for (std::size_t f = 0; f < residual.size(); ++f)
+    for (int g = 0; g < kGroups; ++g) {
+      if (!has_rows(g)) continue;
+      const VectorXd smooth = basis_.values(f) * change.row(g).transpose();
+      for (std::size_t j = 0; j < flights_[f].beats(); ++j) residual[f][row_of(j, g)] -= smooth[static_cast<Index>(j)];
+    }
+  return residual;
+}
+
 /// Calls use(beat, whether the one before it counts) for the beats of a flight that a channel covers.
 template <class Use>
 void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
@@ -105,7 +122,7 @@ void Evidence::find_noise(const Residuals& residual, Find what) {
   io::parallel_for(static_cast<std::size_t>(kGroups), threads_, [&](std::size_t k) {
     const int g = static_cast<int>(k);
     const int channel = g / kCoefficients;
-    if (!has_rows(channel, g % kCoefficients)) return;
+    if (!has_rows(g)) return;
     VectorXd right = VectorXd::Zero(q);
     double n = 0;
     for (std::size_t f = 0; f < flights_.size(); ++f)
@@ -114,7 +131,9 @@ void Evidence::find_noise(const Residuals& residual, Find what) {
         n += 1;
       });
     if (n == 0) return;
-    const VectorXd delta = plain_inverse_[static_cast<std::size_t>(channel)] * right;
+    const VectorXd delta = what == Find::remainder
+                               ? VectorXd(VectorXd::Zero(q))
+                               : VectorXd(plain_inverse_[static_cast<std::size_t>(channel)] * right);
     const auto left = [&](std::size_t f, std::size_t j) {
       return residual[f][row_of(j, g)] - basis_.values(f).row(static_cast<Index>(j)).dot(delta);
     };
@@ -168,7 +187,7 @@ void Evidence::sum_basis() {
   for (std::size_t f = 0; f < flights_.size(); ++f) {
     const MatrixXd& basis = basis_.values(f);
     for (int g = 0; g < kGroups; ++g) {
-      if (!has_rows(g / kCoefficients, g % kCoefficients)) continue;
+      if (!has_rows(g)) continue;
       MatrixXd rows(static_cast<Index>(flights_[f].beats()), q);
       Index n = 0;
       for_whitened(f, g, [&](std::size_t j, double now, double past) {
@@ -208,7 +227,7 @@ SufficientStatistics Evidence::statistics(const Residuals& residual) const {
   for (std::size_t f = 0; f < flights_.size(); ++f) {
     const MatrixXd& basis = basis_.values(f);
     for (int g = 0; g < kGroups; ++g) {
-      if (!has_rows(g / kCoefficients, g % kCoefficients)) continue;
+      if (!has_rows(g)) continue;
       VectorXd& sum = s.sums[f][static_cast<std::size_t>(g)];
       for_whitened(f, g, [&](std::size_t j, double now, double past) {
         const auto i = static_cast<Index>(j);

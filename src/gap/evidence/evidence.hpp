@@ -109,6 +109,10 @@ class Evidence {
   void set_discrepancy(ModelDiscrepancy discrepancy) { discrepancy_ = std::move(discrepancy); }
   /// Those that every model of this robot has from now on.
   void set_scales(const Scales& scales) { scales_ = scales; }
+  /// From now on all of a residual is noise, smooth or not, and no hypothesis finds scales of its own, but for blocks that are free.
+  void learn_remainder(const Residuals& residual);
+  /// A residual less what columns of such coefficients make of it, as far as they are smooth.
+  Residuals without(Residuals residual, const BasisCoefficients& change) const;
   const Scales& scales() const { return scales_; }
   static int block_of(int group, BasisFunction function);
   /// Of the chosen columns, whose theta has the given prior means and sd 1.
@@ -124,10 +128,11 @@ class Evidence {
     double sd = 1, past = 0, signal = 0;
     double least_sd = 0;  ///< as declared
   };
+  bool has_rows(int group) const { return flights_.front().has_rows(group / kCoefficients, group % kCoefficients); }
   void sum_basis();
   std::pair<Eigen::MatrixXd, Eigen::VectorXd> sums_of(const SufficientStatistics& residual,
                                                       const std::vector<char>& use, int group) const;
-  enum class Find { declared, weights, noise };
+  enum class Find { declared, weights, noise, remainder };
   void find_noise(const Residuals& residual, Find what);
   template <class Use>
   void for_rows(std::size_t flight, int channel, const Use& use) const;
@@ -143,6 +148,7 @@ class Evidence {
   int threads_;
   RegimeBasis basis_;
   std::vector<Group> groups_;
+  bool held_ = false;
   Scales scales_{1, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
   Residuals weights_;
   std::vector<Eigen::MatrixXd> plain_inverse_;        ///< of basis x basis, by channel

@@ -46,7 +46,9 @@ std::vector<Residuals> residuals(const std::vector<PredictedFlight>& flights, co
   // candidates whose sensors agree share a log
   std::map<EffectValues, std::vector<std::size_t>> by_sensors;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    EffectValues sensors = sensor_effects(candidates[i].vehicle.effects);
+    // a vehicle that is known by the beat has its sensors in its prediction
+    EffectValues sensors =
+        candidates[i].vehicle.beat_averaged ? EffectValues() : sensor_effects(candidates[i].vehicle.effects);
     sensors.insert(candidates[i].sensors.begin(), candidates[i].sensors.end());
     by_sensors[sensors].push_back(i);
   }

@@ -19,12 +19,14 @@ constexpr double kHalf90 = 1.645;
 double Unknown::value(double coordinate) const { return std::clamp(centre + scale * coordinate, low, high); }
 
 std::vector<Unknown> unknowns_of(const std::string& effect) {
-  const int index = model::effect_index(effect.c_str());
-  const model::EffectEntry& entry = model::effects()[static_cast<std::size_t>(index)];
+  return unknowns_of(model::effects()[static_cast<std::size_t>(model::effect_index(effect.c_str()))]);
+}
+
+std::vector<Unknown> unknowns_of(const model::EffectEntry& entry) {
   std::vector<Unknown> list;
   for (std::size_t k = 0; k < entry.parameters.size(); ++k) {
     const model::EffectParameter& p = entry.parameters[k];
-    Unknown u{effect, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < entry.info.sizes};
+    Unknown u{entry.info.id, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < entry.info.sizes};
     if (u.size) u.scale = std::max(-p.prior_low, p.prior_high) / kHalf90;
     else u.centre = p.typical, u.scale = (p.prior_high - p.prior_low) / (2 * kHalf90);
     list.push_back(std::move(u));
@@ -39,7 +41,17 @@ Hypothesis::Hypothesis(const sim::Randomisation& uncertain, std::vector<std::str
                          uncertain.is_uniform(d) ? 1.0 : kFarthest, false});
   unknowns_.push_back({"", "imu.latency_s", 0, kImuLagSd_s, -kFarthest * kImuLagSd_s, kFarthest * kImuLagSd_s, false});
   for (const std::string& e : effects_)
-    for (Unknown& u : unknowns_of(e)) unknowns_.push_back(std::move(u));
+    for (Unknown& u : unknowns_of(*model::find_effect(uncertain.nominal(), e))) unknowns_.push_back(std::move(u));
+}
+
+Eigen::VectorXd Hypothesis::start(const model::Vehicle& vehicle) const {
+  Eigen::VectorXd at = Eigen::VectorXd::Zero(size());
+  const auto& own = vehicle.effects;
+  for (Eigen::Index i = shared(); i < size(); ++i) {
+    const Unknown& u = unknowns_[static_cast<std::size_t>(i)];
+    if (const auto effect = own.find(u.effect); effect != own.end()) at[i] = u.coordinate(effect->second.at(u.name));
+  }
+  return at;
 }
 
 Eigen::VectorXd Hypothesis::bounded(Eigen::VectorXd coordinates) const {

@@ -8,8 +8,12 @@
 #include <utility>
 #include <vector>
 
-#include "gap/replay/reset_prediction.hpp"
+#include "gap/replay/predicted_flight.hpp"
 #include "sim/randomise.hpp"
+
+namespace flappy::model {
+struct EffectEntry;
+}
 
 namespace flappy::gap {
 
@@ -36,8 +40,9 @@ class Hypothesis {
   Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->majors()); }
   Eigen::Index lag() const { return parameters(); }
   Eigen::Index shared() const { return parameters() + 1; }
-  /// Sizes start at 0, shapes in the middle of their range.
-  Eigen::VectorXd start() const { return Eigen::VectorXd::Zero(size()); }
+  /// Where a vehicle has an effect, its figures there; else sizes start at 0, shapes in the middle of their range.
+  Eigen::VectorXd start(const model::Vehicle& vehicle) const;
+  Eigen::VectorXd start() const { return start(uncertain_->nominal()); }
   /// Into the accepted ranges.
   Eigen::VectorXd bounded(Eigen::VectorXd coordinates) const;
 
@@ -52,6 +57,8 @@ class Hypothesis {
 };
 
 /// What an effect of the catalogue leaves free: its sizes first.
+std::vector<Unknown> unknowns_of(const model::EffectEntry& entry);
+/// Of one that acts within the beat.
 std::vector<Unknown> unknowns_of(const std::string& effect);
 
 }  // namespace flappy::gap

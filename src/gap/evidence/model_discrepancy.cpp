@@ -85,7 +85,8 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
     text += "\n";
   }
   text += std::string(kSpread) + "[spread]\nrobot_sd = " + number(d.spread.robot_sd) +
-          "\nblock_freedom = " + number(d.spread.block_freedom) + "\n\n" + kSensors +
+          "\nblock_freedom = " + number(d.spread.block_freedom) +
+          (d.spread.beside_all ? "\nbeside_all = true\n\n" : "\n\n") + kSensors +
           "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") + "  # as it is mounted, about each axis\n" +
           "imu_place_m = " + sensor("imu_place") + "  # along each axis\npower_latency_s = " + sensor("power_delay") +
           "  # of a sample that is an instant, a mean, or held\n\n" + kBackground + "[background_sd]\n";
@@ -99,11 +100,14 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   root.schema(1);
   ModelDiscrepancy d;
   const io::Table spread = root.table("spread");
-  d.spread = {spread.number("robot_sd", io::positive()), spread.number("block_freedom", io::positive())};
+  d.spread = {spread.number("robot_sd", io::positive()), spread.number("block_freedom", io::positive()),
+              spread.boolean_or("beside_all", false)};
   d.form_error = root.number("form_error", io::non_negative());
 
   for (int channel = 0; channel < kChannels; ++channel) {
-    const io::Table table = root.table("share").table(channel_name(channel));
+    const io::Table share = root.table("share");
+    const io::Table table =
+        share.table(share.has(channel_name(channel)) || !share.has("all") ? channel_name(channel) : "all");
     auto& shares = d.shares[static_cast<std::size_t>(channel)];
     for (const auto& [function, key] : kKeys) {
       const std::vector<double> by_harmonic = table.numbers(key, kHarmonics + 1, io::positive());
@@ -111,18 +115,19 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
     }
   }
 
-  const io::Table sensors = root.table("sensors");
+  const auto sensors = root.optional_table("sensors");
   const auto axes = [&](const char* id, const char* unit, double sd) {
     for (const char* axis : {"x_", "y_", "z_"}) d.nuisances.push_back({id, std::string(axis) + unit, sd});
   };
-  axes("imu_mounting", "rad", sensors.number("imu_rotation_rad", io::positive()));
-  axes("imu_place", "m", sensors.number("imu_place_m", io::positive()));
-  d.nuisances.push_back({"power_delay", "delay_s", sensors.number("power_latency_s", io::positive())});
+  if (sensors) {
+    axes("imu_mounting", "rad", sensors->number("imu_rotation_rad", io::positive()));
+    axes("imu_place", "m", sensors->number("imu_place_m", io::positive()));
+    d.nuisances.push_back({"power_delay", "delay_s", sensors->number("power_latency_s", io::positive())});
+  }
   const io::Table background = root.table("background_sd");
   d.background["other"] = background.number("other", io::positive());
   for (const std::string& key : background.keys())
-    if (key == "other" || model::effect_index(key.c_str()) >= 0)
-      d.background[key] = background.number(key, io::positive());
+    if (key == "other" || model::is_effect(key)) d.background[key] = background.number(key, io::positive());
   root.finish();
   return d;
 }

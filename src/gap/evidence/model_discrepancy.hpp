@@ -8,26 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "gap/replay/reset_prediction.hpp"
+#include "gap/replay/predicted_flight.hpp"
 #include "io/installation.hpp"
 
 namespace flappy::gap {
-
-/// Kinds of functions of the regime (gap/evidence/evidence.hpp).
-enum class BasisFunction {
-  constant,
-  input,
-  rate,
-  product,
-  place,
-  velocity_x,
-  velocity_y,
-  velocity_z,
-  drag_x,
-  drag_y,
-  drag_z,
-  count
-};
 
 /// Functions that models get wrong together.
 enum class Regimes { always, inputs, velocity, place, count };
@@ -39,6 +23,8 @@ struct ModelDiscrepancy {
   /// left has heavy tails. What every vehicle has of an entry is the more, too, the more models of it are off.
   struct Spread {
     double robot_sd, block_freedom;
+    bool
+        beside_all;  ///< what models are off by is what is left beside every entry together, and the same for every hypothesis
   } spread{};
   /// How well an entry's equation describes the effect of its name: sd of every coefficient as a share of its own.
   double form_error = 0;

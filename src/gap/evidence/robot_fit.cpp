@@ -12,6 +12,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kMostRounds = 5;
+/// Noise and what it lets the catalogue explain, by turns.
+constexpr int kRemainderRounds = 3;
 /// Nats that another round has to bring; and that a round may lose, as lines are no curves.
 constexpr double kWorthwhile = 2;
 
@@ -34,7 +36,7 @@ void RobotFit::fit_parameters() {
   parameters_ = fitter_.fit(plain_, plain_.start(), 4);
   evidence_.learn_noise(parameters_.point.residual);
   parameters_.point.statistics = evidence_.statistics(parameters_.point.residual);
-  learn_scales();
+  take_scales(plain_, parameters_.point);
   parameters_ = fitter_.refit(plain_, parameters_, 6);
   nominal_.statistics = evidence_.statistics(nominal_.residual);
 }
@@ -43,9 +45,10 @@ void RobotFit::refit_beside_background() {
   find_sizes();
   find_lines();
   set_background();
-  learn_scales();
+  if (evidence_.discrepancy().spread.beside_all) learn_remainder();
+  take_scales(plain_, parameters_.point);
   parameters_ = fitter_.refit(plain_, parameters_, 4);
-  learn_scales();
+  take_scales(plain_, parameters_.point);
   for (int round = 0; round < kMostRounds && fly_minors(); ++round) continue;
 }
 
@@ -66,11 +69,11 @@ bool RobotFit::fly_minors() {
   };
   take(there, parameters_);
   parameters_ = fitter_.fit(plain_, parameters_.mean(), parameters_, 6);
-  learn_scales();
+  take_scales(plain_, parameters_.point);
   const double gain = log_evidence() - before;
   if (gain < -kWorthwhile) {
     take(minors, parameters);
-    learn_scales();
+    take_scales(plain_, parameters_.point);
   }
   return gain > kWorthwhile;
 }
@@ -89,15 +92,34 @@ void RobotFit::set_background() {
   fitter_.set_background(lines(), background, parameters_);
 }
 
-void RobotFit::learn_scales() {
-  evidence_.set_scales(weigh(plain_, parameters_.point).scales);
+/// What is left beside every size of the catalogue together is noise to every hypothesis.
+void RobotFit::learn_remainder() {
+  for (int round = 0; round < kRemainderRounds; ++round) {
+    Columns c = Fitter::own_columns_of(parameters_.point);
+    for (const SizeColumn& s : sizes_) c.add(s.change, 0);
+    const Posterior p =
+        Evidence::posterior(evidence_.reduce(evidence_.statistics(parameters_.point.residual), c.columns,
+                                             fitter_.all_flights(), evidence_.discrepancy_sd()),
+                            c.chosen, c.mean());
+    BasisCoefficients all = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
+    for (std::size_t k = 0; k < c.columns.size(); ++k) all += p.mean[static_cast<Eigen::Index>(k)] * *c.columns[k];
+    evidence_.learn_remainder(evidence_.without(parameters_.point.residual, all));
+  }
+  parameters_.point.statistics = evidence_.statistics(parameters_.point.residual);
+  nominal_.statistics = evidence_.statistics(nominal_.residual);
   fitter_.take_scale();
 }
 
-Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, std::optional<double> freeing_nats) const {
+void RobotFit::take_scales(const Hypothesis& hypothesis, const Linearised& at) {
+  evidence_.set_scales(weigh(hypothesis, at).scales);
+  fitter_.take_scale();
+}
+
+Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, const Scales& start,
+                        std::optional<double> freeing_nats) const {
   const Columns c = fitter_.unscaled_columns_of(at);
   return evidence_.weigh(at.statistics, c.columns, c.mean(), c.with_robot, fitter_.all_flights(),
-                         fitter_.form_error(hypothesis, at), evidence_.scales(), freeing_nats);
+                         fitter_.form_error(hypothesis, at), start, freeing_nats);
 }
 
 std::vector<SensorFinding> RobotFit::sensors(const Hypothesis& hypothesis, const Fit& fit) const {
@@ -143,9 +165,9 @@ void RobotFit::find_sizes() {
     i += s.shaped.size();
     for (std::size_t n = 0; n < s.further.size(); ++n) along.push_back(changes[i++]);
     if (along[0].size() == 0) continue;
-    sizes_.push_back({s.effect, s.unknown, along[0] / kSizeReach, {}});
+    sizes_.push_back({s, along[0] / kSizeReach, {}});
     for (std::size_t k = shapes; k < shapes + s.shaped.size(); ++k)
-      if (changes[k].size() > 0) shapes_.push_back({s.effect, s.unknown, (changes[k] - along[0]) / kSizeReach, {}});
+      if (changes[k].size() > 0) shapes_.push_back({s, (changes[k] - along[0]) / kSizeReach, {}});
     for (std::size_t n = 1; n + 1 < along.size() && along[n].size() > 0 && along[n + 1].size() > 0; ++n) {
       const double at = kSizeReach * static_cast<double>(n + 1);
       sizes_.back().large.push_back({at, along[n] / at, (along[n + 1] - along[n - 1]) / (2 * kSizeReach)});

@@ -43,11 +43,17 @@ class RobotFit {
   /// What sensors are off by beyond their headers, given a fit.
   std::vector<SensorFinding> sensors(const Hypothesis& hypothesis, const Fit& fit) const;
 
-  /// A hypothesis, with scales of its own.
-  Weighed weigh(const Hypothesis& hypothesis, const Linearised& at, std::optional<double> freeing_nats = {}) const;
+  /// From now on models of this robot are off by what they are beside a fit.
+  void take_scales(const Hypothesis& hypothesis, const Linearised& at);
+  /// A hypothesis, with scales of its own, looked for from `start` on.
+  Weighed weigh(const Hypothesis& hypothesis, const Linearised& at, const Scales& start,
+                std::optional<double> freeing_nats = {}) const;
+  Weighed weigh(const Hypothesis& hypothesis, const Linearised& at, std::optional<double> freeing_nats = {}) const {
+    return weigh(hypothesis, at, evidence_.scales(), freeing_nats);
+  }
 
  private:
-  void learn_scales();
+  void learn_remainder();
   void find_sizes();
   void find_lines();
   void set_background();

@@ -26,10 +26,10 @@ class Screening {
     base_ = c.chosen;
     for (const SizeColumn& column : columns) {
       at_.push_back(static_cast<int>(c.columns.size()));
-      c.add(column.change, 0);
+      c.add(column.change, -column.from);
       for (const SizeColumn::Large& large : column.large) {
         c.add(large.chord, 0);
-        c.add(large.change, -large.at);
+        c.add(large.change, -column.from - large.at);
       }
     }
     reduced_ = evidence.reduce(fit.point.statistics, c.columns, fitter.all_flights(), evidence.discrepancy_sd());
@@ -75,17 +75,15 @@ class Screening {
   }
 
   Screened around(const std::string& effect, std::vector<Size> own, const Reduced& reduced) const {
-    const std::vector<Unknown> unknowns = unknowns_of(effect);
-    const auto one_sided = [&](const Size& s) {
-      return unknowns[static_cast<std::size_t>(columns_[s.column].unknown)].low >= 0;
-    };
-    Screened s{effect, 0, VectorXd::Zero(static_cast<Index>(unknowns.size()))};
+    const auto one_sided = [&](const Size& s) { return columns_[s.column].one_sided; };
+    Screened s{effect, 0, VectorXd::Zero(columns_[own.front().column].unknowns)};
+    for (const Size& size : own) s.coordinates[columns_[size.column].unknown] = columns_[size.column].from;
     for (bool whole = true; !own.empty(); whole = false) {
       std::vector<int> chosen = base_;
       for (const Size& size : own) chosen.push_back(size.at);
       const Posterior p = Evidence::posterior(reduced, chosen, mean_(chosen));
       const auto at = [&](std::size_t k) { return static_cast<Index>(base_.size() + k); };
-      const auto coordinate = [&](std::size_t k) { return own[k].from + p.mean[at(k)]; };
+      const auto coordinate = [&](std::size_t k) { return columns_[own[k].column].from + own[k].from + p.mean[at(k)]; };
       if (whole) {
         s.gain = p.log_evidence - without_;
         for (std::size_t k = 0; k < own.size(); ++k)
@@ -116,24 +114,26 @@ class Screening {
 std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const VectorXd& at,
                                  const std::vector<std::string>& withheld) {
   std::vector<SizeStep> steps;
-  for (const model::EffectEntry& e : model::effects()) {
+  const model::Vehicle now = Hypothesis(uncertain, {}).candidate(at).vehicle;
+  for (const model::EffectEntry& e : model::catalogue_of(uncertain.nominal())) {
     const std::string id = e.info.id;
     if (std::ranges::count(withheld, id)) continue;
     const Hypothesis h(uncertain, {id});
     const Index first = at.size();
-    VectorXd here = h.start();
+    VectorXd here = h.start(now);
     here.head(first) = at;
     for (Index i = first; i < h.size(); ++i) {
       if (!h.unknowns()[static_cast<std::size_t>(i)].size) continue;
       VectorXd there = here;
-      there[i] = kSizeReach;
-      steps.push_back({id, i - first, h.candidate(there), {}, {}});
-      for (std::size_t n = 2; n <= kFurthest && h.unknowns()[static_cast<std::size_t>(i)].low >= 0; ++n) {
-        there[i] = kSizeReach * static_cast<double>(n);
+      there[i] += kSizeReach;
+      const bool one_sided = h.unknowns()[static_cast<std::size_t>(i)].low >= 0;
+      steps.push_back({{id, i - first, h.size() - first, one_sided, here[i]}, h.candidate(there), {}, {}});
+      for (std::size_t n = 2; n <= kFurthest && one_sided; ++n) {
+        there[i] = here[i] + kSizeReach * static_cast<double>(n);
         if (h.bounded(there)[i] != there[i]) break;
         steps.back().further.push_back(h.candidate(there));
       }
-      there[i] = kSizeReach;
+      there[i] = here[i] + kSizeReach;
       for (Index shape = first; shape < h.size(); ++shape) {
         if (h.unknowns()[static_cast<std::size_t>(shape)].size) continue;
         VectorXd other = there;

@@ -5,10 +5,16 @@
 
 namespace flappy::gap {
 
-/// A size of an effect a step of kSizeReach away from 0, with all else as it was.
-struct SizeStep {
+/// A size of an effect.
+struct EffectSize {
   std::string effect;
-  Eigen::Index unknown;  ///< of the effect's
+  Eigen::Index unknown, unknowns;  ///< which of the effect's, and how many it has
+  bool one_sided;
+  double from;  ///< coordinate that the vehicle's file gives it
+};
+
+/// A size a step of kSizeReach away from that, with all else as it was.
+struct SizeStep : EffectSize {
   Candidate candidate;
   std::vector<Candidate> shaped;   ///< the same with each of its shapes a standard deviation away
   std::vector<Candidate> further;  ///< of a size of one sign: two steps away, three, .. kFurthest
@@ -20,14 +26,12 @@ inline constexpr double kSizeReach = 0.4;
 std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
                                  const std::vector<std::string>& withheld);
 
-/// What a size changes for a unit of its coordinate, near 0; and where it is large, as a delay of a third of a beat turns what a smaller
+/// What a size changes for a unit of its coordinate, near the file's; and where it is large, as a delay of a third of a beat turns what a smaller
 /// one does into something else.
-struct SizeColumn {
-  std::string effect;
-  Eigen::Index unknown;
+struct SizeColumn : EffectSize {
   BasisCoefficients change;
   struct Large {
-    double at;                        ///< coordinate
+    double at;                        ///< coordinate beyond the file's
     BasisCoefficients chord, change;  ///< on the way there, and there
   };
   std::vector<Large> large;

@@ -153,7 +153,7 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
               BasisCoefficients::Zero(kGroups, q)};
     double thought = -0.5 * std::pow(std::log(now.robot) / discrepancy_.spread.robot_sd, 2);
     for (std::size_t b = 0; b < kBlocks; ++b)
-      if (counts[b] > 0) thought += now.free[b] ? -*freeing_nats : log_prior(now.blocks[b], now.robot, nu);
+      if (counts[b] > 0) thought += now.free[b] ? -*freeing_nats : held_ ? 0 : log_prior(now.blocks[b], now.robot, nu);
     w.posterior.log_evidence += thought;
     const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
     if (!(gain > 0)) {  // too far: from the best on, by a step that cannot fail
@@ -180,7 +180,7 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
     });
     const VectorXd w_mean = w.posterior.mean, w_variance = w.posterior.covariance.diagonal();
     best = std::move(w);
-    if (gain < kSettled) break;
+    if (gain < kSettled || (held_ && !freeing_nats)) break;
     stride = std::min(kLongest, kLonger * stride);
     next = best.scales;
     std::vector<double> total(kBlocks, 0);
@@ -193,21 +193,23 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
     for (std::size_t b = 0; b < kBlocks; ++b) {
       if (counts[b] == 0) continue;
       const double n = counts[b], f2 = next.robot * next.robot;
-      const double usual2 = (total[b] + nu * f2) / (n + nu);
+      const double usual2 = held_ ? scales_.blocks[b] * scales_.blocks[b] : (total[b] + nu * f2) / (n + nu);
       next.blocks[b] = std::sqrt(usual2);
       next.free[b] = 0;
       if (freeing_nats) {
         const double free2 = std::max(total[b] / n, kLeastFree * kLeastFree * f2);
         const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };
-        if (objective(free2) - *freeing_nats > objective(usual2) + log_prior(std::sqrt(usual2), next.robot, nu)) {
+        const double usual = held_ ? 0 : log_prior(std::sqrt(usual2), next.robot, nu);
+        if (objective(free2) - *freeing_nats > objective(usual2) + usual) {
           next.blocks[b] = std::sqrt(free2);
           next.free[b] = 1;
         }
       }
       if (!next.free[b]) blocks += 1, inverses += 1 / (next.blocks[b] * next.blocks[b]);
     }
-    next.robot =
-        robot_of(nu, blocks, inverses, static_cast<double>(k - first_scaled), scaled, discrepancy_.spread.robot_sd);
+    if (!held_)
+      next.robot =
+          robot_of(nu, blocks, inverses, static_cast<double>(k - first_scaled), scaled, discrepancy_.spread.robot_sd);
     now = strided(best.scales, next, stride);
   }
   return best;

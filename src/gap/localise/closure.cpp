@@ -47,7 +47,7 @@ Losses losses_of(const RowContext& around, const Residuals& residual) {
         if (!around.covers(f, j, channel)) continue;
         double sum = 0, n = 0;
         for (int c = 0; c < kCoefficients; ++c) {
-          if (!has_rows(channel, c)) continue;
+          if (!around.has_rows(channel, c)) continue;
           const std::size_t g = group_of(channel, c);
           sum += huber_loss(residual[f][j * kRowsPerBeat + g] / around.noise_sd[g]);
           n += 1;

@@ -65,7 +65,7 @@ class ChannelRows {
     const std::vector<double> all(beats_.size(), 1);
     add_cell("channel", "all", all, 0, kCoefficients, places);
     for (const Quantity& q : around_.regimes) test_thirds(q, places);
-    if (has_rows(channel_, 1))
+    if (around_.has_rows(channel_, 1))
       for (int h = 0; h <= kHarmonics; ++h)
         add_cell("phase", h == 0 ? "mean of the beat" : "harmonic " + std::to_string(h) + " of the beat", all,
                  h == 0 ? 0 : 2 * h - 1, h == 0 ? 1 : 2 * h + 1, places);
@@ -88,7 +88,7 @@ class ChannelRows {
     int tests = 0;
     for (const double i : in) n += i;
     for (int c = first; c < last; ++c) {
-      if (!has_rows(channel_, c)) continue;
+      if (!around_.has_rows(channel_, c)) continue;
       const std::vector<double>& y = rows_[static_cast<std::size_t>(c)];
       for (std::size_t i = 0; i < y.size(); ++i) squares += share_of(c) * in[i] * y[i] * y[i] / n;
       noise += share_of(c) * noise_sd(c) * noise_sd(c);
@@ -187,7 +187,7 @@ class ChannelRows {
     double explained = 0, noise = 0, least_p = 1;
     int tests = 0;
     for (int c = 0; c < kCoefficients; ++c) {
-      if (!has_rows(channel_, c)) continue;
+      if (!around_.has_rows(channel_, c)) continue;
       std::vector<double> y = rows_[static_cast<std::size_t>(c)];
       double offset = 0;
       for (const double v : y) offset += v / n;
@@ -230,48 +230,28 @@ const char* channel_unit(int channel) {
 RowContext row_context_of(const std::vector<PredictedFlight>& flights, std::vector<double> noise_sd) {
   RowContext s;
   s.noise_sd = std::move(noise_sd);
-  const auto quantity = [&](const char* name, const char* unit, auto&& value) {
-    Quantity q{name, unit, {}};
-    for (const PredictedFlight& f : flights) {
-      q.values.emplace_back();
-      for (const Regime& r : f.recording().regimes) q.values.back().push_back(value(f.recording(), r));
-    }
-    return q;
-  };
   for (const PredictedFlight& f : flights) {
     s.beats.push_back(f.beats());
-    s.beats_Hz.push_back(f.recording().log.header.flapping_Hz);
+    s.beats_Hz.push_back(f.beats_Hz());
     s.covered.emplace_back();
     for (std::size_t j = 0; j < f.beats(); ++j)
       for (int channel = 0; channel < kChannels; ++channel) s.covered.back().push_back(f.covers(j, channel) ? 1 : 0);
   }
-  using R = const Recording&;
-  using B = const Regime&;
-  s.regimes = {
-      quantity("height", "m", [](R r, B b) { return b.position_m.z() - r.world.ground_z_m; }),
-      quantity("speed", "m/s", [](R, B b) { return b.velocity_B_m_s.norm(); }),
-      quantity("amplitude", "V", [](R, B b) { return b.amplitude_V; }),
-      quantity("body rate", "rad/s", [](R, B b) { return b.rate_rad_s.norm(); }),
-      quantity("time", "s", [](R r, B b) { return b.t_s - r.begin_s; }),
-      quantity("heading", "rad", [](R, B b) { return b.heading_rad; }),
+  for (int g = 0; g < kGroups; ++g)
+    s.rows.push_back(!flights.empty() && flights.front().has_rows(g / kCoefficients, g % kCoefficients) ? 1 : 0);
+  // those that all flights have
+  const auto gather = [&](auto&& of, std::vector<Quantity>& to) {
+    if (flights.empty()) return;
+    for (const RegimeQuantity& q : of(flights.front())) {
+      Quantity all{q.name, q.unit, {}};
+      for (const PredictedFlight& f : flights)
+        for (RegimeQuantity& own : of(f))
+          if (own.name == q.name) all.values.push_back(std::move(own.values));
+      if (all.values.size() == flights.size()) to.push_back(std::move(all));
+    }
   };
-  if (std::ranges::all_of(flights, [](const PredictedFlight& f) { return f.recording().log.power.has_value(); }))
-    s.regimes.push_back(quantity("battery", "V", [](R r, B b) {
-      // the mean over the beat, or of what is nearest
-      const flightlog::PowerStream& p = *r.log.power;
-      const double late_s = r.log.header.power->latency_s, half_s = 0.5 / r.log.header.flapping_Hz;
-      const auto index = [&](double t_s) { return std::ranges::lower_bound(p.t_s, t_s + late_s) - p.t_s.begin(); };
-      const auto last = static_cast<std::ptrdiff_t>(p.t_s.size());
-      const auto first = std::min(index(b.t_s - half_s), last - 1);
-      const auto end = std::max(index(b.t_s + half_s), first + 1);
-      double sum = 0;
-      for (auto i = first; i < end; ++i) sum += p.battery_V[static_cast<std::size_t>(i)];
-      return sum / static_cast<double>(end - first);
-    }));
-  s.inputs = {quantity("amplitude", "V", [](R, B b) { return b.amplitude_V; }),
-              quantity("difference", "V", [](R, B b) { return b.difference_V; }),
-              quantity("bias", "V", [](R, B b) { return b.bias_V; }),
-              quantity("split cycle", "", [](R, B b) { return b.split_cycle; })};
+  gather([](const PredictedFlight& f) { return f.regimes(); }, s.regimes);
+  gather([](const PredictedFlight& f) { return f.inputs(); }, s.inputs);
   return s;
 }
 

@@ -36,7 +36,9 @@ struct RowContext {
   std::vector<double> beats_Hz;            ///< of each flight
   std::vector<std::vector<char>> covered;  ///< [flight][beat][channel]
   std::vector<Quantity> regimes, inputs;
+  std::vector<char> rows;        ///< [group]: whether there are any
   std::vector<double> noise_sd;  ///< [group]
+  bool has_rows(int channel, int coefficient) const { return rows[group_of(channel, coefficient)] != 0; }
   bool covers(std::size_t flight, std::size_t beat, int channel) const {
     return covered[flight][beat * kChannels + static_cast<std::size_t>(channel)] != 0;
   }

@@ -49,15 +49,7 @@ class ShiftedVoltage {
 
 }  // namespace
 
-const char* channel_name(int channel) {
-  static const char* const kNames[kChannels] = {
-      "torque_x",    "torque_y",     "torque_z", "force_x",      "force_y",       "force_z",
-      "stroke_left", "stroke_right", "battery",  "current_left", "current_right", "path_x",
-      "path_y",      "path_z",       "rotate_x", "rotate_y",     "rotate_z"};
-  return kNames[channel];
-}
-
-PredictedFlight::PredictedFlight(Recording recording) : recording_(std::move(recording)) {
+ResetPrediction::ResetPrediction(Recording recording) : recording_(std::move(recording)) {
   const Recording& r = recording_;
   const auto first = static_cast<std::size_t>(std::ceil(kSpinUpBeats));
   imu_ = BeatProjection(r.beat, r.valid, r.beats, first);
@@ -94,7 +86,7 @@ PredictedFlight::PredictedFlight(Recording recording) : recording_(std::move(rec
 
 /// The samples of power.csv on the grid. A sample and a new voltage may share an instant, and the sample is of the new one:
 /// so it is taken from the first step that begins then or later, and the next.
-void PredictedFlight::lay_power(std::size_t first_beat) {
+void ResetPrediction::lay_power(std::size_t first_beat) {
   const Recording& r = recording_;
   if (!r.log.power) return;
   std::vector<double> beat;
@@ -138,7 +130,7 @@ void put_streams(const std::vector<StreamRow>& streams, Rows& rows) {
 
 }  // namespace
 
-void PredictedFlight::compare_streams() {
+void ResetPrediction::compare_streams() {
   const std::vector<StreamRow> streams = stream_rows(recording_);
   put_streams(streams, measured_);
   for (std::size_t j = 0; j < streams.size(); ++j) compared_.push_back(streams[j].valid && imu_.covers(j) ? 1 : 0);
@@ -162,7 +154,7 @@ void PredictedFlight::compare_streams() {
 }
 
 /// Mean forces as a second difference of positions has them, in W and back in B; and what motion capture adds to them.
-void PredictedFlight::smooth_forces(Rows& rows, const Eigen::Matrix3Xd& more_m_s2) const {
+void ResetPrediction::smooth_forces(Rows& rows, const Eigen::Matrix3Xd& more_m_s2) const {
   const auto row = [&](std::size_t j, std::size_t i) { return j * kRowsPerBeat + (kForceX + i) * kCoefficients; };
   std::vector<Eigen::Vector3d> force(recording_.beats);
   for (std::size_t j = 0; j < recording_.beats; ++j)
@@ -177,7 +169,7 @@ void PredictedFlight::smooth_forces(Rows& rows, const Eigen::Matrix3Xd& more_m_s
 }
 
 /// Of samples [interval][channel].
-Rows PredictedFlight::rows_of(const std::vector<double>& samples) const {
+Rows ResetPrediction::rows_of(const std::vector<double>& samples) const {
   Rows together(recording_.beats * kCoefficients * kSignals, 0), rows(recording_.beats * kRowsPerBeat, 0);
   imu_.project(samples.data(), kSignals, together.data());
   put_channels(together, recording_.beats, kSignals, 1, 0, 0, rows);
@@ -185,13 +177,13 @@ Rows PredictedFlight::rows_of(const std::vector<double>& samples) const {
 }
 
 /// Of samples [sample][battery, left, right].
-void PredictedFlight::put_power(const std::vector<double>& samples, Rows& rows) const {
+void ResetPrediction::put_power(const std::vector<double>& samples, Rows& rows) const {
   Rows together(recording_.beats * kCoefficients * kMetered, 0);
   power_.project(samples.data(), kMetered, together.data());
   put_channels(together, recording_.beats, kMetered, 1, 0, kBattery, rows);
 }
 
-Rows PredictedFlight::declared_noise(std::uint64_t seed) const {
+Rows ResetPrediction::declared_noise(std::uint64_t seed) const {
   const flightlog::FlightHeader& h = recording_.log.header;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
@@ -224,7 +216,7 @@ Rows PredictedFlight::declared_noise(std::uint64_t seed) const {
   return rows;
 }
 
-bool PredictedFlight::covers(std::size_t beat, int channel) const {
+bool ResetPrediction::covers(std::size_t beat, int channel) const {
   if (channel >= kPathX) return compared_[beat] != 0;
   if (channel >= kBattery) return imu_.covers(beat) && beat < power_.beats() && power_.covers(beat);
   if (channel >= kForceX && channel <= kForceZ) return smoothed_[beat] != 0;
@@ -232,7 +224,7 @@ bool PredictedFlight::covers(std::size_t beat, int channel) const {
   return imu_.covers(beat);
 }
 
-std::vector<Rows> PredictedFlight::predict(const std::vector<const Candidate*>& candidates) const {
+std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& candidates) const {
   const Recording& r = recording_;
   const ResetBlock reset = *reset_block_kernels[sim::place_of("")];
   sim::Batch<double> batch(kVehicles, candidates.front()->vehicle, {kPredictionStep_s, 1, r.world, {}});
@@ -312,19 +304,103 @@ std::vector<Rows> PredictedFlight::predict(const std::vector<const Candidate*>& 
   return result;
 }
 
-std::vector<std::vector<Rows>> predict_all(const std::vector<PredictedFlight>& flights,
-                                           const std::vector<Candidate>& candidates, int threads) {
-  const std::size_t blocks = (candidates.size() + kVehicles - 1) / kVehicles;
-  std::vector<std::vector<Rows>> result(candidates.size(), std::vector<Rows>(flights.size()));
-  io::parallel_for(blocks * flights.size(), threads, [&](std::size_t job) {
-    const std::size_t flight = job % flights.size(), first = job / flights.size() * kVehicles;
-    std::vector<const Candidate*> group;
-    for (std::size_t i = first; i < std::min(first + kVehicles, candidates.size()); ++i)
-      group.push_back(&candidates[i]);
-    std::vector<Rows> rows = flights[flight].predict(group);
-    for (std::size_t i = 0; i < group.size(); ++i) result[first + i][flight] = std::move(rows[i]);
-  });
-  return result;
+template <class Value>
+std::vector<double> ResetPrediction::each(const Value& value) const {
+  std::vector<double> list;
+  for (const Regime& r : recording_.regimes) list.push_back(value(recording_, r));
+  return list;
+}
+
+namespace {
+
+using R = const Recording&;
+using S = const Regime&;
+
+/// How far what is near a surface reaches: a wing's length.
+constexpr double kReach_m = 0.07;
+
+double near_wall(R r, S s) {
+  double near = 0;
+  for (const sim::Wall& w : r.world.walls)
+    near += std::exp(-std::max(0.0, w.normal_x * (s.position_m.x() - w.x_m) + w.normal_y * (s.position_m.y() - w.y_m)) /
+                     kReach_m);
+  return near;
+}
+
+/// Of the beat, or of what is nearest.
+double battery_V(R r, S s) {
+  const flightlog::PowerStream& p = *r.log.power;
+  const double late_s = r.log.header.power->latency_s, half_s = 0.5 / r.log.header.flapping_Hz;
+  const auto index = [&](double t_s) { return std::ranges::lower_bound(p.t_s, t_s + late_s) - p.t_s.begin(); };
+  const auto last = static_cast<std::ptrdiff_t>(p.t_s.size());
+  const auto first = std::min(index(s.t_s - half_s), last - 1);
+  const auto end = std::max(index(s.t_s + half_s), first + 1);
+  double sum = 0;
+  for (auto i = first; i < end; ++i) sum += p.battery_V[static_cast<std::size_t>(i)];
+  return sum / static_cast<double>(end - first);
+}
+
+}  // namespace
+
+std::vector<RegimeFunction> ResetPrediction::functions() const {
+  std::vector<RegimeFunction> list;
+  const auto add = [&](const char* name, BasisFunction kind, auto&& value) {
+    const std::vector<double> values = each(value);
+    list.push_back(
+        {name, kind, Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()))});
+  };
+  add("amplitude", BasisFunction::input, [](R, S s) { return s.amplitude_V; });
+  add("difference", BasisFunction::input, [](R, S s) { return s.difference_V; });
+  add("bias", BasisFunction::input, [](R, S s) { return s.bias_V; });
+  add("split_cycle", BasisFunction::input, [](R, S s) { return s.split_cycle; });
+  add("velocity_x", BasisFunction::velocity_x, [](R, S s) { return s.velocity_B_m_s.x(); });
+  add("velocity_y", BasisFunction::velocity_y, [](R, S s) { return s.velocity_B_m_s.y(); });
+  add("velocity_z", BasisFunction::velocity_z, [](R, S s) { return s.velocity_B_m_s.z(); });
+  add("rate_x", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.x(); });
+  add("rate_y", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.y(); });
+  add("rate_z", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.z(); });
+  add("|velocity| velocity_x", BasisFunction::drag_x,
+      [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.x(); });
+  add("|velocity| velocity_y", BasisFunction::drag_y,
+      [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.y(); });
+  add("|velocity| velocity_z", BasisFunction::drag_z,
+      [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.z(); });
+  add("near ground", BasisFunction::place,
+      [](R r, S s) { return std::exp(-std::max(0.0, s.position_m.z() - r.world.ground_z_m) / kReach_m); });
+  add("near ceiling", BasisFunction::place,
+      [](R r, S s) { return std::exp(-std::max(0.0, r.world.ceiling_z_m - s.position_m.z()) / kReach_m); });
+  add("near wall", BasisFunction::place, near_wall);
+  add("height", BasisFunction::place, [](R, S s) { return s.position_m.z(); });
+  add("cos heading", BasisFunction::place, [](R, S s) { return std::cos(s.heading_rad); });
+  add("sin heading", BasisFunction::place, [](R, S s) { return std::sin(s.heading_rad); });
+  add("time", BasisFunction::place, [](R r, S s) { return s.t_s - r.begin_s; });
+  return list;
+}
+
+std::vector<std::pair<std::string, std::string>> ResetPrediction::products() const {
+  std::vector<std::pair<std::string, std::string>> list;
+  for (const char* other : {"amplitude", "difference", "bias", "split_cycle", "velocity_x", "velocity_z"})
+    list.emplace_back("amplitude", other);
+  return list;
+}
+
+std::vector<RegimeQuantity> ResetPrediction::inputs() const {
+  return {{"amplitude", "V", each([](R, S s) { return s.amplitude_V; })},
+          {"difference", "V", each([](R, S s) { return s.difference_V; })},
+          {"bias", "V", each([](R, S s) { return s.bias_V; })},
+          {"split cycle", "", each([](R, S s) { return s.split_cycle; })}};
+}
+
+std::vector<RegimeQuantity> ResetPrediction::regimes() const {
+  std::vector<RegimeQuantity> list = {
+      {"height", "m", each([](R r, S s) { return s.position_m.z() - r.world.ground_z_m; })},
+      {"speed", "m/s", each([](R, S s) { return s.velocity_B_m_s.norm(); })},
+      {"amplitude", "V", each([](R, S s) { return s.amplitude_V; })},
+      {"body rate", "rad/s", each([](R, S s) { return s.rate_rad_s.norm(); })},
+      {"time", "s", each([](R r, S s) { return s.t_s - r.begin_s; })},
+      {"heading", "rad", each([](R, S s) { return s.heading_rad; })}};
+  if (recording_.log.power) list.push_back({"battery", "V", each(battery_V)});
+  return list;
 }
 
 }  // namespace flappy::gap

@@ -4,7 +4,7 @@
 // Valid up to kSlots - 2 steps, 25 ms at 1e-4 s; the delay is rounded to 1/1024 of a step.
 #pragma once
 
-#include "model/effects/effect.hpp"
+#include "model/effects/mean_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -33,6 +33,12 @@ struct CommandDelay {
       h.left.voltage_V.raw[i] = (1 - part) * at(newer) + part * at(older);
       h.right.voltage_V.raw[i] = (1 - part) * at(newer + 1) + part * at(older + 1);
     }
+  }
+
+  static constexpr std::array<EffectParameter, 1> kMeanParameters{{{"delay_s", 0, 0.5, 0.03, 0, 0.1}}};
+  template <class T>
+  static FLAPPY_INLINE void mean_drive(const T (&q)[1], MeanDrive<T>& drive) {
+    drive.delay_s += q[0];
   }
 };
 

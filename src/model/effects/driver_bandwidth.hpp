@@ -4,7 +4,7 @@
 // The winding's L/R, which the base model neglects, would lag the back-EMF, too.
 #pragma once
 
-#include "model/effects/effect.hpp"
+#include "model/effects/mean_effect.hpp"
 #include "model/math.hpp"
 
 namespace flappy::model {
@@ -27,6 +27,12 @@ struct DriverBandwidth {
     };
     follow(0, h.left);
     follow(1, h.right);
+  }
+
+  static constexpr std::array<EffectParameter, 1> kMeanParameters{{{"lag_s", 0, 1, 0.05, 0, 0.15}}};
+  template <class T>
+  static FLAPPY_INLINE void mean_drive(const T (&q)[1], MeanDrive<T>& drive) {
+    drive.lag_s += q[0];
   }
 };
 

@@ -7,7 +7,7 @@
 // wings, there is more lift, so the force in the plane of the strokes stays. A level attitude and a flat ground are assumed; below the ground h counts as 0.
 #pragma once
 
-#include "model/effects/effect.hpp"
+#include "model/effects/mean_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -21,6 +21,14 @@ struct GroundEffect {
   static FLAPPY_INLINE void air(const T (&q)[2], const Surroundings<T>& s, const StateRows<T>&, WingWrench<T>& air) {
     const T height = max(T(stroke_plane_z(s) - s.ground_z_m), T(0));
     air = with_lift(air, T(T(1) + q[0] * exp_negative(T(height / q[1]))));
+  }
+
+  static constexpr std::array<EffectParameter, 2> kMeanParameters{
+      {{"gain", 0, 1, 0.15, 0, 0.45}, {"length_m", 0.005, 2, 0.1, 0.03, 0.3}}};
+  template <class T>
+  static FLAPPY_INLINE void mean_load(const T (&q)[2], const MeanState<T>& s, MeanLoads<T>& load) {
+    const T height = max(T(s.position_m.z - s.ground_z_m), T(0));
+    load.force_N.z += T(q[0] * exp_negative(T(height / q[1]))) * s.thrust_N;
   }
 };
 

@@ -4,7 +4,7 @@
 //     lever arm between sensors.
 #pragma once
 
-#include "model/effects/effect.hpp"
+#include "model/effects/mean_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -14,6 +14,16 @@ struct MarkerOffset {
   static constexpr std::array<EffectParameter, 3> kParameters{{{"x_m", -0.05, 0.05, 0.002, -0.006, 0.006},
                                                                {"y_m", -0.05, 0.05, 0.002, -0.006, 0.006},
                                                                {"z_m", -0.05, 0.05, 0.002, -0.006, 0.006}}};
+
+  /// The specific force of the point that is seen: a' d + w (w d) more.
+  static constexpr std::array<EffectParameter, 3> kMeanParameters{{{"x_m", -0.5, 0.5, 0.02, -0.06, 0.06},
+                                                                   {"y_m", -0.5, 0.5, 0.02, -0.06, 0.06},
+                                                                   {"z_m", -0.5, 0.5, 0.02, -0.06, 0.06}}};
+  template <class T>
+  static FLAPPY_INLINE void mean_seen(const T (&q)[3], const MeanState<T>& s, Vec3<T>& force_m_s2) {
+    const Vec3<T> d{q[0], q[1], q[2]};
+    force_m_s2 = force_m_s2 + (cross(s.turning_rad_s2, d) + cross(s.rate_rad_s, cross(s.rate_rad_s, d)));
+  }
 };
 
 }  // namespace FLAPPY_ISA

@@ -4,7 +4,7 @@
 //     direction of gravity as an unknown of calibration.
 #pragma once
 
-#include "model/effects/effect.hpp"
+#include "model/effects/mean_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -14,6 +14,13 @@ struct MocapTilt {
                                     "Furgale, Rehder, Siegwart, IROS 2013"};
   static constexpr std::array<EffectParameter, 2> kParameters{
       {{"x_rad", -0.3, 0.3, 0.01, -0.03, 0.03}, {"y_rad", -0.3, 0.3, 0.01, -0.03, 0.03}}};
+
+  /// Gravity is taken from the wrong vertical: t x g more, t the world's turn.
+  template <class T>
+  static FLAPPY_INLINE void mean_seen(const T (&q)[2], const MeanState<T>& s, Vec3<T>& force_m_s2) {
+    force_m_s2 =
+        force_m_s2 + transpose_times(s.attitude, Vec3<T>{q[1] * s.gravity_m_s2, -T(q[0] * s.gravity_m_s2), T(0)});
+  }
 };
 
 }  // namespace FLAPPY_ISA

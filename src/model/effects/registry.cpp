@@ -8,10 +8,10 @@
 namespace flappy::model {
 namespace {
 
-template <int I>
+template <class Effect>
 void change(const double* parameters, Vehicle& v) {
-  constexpr std::size_t kCount = EffectAt<I>::kParameters.size();
-  EffectAt<I>::vehicle(*reinterpret_cast<const double(*)[kCount]>(parameters), v);
+  constexpr std::size_t kCount = Effect::kParameters.size();
+  Effect::vehicle(*reinterpret_cast<const double(*)[kCount]>(parameters), v);
 }
 
 template <int I>
@@ -21,9 +21,51 @@ EffectEntry entry() {
                 {Effect::kParameters.begin(), Effect::kParameters.end()},
                 effect_rows_before<I>(),
                 states_of<Effect>(),
-                nullptr};
-  if constexpr (Effect::kInfo.stage == Stage::body) e.change = change<I>;
+                nullptr,
+                {}};
+  if constexpr (Effect::kInfo.stage == Stage::body) e.change = change<Effect>;
   return e;
+}
+
+/// Its parameters as a mean over beats: its own, where a robot of another size or kind needs others.
+template <class Effect>
+constexpr const auto& mean_parameters() {
+  if constexpr (requires { Effect::kMeanParameters; }) return Effect::kMeanParameters;
+  else return Effect::kParameters;
+}
+
+/// A stage that reads its parameters as an array.
+template <auto stage, std::size_t count, class... Further>
+void staged(const double* parameters, Further... further) {
+  stage(*reinterpret_cast<const double(*)[count]>(parameters), further...);
+}
+
+template <class Effect>
+EffectEntry mean_entry() {
+  constexpr std::size_t kCount = mean_parameters<Effect>().size();
+  EffectInfo info = Effect::kInfo;
+  if constexpr (requires { Effect::kMeanSizes; }) info.sizes = Effect::kMeanSizes;
+  EffectEntry e{info, {mean_parameters<Effect>().begin(), mean_parameters<Effect>().end()}, 0, 0, nullptr, {}};
+  if constexpr (Effect::kInfo.stage == Stage::body) e.change = change<Effect>;
+  if constexpr (requires { Effect::template mean_drive<double>; })
+    e.mean.drive = staged<Effect::template mean_drive<double>, kCount, MeanDrive<double>&>;
+  if constexpr (requires { Effect::template mean_wind<double>; })
+    e.mean.wind = staged<Effect::template mean_wind<double>, kCount, const MeanState<double>&, Vec3<double>&>;
+  if constexpr (requires { Effect::template mean_load<double>; })
+    e.mean.load = staged<Effect::template mean_load<double>, kCount, const MeanState<double>&, MeanLoads<double>&>;
+  if constexpr (requires { Effect::template mean_seen<double>; })
+    e.mean.seen = staged<Effect::template mean_seen<double>, kCount, const MeanState<double>&, Vec3<double>&>;
+  return e;
+}
+
+template <class... Effect>
+std::vector<EffectEntry> mean_list(std::tuple<Effect...>*) {
+  return {mean_entry<Effect>()...};
+}
+
+const std::vector<EffectEntry>& means() {
+  static const std::vector<EffectEntry> all = mean_list(static_cast<MeanEffects*>(nullptr));
+  return all;
 }
 
 template <int... I>
@@ -51,6 +93,27 @@ const std::vector<EffectEntry>& effects() {
   return all;
 }
 
+namespace {
+
+const EffectEntry* entry_of(const std::string& id) {
+  for (const auto* catalogue : {&effects(), &means()})
+    for (const EffectEntry& e : *catalogue)
+      if (e.info.id == id) return &e;
+  return nullptr;
+}
+
+}  // namespace
+
+const std::vector<EffectEntry>& catalogue_of(const Vehicle& vehicle) {
+  return vehicle.beat_averaged ? means() : effects();
+}
+
+const EffectEntry* find_effect(const Vehicle& vehicle, const std::string& id) {
+  const std::vector<EffectEntry>& all = catalogue_of(vehicle);
+  const auto found = std::ranges::find_if(all, [&](const EffectEntry& e) { return e.info.id == id; });
+  return found == all.end() ? nullptr : &*found;
+}
+
 std::uint64_t sensor_effects() {
   static const std::uint64_t set = [] {
     std::uint64_t bits = 0;
@@ -67,15 +130,16 @@ int effect_index(const char* id) {
   return -1;
 }
 
+bool is_effect(const std::string& id) { return entry_of(id) != nullptr; }
+
 std::string group_of(const std::string& id) {
-  const int index = effect_index(id.c_str());
-  const std::string group = index < 0 ? "" : effects()[static_cast<std::size_t>(index)].info.group;
-  return group.empty() ? id : group;
+  const EffectEntry* entry = entry_of(id);
+  return entry == nullptr || *entry->info.group == 0 ? id : entry->info.group;
 }
 
-std::vector<std::string> whole_group(const std::string& id) {
+std::vector<std::string> whole_group(const std::vector<EffectEntry>& catalogue, const std::string& id) {
   std::vector<std::string> all;
-  for (const EffectEntry& e : effects())
+  for (const EffectEntry& e : catalogue)
     if (group_of(e.info.id) == group_of(id)) all.emplace_back(e.info.id);
   return all;
 }

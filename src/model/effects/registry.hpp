@@ -10,6 +10,7 @@
 #include "model/effects/accelerometer_misalignment.hpp"
 #include "model/effects/added_mass.hpp"
 #include "model/effects/battery_sag.hpp"
+#include "model/effects/battery_thrust.hpp"
 #include "model/effects/body_drag.hpp"
 #include "model/effects/ceiling_effect.hpp"
 #include "model/effects/clap_and_fling.hpp"
@@ -18,17 +19,22 @@
 #include "model/effects/coulomb_friction.hpp"
 #include "model/effects/driver_bandwidth.hpp"
 #include "model/effects/driver_dead_zone.hpp"
+#include "model/effects/flapping_counter_force.hpp"
 #include "model/effects/gear_backlash.hpp"
 #include "model/effects/ground_effect.hpp"
 #include "model/effects/gyro_bias.hpp"
 #include "model/effects/inertia_products.hpp"
 #include "model/effects/marker_offset.hpp"
+#include "model/effects/mean_effect.hpp"
 #include "model/effects/mocap_delay.hpp"
 #include "model/effects/mocap_tilt.hpp"
 #include "model/effects/rotational_lift.hpp"
 #include "model/effects/spring_hardening.hpp"
 #include "model/effects/stop_compliance.hpp"
+#include "model/effects/stroke_plane_actuation.hpp"
 #include "model/effects/tether.hpp"
+#include "model/effects/thrust_axis_tilt.hpp"
+#include "model/effects/translational_lift.hpp"
 #include "model/effects/vibration_rectification.hpp"
 #include "model/effects/wake_capture.hpp"
 #include "model/effects/wall_effect.hpp"
@@ -48,6 +54,11 @@ using Effects = std::tuple<ComOffset, InertiaProducts, WingInertiaShape, WingDam
                            StopCompliance, GearBacklash, Wind, WingFlexibility, RotationalLift, WakeCapture,
                            ClapAndFling, GroundEffect, CeilingEffect, AddedMass, WallEffect, BodyDrag, Tether, GyroBias,
                            AccelerometerMisalignment, VibrationRectification, MocapTilt, MarkerOffset, MocapDelay>;
+
+/// Those that have a stage for the mean of a beat, in the order in which they act.
+using MeanEffects = std::tuple<ComOffset, InertiaProducts, CommandDelay, DriverBandwidth, BatteryThrust, Wind,
+                               GroundEffect, BodyDrag, Tether, FlappingCounterForce, TranslationalLift,
+                               StrokePlaneActuation, ThrustAxisTilt, MocapTilt, MarkerOffset>;
 
 inline constexpr int kEffects = std::tuple_size_v<Effects>;
 static_assert(kEffects <= 64, "a set of effects is a word");
@@ -80,13 +91,14 @@ constexpr int state_rows(std::uint64_t set) {
 
 }  // namespace FLAPPY_ISA
 
-/// What the rest of the project knows of an effect.
+/// What the rest of the project knows of an effect, within the beat or as a mean over beats.
 struct EffectEntry {
   EffectInfo info;
   std::vector<EffectParameter> parameters;
   int first_row;                                       ///< of its parameters in a block's effect rows
   int states;                                          ///< rows of memory
   void (*change)(const double* parameters, Vehicle&);  ///< its stage `vehicle`, or null
+  MeanStages mean;                                     ///< of a robot that is known by the beat
 
   /// Its parameters: those given, typical ones for the others.
   std::vector<double> values(const std::map<std::string, double>& given) const;
@@ -94,15 +106,21 @@ struct EffectEntry {
   bool acts(const std::vector<double>& values) const;
 };
 
-/// The registry by index, which is also the bit of an effect in a block's set.
+/// Those that act within the beat, by index, which is also the bit of an effect in a block's set.
 const std::vector<EffectEntry>& effects();
+/// Those that a vehicle may have: the former, or, of one that is known by the beat, those with a stage for its mean.
+const std::vector<EffectEntry>& catalogue_of(const Vehicle& vehicle);
+/// Null where the vehicle's catalogue has no such entry.
+const EffectEntry* find_effect(const Vehicle& vehicle, const std::string& id);
 /// Bits of those that act on sensors alone.
 std::uint64_t sensor_effects();
 /// Index of `id`, or -1.
 int effect_index(const char* id);
+/// Whether any kind of vehicle has such an entry.
+bool is_effect(const std::string& id);
 /// What an effect is grouped with (EffectInfo::group): its group's name, or its own where it has none.
 std::string group_of(const std::string& id);
-/// All entries of an effect's group, in the registry's order.
-std::vector<std::string> whole_group(const std::string& id);
+/// All entries of an effect's group in a catalogue, in its order.
+std::vector<std::string> whole_group(const std::vector<EffectEntry>& catalogue, const std::string& id);
 
 }  // namespace flappy::model

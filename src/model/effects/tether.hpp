@@ -5,7 +5,7 @@
 //     offsets. The line's inertia, its damping and its drag are left out; below the ground h counts as 0.
 #pragma once
 
-#include "model/effects/effect.hpp"
+#include "model/effects/mean_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -26,6 +26,14 @@ struct Tether {
         s.attitude, Vec3<T>{q[1] * T(q[2] - at.x), q[1] * T(q[3] - at.y), -T(T(q[0] * s.gravity) * height)});
     load.force_B = load.force_B + force;
     load.moment_B = load.moment_B + cross(Vec3<T>{T(0), T(0), q[4]} - s.com_m, force);
+  }
+
+  template <class T>
+  static FLAPPY_INLINE void mean_load(const T (&q)[5], const MeanState<T>& s, MeanLoads<T>& load) {
+    const T height = max(T(s.position_m.z - s.ground_z_m), T(0));
+    const Vec3<T> force{q[1] * T(q[2] - s.position_m.x), q[1] * T(q[3] - s.position_m.y),
+                        -T(T(q[0] * s.gravity_m_s2) * height)};
+    load.add(transpose_times(s.attitude, force), Vec3<T>{T(0), T(0), q[4]} - s.com_m);
   }
 };
 

@@ -7,7 +7,7 @@
 // Gusts are long against the vehicle; shear and the wake's drift are left out. Phases begin at 0 with a flight.
 #pragma once
 
-#include "model/effects/effect.hpp"
+#include "model/effects/mean_effect.hpp"
 #include "model/math.hpp"
 
 namespace flappy::model {
@@ -39,6 +39,14 @@ struct Wind {
     }
     const T size = T(0.81649658092772603) * q[3];  // sqrt(2/3)
     wind_B = transpose_times(s.attitude, Vec3<T>{q[0] + size * gust[0], q[1] + size * gust[1], q[2] + size * gust[2]});
+  }
+
+  static constexpr int kMeanSizes = 3;
+  static constexpr std::array<EffectParameter, 3> kMeanParameters{
+      {{"x_m_s", -5, 5, 0.3, -0.9, 0.9}, {"y_m_s", -5, 5, 0.3, -0.9, 0.9}, {"z_m_s", -5, 5, 0.1, -0.3, 0.3}}};
+  template <class T>
+  static FLAPPY_INLINE void mean_wind(const T (&q)[3], const MeanState<T>& s, Vec3<T>& wind_B) {
+    wind_B = wind_B + transpose_times(s.attitude, Vec3<T>{q[0], q[1], q[2]});
   }
 };
 

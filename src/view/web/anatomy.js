@@ -7,7 +7,7 @@ import {wingOutline, wingPoint} from "./geometry.js";
  * @typedef {{channel: string, name: string, short: string, ratio: number, text: string}} Part
  */
 
-const kWidth = 480, kHeight = 350, kScale = 2400;
+const kWidth = 480, kHeight = 350, kScale = 2400, kLetter = 7.5, kBelow = 24;  // px
 
 /**
  * Seen from the front and a little from above: the robot's left is on the right.
@@ -72,25 +72,43 @@ function shapeOf(channel) {
 /** Of a robot as wide as the drawing wants it. @type {Side} */
 const kSide = {shoulder_m: [0, 0.014, 0.019], wing_length_m: 0.07, mean_chord_m: 0.0212, moments: [1, 0.4508, 0.2842]};
 
+/** @returns {SVGElement[]} */
+function wingElements() {
+  const outline = wingOutline(kSide);
+  return [-1, 1].map((sign) => {
+    const side = {...kSide, shoulder_m: [0, sign * 0.014, 0.019]};
+    const at = (/** @type {number} */ s, /** @type {number} */ c) => wingPoint(side, sign, 0.15, 0.5, s, c);
+    const edge = [at(0, 0), ...outline.map(([s]) => at(s, 0)), ...[...outline].reverse().map(([s, c]) => at(s, c))];
+    return drawn("path", {d: `${pathOf(edge)} Z`, fill: "#dfe9f2", stroke: "#8fa8bd"});
+  });
+}
+
+/** @returns {SVGElement} */
+function bodyElement() {
+  const height = [[-0.04, 0], [-0.03, 0.004], [-0.016, 0.009], [0, 0.0105], [0.012, 0.0085], [0.022, 0.0045], [0.026, 0.0062], [0.031, 0.0068],
+    [0.036, 0.0048], [0.0375, 0]];
+  const silhouette = [...height.map(([z, r]) => [projected([0, 0, z])[0] + kScale * r, projected([0, 0, z])[1]]),
+    ...[...height].reverse().map(([z, r]) => [projected([0, 0, z])[0] - kScale * r, projected([0, 0, z])[1]])];
+  return drawn("path", {d: `M${silhouette.map((p) => p.map((v) => v.toFixed(1)).join(" ")).join("L")}Z`, fill: "#e7ebef", stroke: "#8c959f"});
+}
+
+/** A body that says nothing of its shape: a circle about the tracked point, the same in the plane of its x and y. @returns {SVGElement[]} */
+function signElements() {
+  const radius_m = 0.016, [x, y] = projected([0, 0, 0]);
+  const level = Array.from({length: 49}, (_, k) => [radius_m * Math.cos(2 * Math.PI * k / 48), radius_m * Math.sin(2 * Math.PI * k / 48), 0]);
+  return [drawn("circle", {cx: x, cy: y, r: kScale * radius_m, fill: "#e7ebef", stroke: "#8c959f"}),
+    drawn("path", {d: pathOf(level), fill: "none", stroke: "#8c959f"})];
+}
+
 /**
- * @param {{parts: Part[], wing: Side | null, note: string}} block
+ * @param {{parts: Part[], wings?: boolean, note: string}} block
  * @returns {HTMLElement}
  */
 export function anatomyElement(block) {
   const shown = drawn("svg", {viewBox: `0 0 ${kWidth} ${kHeight}`, role: "img",
     "aria-label": block.parts.map((part) => `${part.name} ${part.text}`).join("; ")});
-  const outline = wingOutline(kSide);
-  for (const sign of [-1, 1]) {
-    const side = {...kSide, shoulder_m: [0, sign * 0.014, 0.019]};
-    const at = (/** @type {number} */ s, /** @type {number} */ c) => wingPoint(side, sign, 0.15, 0.5, s, c);
-    const edge = [at(0, 0), ...outline.map(([s]) => at(s, 0)), ...[...outline].reverse().map(([s, c]) => at(s, c))];
-    shown.append(drawn("path", {d: `${pathOf(edge)} Z`, fill: "#dfe9f2", stroke: "#8fa8bd"}));
-  }
-  const height = [[-0.04, 0], [-0.03, 0.004], [-0.016, 0.009], [0, 0.0105], [0.012, 0.0085], [0.022, 0.0045], [0.026, 0.0062], [0.031, 0.0068],
-    [0.036, 0.0048], [0.0375, 0]];
-  const silhouette = [...height.map(([z, r]) => [projected([0, 0, z])[0] + kScale * r, projected([0, 0, z])[1]]),
-    ...[...height].reverse().map(([z, r]) => [projected([0, 0, z])[0] - kScale * r, projected([0, 0, z])[1]])];
-  shown.append(drawn("path", {d: `M${silhouette.map((p) => p.map((v) => v.toFixed(1)).join(" ")).join("L")}Z`, fill: "#e7ebef", stroke: "#8c959f"}));
+  if (block.wings !== false) shown.append(...wingElements(), bodyElement());
+  else shown.append(...signElements());
   const marker = drawn("marker", {id: "head", viewBox: "0 0 10 10", refX: 5, refY: 5, markerWidth: 3.2, markerHeight: 3.2, orient: "auto-start-reverse"},
     drawn("path", {d: "M0 0L10 5L0 10Z", fill: "context-stroke"}));
   shown.append(drawn("defs", {}, marker));
@@ -101,7 +119,8 @@ export function anatomyElement(block) {
     shown.append(drawn("path", {d: pathOf(shape.points), fill: "none", "stroke-linecap": "round", "marker-end": "url(#head)", ...inkOf(strength)}));
     if (strength < 0.25) continue;
     const [x, y] = projected(shape.label);
-    shown.append(drawn("text", {x: x.toFixed(0), y: y.toFixed(0), "text-anchor": x > kWidth * 0.6 ? "start" : x < kWidth * 0.4 ? "end" : "middle"}, part.short));
+    const within = x > kWidth * 0.6 ? Math.min(x, kWidth - kLetter * part.short.length) : x;
+    shown.append(drawn("text", {x: within.toFixed(0), y: (within < x ? y + kBelow : y).toFixed(0), "text-anchor": x > kWidth * 0.6 ? "start" : x < kWidth * 0.4 ? "end" : "middle"}, part.short));
   }
   const list = element("ul", {}, ...[...block.parts].sort((a, b) => b.ratio - a.ratio).slice(0, 7).map((part) =>
     element("li", {}, element("b", {}, `${part.ratio >= 10 ? Math.round(part.ratio) : part.ratio.toFixed(1)}×`), element("span", {}, element("b", {}, part.name), ` ${part.text}`))));

@@ -149,7 +149,8 @@ export function figureRows(figure) {
  * @returns {HTMLElement}
  */
 export function figureElement(figure) {
-  const high = figure.categories.length > 0 ? 110 + 26 * figure.categories.length : 300;
+  const lines = Math.max(0, ...figure.categories.map((name) => wrapped(name).length));
+  const high = figure.categories.length > 0 ? 110 + (lines > 2 ? 17 * lines : 26) * figure.categories.length : 300;
   const canvas = element("canvas", {role: "img", "aria-label": `${figure.title}. ${figure.note}`});
   const frame = element("div", {class: "chart", style: `height: ${high}px`}, canvas);
   const numbers = element("details", {}, element("summary", {}, "Numbers"));

@@ -14,7 +14,8 @@ import {meanBetween, placeOf, runningSums, unwrapped, valueAt} from "./series.js
  */
 
 const kDegrees = 180 / Math.PI;
-const kVelocityOver_s = 0.02;
+const kVelocityOver_s = 0.02, kStep_s = 0.1;
+const kInputsOfAPlot = 6;
 export const kBlue = "#0072b2", kVermillion = "#d55e00", kGreen = "#009e73", kPurple = "#cc79a7";
 
 export class Flight {
@@ -40,7 +41,9 @@ export class Flight {
     }
     const m = this.streams.mocap;
     this.duration_s = m.t_s[m.t_s.length - 1];
-    this.sums = ["x", "y", "z"].map((axis) => runningSums(this.streams.imu[`accel_${axis}_m_s2`]));
+    /** Of the path where there is such, for it has no beat to take the mean of. */
+    this.forces = this.streams.path ?? this.streams.imu;
+    this.sums = !this.forces ? [] : ["x", "y", "z"].map((axis) => runningSums(this.forces[`accel_${axis}_m_s2`]));
   }
 
   /** @param {number} t_s @returns {number[]} in W, m */
@@ -64,9 +67,15 @@ export class Flight {
     return a.map((value, k) => (b[k] - value) / Math.max(1e-9, end - begin));
   }
 
-  /** @param {number} t_s @returns {number[]} in W, N: mass times specific force, the mean of one beat */
+  /** @returns {number} the length of a beat, or of a step through a flight that has none */
+  get beat_s() {
+    return this.json.flapping_Hz > 0 ? 1 / this.json.flapping_Hz : kStep_s;
+  }
+
+  /** @param {number} t_s @returns {number[] | null} in W, N: mass times specific force, the mean of one beat; null: no stream has it */
   forceAt(t_s) {
-    const half = 0.5 / this.json.flapping_Hz, times = this.streams.imu.t_s;
+    if (!this.forces) return null;
+    const half = this.streams.path ? 0 : 0.5 * this.beat_s, times = this.forces.t_s;
     const mean = this.sums.map((sums) => meanBetween(times, sums, t_s - half, t_s + half) * this.json.vehicle.mass_kg);
     return rotated(this.attitudeAt(t_s), mean);
   }
@@ -83,7 +92,7 @@ export class Flight {
     const s = this.streams, m = s.mocap;
     const angles = [new Float64Array(m.t_s.length), new Float64Array(m.t_s.length), new Float64Array(m.t_s.length)];
     for (let i = 0; i < m.t_s.length; i++) anglesOf([m.qw[i], m.qx[i], m.qy[i], m.qz[i]]).forEach((angle, k) => { angles[k][i] = angle; });
-    const colours = [kBlue, kVermillion, kGreen, kPurple];
+    const colours = [kBlue, kVermillion, kGreen, kPurple, "#000000", "#767676"];
     const panel = (/** @type {string} */ id, /** @type {string} */ title, /** @type {string} */ unit, /** @type {boolean} */ shown,
       /** @type {Float64Array} */ times, /** @type {[string, Float64Array | undefined][]} */ lines) => {
       const there = /** @type {[string, Float64Array][]} */ (lines.filter((line) => line[1] !== undefined));
@@ -94,15 +103,26 @@ export class Flight {
       panel("position", "Position", "m", true, m.t_s, [["x", m.x_m], ["y", m.y_m], ["z", m.z_m]]),
       panel("attitude", "Attitude", "deg", true, m.t_s,
         [["roll", degrees(unwrapped(angles[0]))], ["pitch", degrees(angles[1])], ["yaw", degrees(unwrapped(angles[2]))]]),
-      panel("rate", "Body rate", "rad/s", false, s.imu.t_s,
-        [["x", s.imu.gyro_x_rad_s], ["y", s.imu.gyro_y_rad_s], ["z", s.imu.gyro_z_rad_s]]),
-      panel("force", "Specific force", "m/s²", false, s.imu.t_s,
-        [["x", s.imu.accel_x_m_s2], ["y", s.imu.accel_y_m_s2], ["z", s.imu.accel_z_m_s2]]),
-      panel("inputs", "Inputs", "V", true, s.command.t_s,
-        [["amplitude", s.command.amplitude_V], ["difference", s.command.difference_V], ["bias", s.command.bias_V]]),
-      panel("split", "Split cycle", "% of a beat", false, s.command.t_s, [["split", s.command.split_cycle?.map((x) => 100 * x)]]),
-      panel("voltages", "Voltages", "V", true, s.command.t_s, [["left", s.command.left_voltage_V], ["right", s.command.right_voltage_V]]),
     ];
+    if (s.path)
+      list.push(panel("path", "Specific force of the path", "m/s²", true, s.path.t_s,
+        [["x", s.path.accel_x_m_s2], ["y", s.path.accel_y_m_s2], ["z", s.path.accel_z_m_s2]]));
+    if (s.imu) {
+      list.push(panel("rate", "Body rate", "rad/s", false, s.imu.t_s,
+        [["x", s.imu.gyro_x_rad_s], ["y", s.imu.gyro_y_rad_s], ["z", s.imu.gyro_z_rad_s]]));
+      list.push(panel("force", "Specific force", "m/s²", false, s.imu.t_s,
+        [["x", s.imu.accel_x_m_s2], ["y", s.imu.accel_y_m_s2], ["z", s.imu.accel_z_m_s2]]));
+    }
+    if (s.command) {
+      const c = s.command;
+      list.push(panel("inputs", "Inputs", "V", true, c.t_s, [["amplitude", c.amplitude_V], ["difference", c.difference_V], ["bias", c.bias_V]]));
+      list.push(panel("split", "Split cycle", "% of a beat", false, c.t_s, [["split", c.split_cycle?.map((x) => 100 * x)]]));
+      list.push(panel("voltages", "Voltages", "V", true, c.t_s, [["left", c.left_voltage_V], ["right", c.right_voltage_V]]));
+    }
+    const declared = Object.entries(s.declared ?? {}).filter(([name]) => name !== "t_s");
+    for (let k = 0; k < declared.length; k += kInputsOfAPlot)
+      list.push(panel(`declared_${k}`, k === 0 ? "Inputs" : `Inputs from ${k + 1} on`, "as declared", true, s.declared.t_s,
+        declared.slice(k, k + kInputsOfAPlot).map(([name, values]) => [name.replaceAll("_", " "), values])));
     if (s.wings) {
       const w = s.wings;
       list.push(panel("strokes", "Strokes", "deg", true, w.t_s, [["left", degrees(w.left_stroke_rad)], ["right", degrees(w.right_stroke_rad)]]));

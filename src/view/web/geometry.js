@@ -2,7 +2,8 @@
 
 /**
  * @typedef {{shoulder_m: number[], wing_length_m: number, mean_chord_m: number, moments: number[]}} Side
- * @typedef {{name: string, mass_kg: number, left: Side, right: Side}} Vehicle
+ * @typedef {{name: string, mass_kg: number, left?: Side, right?: Side, body_m?: number[]}} Vehicle body_m: of one without modelled wings, the
+ *   semi-axes of its ellipsoid
  */
 
 /**

@@ -14,7 +14,11 @@ const kMoments = 8;
 const kTrailPoints = 1500;
 const kSpeeds = [["real time", 1], ["1/4", 0.25], ["1/10", 0.1], ["1/50", 0.02], ["1/200", 0.005]];
 const kViews = [["chase", "chase"], ["free", "free"], ["front", "front"], ["side", "side"], ["top", "top"]];
-const kKeys = "space plays, arrows step by a twentieth of a beat (with Shift by a beat), W A S D turn the camera, + and \u2212 zoom, C changes it";
+
+/** @param {string} step @returns {string} */
+function keysOf(step) {
+  return `space plays, arrows step by a twentieth of ${step} (with Shift by ${step}), W A S D turn the camera, + and \u2212 zoom, C changes it`;
+}
 
 /**
  * @param {[string, string | number][]} options
@@ -50,7 +54,9 @@ export class Player {
     this.flights = block.flights.map((json) => new Flight(json, bytes));
     this.goal_m = block.goal_m;
     this.duration_s = Math.max(...this.flights.map((flight) => flight.duration_s));
-    this.beat_s = 1 / this.flights[0].json.flapping_Hz;
+    this.beats = this.flights[0].json.flapping_Hz > 0;
+    this.beat_s = this.flights[0].beat_s;
+    this.keys = keysOf(this.beats ? "a beat" : `${this.beat_s} s`);
     this.now_s = 0;
     this.speed = 1;
     this.playing = false;
@@ -58,7 +64,7 @@ export class Player {
     this.flying = this.flights.map(() => true);
     /** @type {Scene | null} */
     this.scene = null;
-    this.view = element("div", {class: "view", tabindex: "0", role: "application", "aria-label": `The flight in 3D; ${kKeys}`});
+    this.view = element("div", {class: "view", tabindex: "0", role: "application", "aria-label": `The flight in 3D; ${this.keys}`});
     this.readout = element("p", {class: "readout"});
     this.slider = /** @type {HTMLInputElement} */ (element("input", {type: "range", min: "0", max: String(this.duration_s), step: "any", value: "0",
       "aria-label": "time, s"}));
@@ -77,15 +83,17 @@ export class Player {
       made.addEventListener("click", () => this.seek(this.now_s + beats * this.beat_s));
       return made;
     };
-    const windows = /** @type {[string, number][]} */ ([["whole flight", this.duration_s], ["10 s", 10], ["1 s", 1], ["5 beats", 5 * this.beat_s],
-      ["1 beat", this.beat_s]].filter(([, length], k) => k === 0 || length < this.duration_s));
+    const [short, long] = this.beats ? ["beat", "one beat"] : [`${this.beat_s} s`, `${this.beat_s} s`];
+    const of_beats = this.beats ? [["5 beats", 5 * this.beat_s], ["1 beat", this.beat_s]] : [];
+    const windows = /** @type {[string, number][]} */ ([["whole flight", this.duration_s], ["10 s", 10], ["1 s", 1], ...of_beats]
+      .filter(([, length], k) => k === 0 || Number(length) < this.duration_s));
     const ghosts = this.flights.length < 2 ? [] : this.flights.map((flight, k) => {
       const made = toggle(flight.json.name, true, (on) => { this.flying[k] = on; this.draw(); });
       made.prepend(element("span", {class: "swatch", style: `--colour: ${kColours[k % kColours.length]}`}));
       return made;
     });
     const controls = element("div", {class: "controls"},
-      element("div", {}, this.button, step("◂ beat", "one beat back", -1), step("beat ▸", "one beat on", 1),
+      element("div", {}, this.button, step(`◂ ${short}`, `${long} back`, -1), step(`${short} ▸`, `${long} on`, 1),
         choice(/** @type {[string, number][]} */ (kSpeeds), "Speed", (value) => { this.speed = Number(value); }),
         choice(windows, "Show", (length) => this.timeline.show(Number(length)))),
       this.slider,
@@ -95,7 +103,7 @@ export class Player {
     this.steer(this.view);
     const notes = this.notes().map((note) => element("p", {class: "note"}, note));
     return element("div", {class: "player"}, element("div", {class: "stage"}, this.view, this.readout, controls, ...notes,
-      element("p", {class: "note"}, `In the view: ${kKeys}.`)), this.timeline.element);
+      element("p", {class: "note"}, `In the view: ${this.keys}.`)), this.timeline.element);
   }
 
   /**
@@ -116,6 +124,10 @@ export class Player {
     const json = this.flights[0].json;
     if (json.wings === "derived")
       list.push("No wings were recorded: strokes and rotations are what the recorded voltages make of the vehicle's wings.");
+    if (json.wings === "still") list.push("Neither wings nor voltages were recorded: the wings are drawn still.");
+    if (json.wings === "none")
+      list.push("The vehicle's file has no modelled wings, and none are drawn: the body is the ellipsoid of its mass and inertia, its nose forward, "
+        + "and the force is that of the path that motion capture saw, up to the file's bandwidth.");
     if (this.flights.length > 1) list.push(`Solid lines: ${json.name}. Dashed lines: ${this.flights[1].json.name}. Each begins at its own first pose.`);
     list.push(...this.flights.flatMap((flight) => flight.json.notes.map((note) => `${flight.json.name}: ${note}.`)));
     return list;
@@ -163,14 +175,15 @@ export class Player {
   draw() {
     const poses = this.flights.map((flight, k) => !this.flying[k] ? null : {
       position: flight.positionAt(this.now_s), attitude: flight.attitudeAt(this.now_s), wings: flight.wingsAt(this.now_s),
-      velocity: k === 0 ? flight.velocityAt(this.now_s) : [0, 0, 0], force: k === 0 ? flight.forceAt(this.now_s) : [0, 0, 0]});
+      velocity: k === 0 ? flight.velocityAt(this.now_s) : [0, 0, 0], force: (k === 0 ? flight.forceAt(this.now_s) : null) ?? [0, 0, 0]});
     this.scene?.draw(poses, this.flights.map((flight) => Math.min(1, this.now_s / flight.duration_s)), this.shown);
-    const flight = this.flights[0], speed = Math.hypot(...flight.velocityAt(this.now_s)), force = Math.hypot(...flight.forceAt(this.now_s));
-    const weights = force / (flight.json.vehicle.mass_kg * flight.json.gravity_m_s2);
-    this.readout.replaceChildren(element("b", {}, `${this.now_s.toFixed(3)} s`), ` beat ${(this.now_s / this.beat_s).toFixed(2)} `,
+    const flight = this.flights[0], speed = Math.hypot(...flight.velocityAt(this.now_s)), vector = flight.forceAt(this.now_s);
+    const force = vector ? Math.hypot(...vector) : NaN, weights = force / (flight.json.vehicle.mass_kg * flight.json.gravity_m_s2);
+    const kind = flight.streams.path ? "of the path" : "mean of a beat";
+    this.readout.replaceChildren(element("b", {}, `${this.now_s.toFixed(3)} s`), this.beats ? ` beat ${(this.now_s / this.beat_s).toFixed(2)} ` : " ",
       element("span", {class: "key"}, element("span", {class: "swatch", style: "--colour: #009e73"}), `velocity ${shortNumber(speed)} m/s`), " ",
-      element("span", {class: "key"}, element("span", {class: "swatch", style: "--colour: #d55e00"}),
-        `force ${shortNumber(1000 * force)} mN, ${weights.toFixed(2)} weights, mean of a beat`));
+      ...vector ? [element("span", {class: "key"}, element("span", {class: "swatch", style: "--colour: #d55e00"}),
+        `force ${shortNumber(1000 * force)} mN, ${weights.toFixed(2)} weights, ${kind}`)] : []);
   }
 
   /** @param {boolean} on */

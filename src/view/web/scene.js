@@ -9,22 +9,60 @@ import {rotated, wingOutline} from "./geometry.js";
  * @typedef {"chase" | "free" | "front" | "side" | "top"} View
  */
 
+const kHalfSpan_m = 0.084;
 const kMomentColour = "#0072b2";
+const kChase_m = 0.55;  // from which a robot is followed
 const kFar_m = 50;  // what lies farther away is not there
 const kVelocityArrow_s = 0.12, kForceArrow_m = 0.09;  // length at 1 m/s, and at the weight
 /** Height and radius of the body of a robot with wings of 70 mm; only its looks: no vehicle's file has an outline. */
 const kBody = [[-0.04, 0], [-0.03, 0.004], [-0.016, 0.009], [0, 0.0105], [0.012, 0.0085], [0.022, 0.0045], [0.026, 0.0062],
   [0.031, 0.0068], [0.036, 0.0048], [0.0375, 0]];
 
-/** One robot. Its wings are those of the vehicle's file. */
+/**
+ * How much larger a robot is than the one that distances and arrows are made for.
+ * @param {Vehicle} vehicle
+ * @returns {number}
+ */
+function sizeOf(vehicle) {
+  return vehicle.body_m ? Math.max(...vehicle.body_m) / kHalfSpan_m : 1;
+}
+
+/** One robot. Its wings are those of the vehicle's file; where that has none, it is the ellipsoid of its mass and inertia. */
 class Robot {
   /**
    * @param {Vehicle} vehicle
-   * @param {string} colour of its wings
+   * @param {string} colour of its wings, or of all of it
    */
   constructor(vehicle, colour) {
     this.group = new THREE.Group();
-    const size = vehicle.left.wing_length_m / 0.07;
+    /** @type {{sign: number, stroke: any, rotation: any}[]} */
+    this.wings = [];
+    if (vehicle.body_m) this.addEllipsoid(vehicle.body_m, colour);
+    else this.addFlapper(/** @type {Side} */ (vehicle.left), /** @type {Side} */ (vehicle.right), colour);
+  }
+
+  /**
+   * @param {number[]} semi_axes_m
+   * @param {string} colour
+   */
+  addEllipsoid(semi_axes_m, colour) {
+    const body = new THREE.Mesh(new THREE.SphereBufferGeometry(1, 40, 24),
+      new THREE.MeshStandardMaterial({color: colour, roughness: 0.85, transparent: true, opacity: 0.4, depthWrite: false}));
+    body.scale.set(...semi_axes_m);
+    const size = Math.max(...semi_axes_m);
+    const beak = new THREE.Mesh(new THREE.ConeBufferGeometry(0.06 * size, 0.3 * size, 16), new THREE.MeshStandardMaterial({color: 0x24292f}));
+    beak.rotation.z = -Math.PI / 2;
+    beak.position.set(semi_axes_m[0] + 0.15 * size, 0, 0);
+    this.group.add(body, beak);
+  }
+
+  /**
+   * @param {Side} left
+   * @param {Side} right
+   * @param {string} colour of its wings
+   */
+  addFlapper(left, right, colour) {
+    const size = left.wing_length_m / 0.07;
     const outline = kBody.map(([height, radius]) => new THREE.Vector2(radius * size, height * size));
     const smooth = new THREE.SplineCurve(outline).getPoints(40);
     const body = new THREE.Mesh(new THREE.LatheBufferGeometry(smooth, 24), new THREE.MeshStandardMaterial({color: 0x8b98a5, roughness: 0.85}));
@@ -33,8 +71,7 @@ class Robot {
     beak.rotation.z = -Math.PI / 2;
     beak.position.set(0.017 * size, 0, 0.03 * size);
     this.group.add(body, beak);
-    this.wings = [[vehicle.left, 1], [vehicle.right, -1]].map(([side, sign]) =>
-      this.addWing(/** @type {Side} */ (side), /** @type {number} */ (sign), colour));
+    this.wings = [this.addWing(left, 1, colour), this.addWing(right, -1, colour)];
   }
 
   /**
@@ -214,13 +251,16 @@ export class Scene {
     this.shadow = new THREE.Mesh(new THREE.CircleBufferGeometry(0.03, 24), new THREE.MeshBasicMaterial({color: 0x57606a, transparent: true, opacity: 0.35}));
     this.scene.add(this.shadow);
     this.weight_N = robots[0].vehicle.mass_kg * 9.81;
+    this.size = sizeOf(robots[0].vehicle);
+    this.top_m = robots[0].vehicle.body_m?.[2] ?? 0.019;
+    this.shadow.scale.setScalar(this.size);
     this.addPlace(place, goal_m);
 
     /** @type {View} */
     this.view = "chase";
     this.azimuth = -2.3;
     this.elevation = 0.35;
-    this.distance = 0.55;
+    this.distance = kChase_m * this.size;
     this.target = [...this.middle];
     this.watched = [...this.middle];
     this.resize();
@@ -308,7 +348,7 @@ export class Scene {
   look(view) {
     this.view = view;
     const wide = Math.max(0.5, 1.9 * this.extent);
-    if (view === "chase") Object.assign(this, {azimuth: -2.3, elevation: 0.35, distance: 0.55});
+    if (view === "chase") Object.assign(this, {azimuth: -2.3, elevation: 0.35, distance: kChase_m * this.size});
     else if (view === "free") Object.assign(this, {azimuth: -1.9, elevation: 0.4, distance: wide});
     else if (view === "front") Object.assign(this, {azimuth: 0, elevation: 0, distance: wide});
     else if (view === "side") Object.assign(this, {azimuth: -Math.PI / 2, elevation: 0, distance: wide});
@@ -361,9 +401,9 @@ export class Scene {
     if (pose) {
       this.watched = pose.position;
       if (shown.arrows) {
-        const above = rotated(pose.attitude, [0, 0, 0.019]).map((value, k) => value + pose.position[k]);
-        this.velocity.show(pose.position, pose.velocity.map((value) => value * kVelocityArrow_s));
-        this.force.show(above, pose.force.map((value) => value * kForceArrow_m / this.weight_N));
+        const above = rotated(pose.attitude, [0, 0, this.top_m]).map((value, k) => value + pose.position[k]);
+        this.velocity.show(pose.position, pose.velocity.map((value) => value * kVelocityArrow_s * this.size));
+        this.force.show(above, pose.force.map((value) => value * kForceArrow_m * this.size / this.weight_N));
       }
       const height = pose.position[2] - this.floor_m;
       this.shadow.position.set(pose.position[0], pose.position[1], this.floor_m + 0.0005);

@@ -144,6 +144,8 @@ Flown flown(unsigned seed, double past) {
   std::mt19937_64 random(seed);
   Flown f;
   f.around.noise_sd.assign(kGroups, 2);
+  for (int g = 0; g < kGroups; ++g)
+    f.around.rows.push_back(g / kCoefficients < kPathX || g % kCoefficients == 0 ? 1 : 0);
   Quantity height{"height", "m", {}}, input{"input", "V", {}};
   const auto rows = [&] {
     Rows r(kBeats * kRowsPerBeat, 0);

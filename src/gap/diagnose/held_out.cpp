@@ -1,0 +1,305 @@
+#include "gap/diagnose/held_out.hpp"
+
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+#include <random>
+
+#include "io/statistics.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Seconds of a block, draws of blocks, copies that are shifted.
+constexpr double kBlock_s = 2;
+constexpr int kDraws = 1000, kCopies = 20;
+/// On functions of rms 1: those that are nearly the same share what they explain.
+constexpr double kRidge = 0.01;
+
+/// The most probable coordinates by the chosen flights alone.
+VectorXd coordinates_by(const RobotFit& robot, const Fitted& fit, const std::vector<char>& use,
+                        Posterior* own = nullptr) {
+  const Linearised& l = *fit.point;
+  const Columns c = robot.fitter().columns_of(l);
+  const BasisCoefficients sd = (robot.evidence().discrepancy_sd().array().square() +
+                                robot.fitter().form_error(fit.hypothesis, l).array().square())
+                                   .sqrt();
+  const Posterior p =
+      Evidence::posterior(robot.evidence().reduce(l.statistics, c.columns, use, sd), c.chosen, c.mean());
+  VectorXd at = l.at;
+  Index i = 0;
+  for (std::size_t k = 0; k < l.columns.size(); ++k)
+    if (l.columns[k].size() > 0) at += p.mean[i++] * l.directions.axes.col(static_cast<Index>(k));
+  if (own != nullptr) *own = p;
+  return fit.hypothesis.bounded(at);
+}
+
+/// "level_flight" of level_flight_2: names without a number at their end.
+std::string kind_of(std::string name) {
+  while (!name.empty() && std::isdigit(static_cast<unsigned char>(name.back()))) name.pop_back();
+  while (!name.empty() && (name.back() == '_' || name.back() == '-')) name.pop_back();
+  for (const char* word : {"_rep", "_run"})
+    if (name.ends_with(word)) name.resize(name.size() - std::string(word).size());
+  return name;
+}
+
+/// Calls use(flight, beat, row) for what a channel covers.
+template <class Use>
+void for_rows(const std::vector<PredictedFlight>& flights, int channel, const Use& use) {
+  for (std::size_t f = 0; f < flights.size(); ++f)
+    for (std::size_t j = 0; j < flights[f].beats(); ++j)
+      if (flights[f].covers(j, channel))
+        use(f, j, j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients);
+}
+
+double rms_of(const std::vector<PredictedFlight>& flights, const Residuals& left, int channel) {
+  double sum = 0, n = 0;
+  for_rows(flights, channel, [&](std::size_t f, std::size_t, std::size_t row) {
+    if (left[f].empty()) return;
+    sum += left[f][row] * left[f][row];
+    n += 1;
+  });
+  return n > 0 ? std::sqrt(sum / n) : 0;
+}
+
+std::vector<int> channels_of(const std::vector<PredictedFlight>& flights) {
+  std::vector<int> list;
+  for (int channel = 0; channel < kChannels; ++channel)
+    if (flights.front().has_rows(channel, 0)) list.push_back(channel);
+  return list;
+}
+
+HeldOutError error_of(const std::vector<PredictedFlight>& flights, const Residuals& each, const Residuals& by_type,
+                      int channel) {
+  HeldOutError e{channel_name(channel), rms_of(flights, each, channel), 0, 0, rms_of(flights, by_type, channel)};
+  std::vector<double> sums, counts;
+  std::vector<std::size_t> first;  // block of each flight
+  for (std::size_t f = 0; f < flights.size(); ++f) {
+    first.push_back(sums.size());
+    const auto length =
+        std::max<std::size_t>(1, static_cast<std::size_t>(std::round(kBlock_s * flights[f].beats_Hz())));
+    sums.resize(first[f] + flights[f].beats() / length + 1, 0);
+    counts.resize(sums.size(), 0);
+    for (std::size_t j = 0; j < flights[f].beats(); ++j) {
+      if (each[f].empty() || !flights[f].covers(j, channel)) continue;
+      const double v = each[f][j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients];
+      sums[first[f] + j / length] += v * v;
+      counts[first[f] + j / length] += 1;
+    }
+  }
+  std::mt19937_64 random(1);
+  std::vector<double> draws;
+  for (int k = 0; k < kDraws; ++k) {
+    double sum = 0, n = 0;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      const std::size_t b = random() % sums.size();
+      sum += sums[b], n += counts[b];
+    }
+    if (n > 0) draws.push_back(std::sqrt(sum / n));
+  }
+  if (!draws.empty()) e.low = io::quantile(draws, 0.05), e.high = io::quantile(draws, 0.95);
+  return e;
+}
+
+/// Rms of what least squares on other flights leave of `y`, fitted by one column: [flight][beat] of one channel.
+double left_beside(const std::vector<std::vector<double>>& y, const std::vector<std::vector<double>>& x) {
+  double sum = 0, n = 0;
+  for (std::size_t out = 0; out < y.size(); ++out) {
+    double xy = 0, xx = 1e-12;
+    for (std::size_t f = 0; f < y.size(); ++f)
+      for (std::size_t j = 0; (f != out || y.size() == 1) && j < y[f].size(); ++j)
+        xy += x[f][j] * y[f][j], xx += x[f][j] * x[f][j];
+    for (std::size_t j = 0; j < y[out].size(); ++j) sum += std::pow(y[out][j] - xy / xx * x[out][j], 2), n += 1;
+  }
+  return std::sqrt(sum / std::max(n, 1.0));
+}
+
+/// A constant is nothing that could be shifted.
+void centre(std::vector<std::vector<double>>& v) {
+  double sum = 0, n = 0;
+  for (const std::vector<double>& flight : v)
+    for (const double value : flight) sum += value, n += 1;
+  for (std::vector<double>& flight : v)
+    for (double& value : flight) value -= sum / n;
+}
+
+/// Each effect of a set beside the rest: all of what it changes, and copies of that at other times.
+void control(const std::vector<PredictedFlight>& flights, const Fitted& all, const VectorXd& at, int threads,
+             Validation& to) {
+  std::vector<Candidate> candidates = {all.hypothesis.candidate(at)};
+  for (const std::string& e : all.hypothesis.effects()) {
+    VectorXd without = at;
+    for (Index i = all.hypothesis.shared(); i < all.hypothesis.size(); ++i) {
+      const Unknown& u = all.hypothesis.unknowns()[static_cast<std::size_t>(i)];
+      if (u.effect == e && u.size) without[i] = 0;
+    }
+    candidates.push_back(all.hypothesis.candidate(without));
+  }
+  const std::vector<Residuals> left = residuals(flights, candidates, threads);
+  std::mt19937_64 random(1);
+  for (std::size_t e = 0; e + 1 < candidates.size(); ++e) {
+    if (left[0].empty() || left[e + 1].empty()) continue;
+    Validation::Control best{all.hypothesis.effects()[e], "", 0, 0};
+    for (const int channel : channels_of(flights)) {
+      std::vector<std::vector<double>> y(flights.size()), x(flights.size());
+      for_rows(flights, channel, [&](std::size_t f, std::size_t, std::size_t row) {
+        y[f].push_back(left[e + 1][f][row]);
+        x[f].push_back(left[e + 1][f][row] - left[0][f][row]);
+      });
+      centre(y);
+      centre(x);
+      std::vector<std::vector<double>> none = x;
+      for (std::vector<double>& v : none) std::ranges::fill(v, 0.0);
+      const double before = left_beside(y, none), gain = 1 - left_beside(y, x) / before;
+      if (!best.channel.empty() && gain <= best.gain) continue;
+      double shifted = -1;
+      for (int copy = 0; copy < kCopies; ++copy) {
+        std::vector<std::vector<double>> moved = x;
+        for (std::vector<double>& v : moved)
+          if (v.size() > 2 * kLeastShift)
+            std::ranges::rotate(
+                v, v.begin() + static_cast<std::ptrdiff_t>(kLeastShift + random() % (v.size() - 2 * kLeastShift)));
+        shifted = std::max(shifted, 1 - left_beside(y, moved) / before);
+      }
+      best.channel = channel_name(channel), best.gain = gain, best.best_of_shifted = shifted;
+    }
+    to.controls.push_back(best);
+  }
+}
+
+void agree(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Fitted& fit, Validation& to) {
+  const Hypothesis& h = fit.hypothesis;
+  std::vector<VectorXd> means;
+  std::vector<VectorXd> sds;
+  for (std::size_t f = 0; f < flights.size(); ++f) {
+    std::vector<char> use(flights.size(), 0);
+    use[f] = 1;
+    Posterior p;
+    means.push_back(coordinates_by(robot, fit, use, &p));
+    Eigen::MatrixXd axes(h.size(), 0);
+    for (std::size_t k = 0; k < fit.point->columns.size(); ++k)
+      if (fit.point->columns[k].size() > 0) {
+        axes.conservativeResize(Eigen::NoChange, axes.cols() + 1);
+        axes.rightCols(1) = fit.point->directions.axes.col(static_cast<Index>(k));
+      }
+    const Eigen::MatrixXd covariance = axes * p.covariance.topLeftCorner(axes.cols(), axes.cols()) * axes.transpose();
+    sds.push_back(covariance.diagonal().cwiseMax(0).cwiseSqrt());
+  }
+  for (Index i = h.shared(); i < h.size(); ++i) {
+    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+    if (!u.size) continue;
+    Validation::Agreement a{u.effect + "." + u.name, {}, {}, 1};
+    double weight = 0, mean = 0, squares = 0;
+    for (std::size_t f = 0; f < flights.size(); ++f) {
+      a.value.push_back(u.value(means[f][i]));
+      a.sd.push_back(u.scale * sds[f][i]);
+      weight += 1 / (a.sd[f] * a.sd[f]);
+      mean += a.value[f] / (a.sd[f] * a.sd[f]);
+    }
+    for (std::size_t f = 0; f < flights.size(); ++f) squares += std::pow((a.value[f] - mean / weight) / a.sd[f], 2);
+    if (flights.size() > 1)
+      a.p_value = cdf(complement(boost::math::chi_squared(static_cast<double>(flights.size() - 1)), squares));
+    to.agreements.push_back(std::move(a));
+  }
+}
+
+}  // namespace
+
+std::vector<Residuals> held_out(const RobotFit& robot, const std::vector<PredictedFlight>& flights,
+                                const std::vector<Fitted>& fits, const std::vector<int>& fold, int threads) {
+  const std::size_t folds = static_cast<std::size_t>(*std::ranges::max_element(fold)) + 1;
+  std::vector<Candidate> candidates;
+  for (const Fitted& fit : fits)
+    for (std::size_t k = 0; k < folds; ++k) {
+      std::vector<char> others(flights.size(), 1);
+      for (std::size_t f = 0; folds > 1 && f < flights.size(); ++f) others[f] = fold[f] != static_cast<int>(k);
+      candidates.push_back(fit.hypothesis.candidate(coordinates_by(robot, fit, others)));
+    }
+  std::vector<Residuals> rows = residuals(flights, candidates, threads);
+  std::vector<Residuals> left(fits.size(), Residuals(flights.size()));
+  for (std::size_t i = 0; i < fits.size(); ++i)
+    for (std::size_t f = 0; f < flights.size(); ++f) {
+      Residuals& s = rows[i * folds + static_cast<std::size_t>(fold[f])];
+      if (!s.empty()) left[i][f] = std::move(s[f]);
+    }
+  return left;
+}
+
+Residuals smoothed_away(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Residuals& residual) {
+  const RegimeBasis& basis = robot.evidence().basis();
+  Residuals left = residual;
+  for (const int channel : channels_of(flights))
+    for (std::size_t out = 0; out < flights.size(); ++out) {
+      Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(basis.size(), basis.size());
+      VectorXd right = VectorXd::Zero(basis.size());
+      double n = 0;
+      for_rows(flights, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
+        if ((f == out && flights.size() > 1) || residual[f].empty()) return;
+        const VectorXd b = basis.values(f).row(static_cast<Index>(j)).transpose();
+        normal.noalias() += b * b.transpose();
+        right += residual[f][row] * b;
+        n += 1;
+      });
+      normal.diagonal().array() += kRidge * n;
+      const VectorXd fit = normal.ldlt().solve(right);
+      for_rows(flights, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
+        if (f == out && !left[f].empty()) left[f][row] -= basis.values(f).row(static_cast<Index>(j)).dot(fit);
+      });
+    }
+  return left;
+}
+
+double mean_square(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Residuals& residual) {
+  double sum = 0, n = 0;
+  for (const int channel : channels_of(flights)) {
+    const double noise = robot.evidence().noise_sd(channel * kCoefficients);
+    for_rows(flights, channel, [&](std::size_t f, std::size_t, std::size_t row) {
+      if (!residual[f].empty()) sum += std::pow(residual[f][row] / noise, 2), n += 1;
+    });
+  }
+  return n > 0 ? sum / n : 0;
+}
+
+Validation validate(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Diagnosis& d,
+                    int threads) {
+  Validation v;
+  const sim::Randomisation& uncertain = robot.uncertain();
+  // the largest set that the conclusion holds, and those on the way to it
+  std::vector<Fitted> fits = {{Hypothesis(uncertain, {}), &d.parameters.point}};
+  const ScoredHypothesis& concluded = d.hypotheses[d.conclusion.hypothesis];
+  for (std::size_t n = 1; n <= concluded.effects.size(); ++n) {
+    const std::vector<std::string> set(concluded.effects.begin(),
+                                       concluded.effects.begin() + static_cast<std::ptrdiff_t>(n));
+    const auto found = std::ranges::find_if(d.hypotheses, [&](const ScoredHypothesis& a) {
+      return a.fitted() && a.kind == ScoredHypothesis::Kind::effect && a.effects == set;
+    });
+    if (found != d.hypotheses.end()) fits.push_back({Hypothesis(uncertain, set), &found->fit.point});
+  }
+  std::vector<int> each, type;
+  std::vector<std::string> kinds;
+  for (std::size_t f = 0; f < flights.size(); ++f) {
+    const std::string kind = kind_of(flights[f].name());
+    if (!std::ranges::count(kinds, kind)) kinds.push_back(kind);
+    each.push_back(static_cast<int>(f));
+    type.push_back(static_cast<int>(std::ranges::find(kinds, kind) - kinds.begin()));
+  }
+  const std::vector<Residuals> left = held_out(robot, flights, fits, each, threads),
+                               by_type = held_out(robot, flights, fits, type, threads);
+  const auto rung = [&](const std::string& added, const Residuals& own, const Residuals& own_by_type) {
+    v.ladder.push_back({added, {}});
+    for (const int channel : channels_of(flights))
+      v.ladder.back().errors.push_back(error_of(flights, own, own_by_type, channel));
+  };
+  rung("file", d.nominal, d.nominal);
+  for (std::size_t i = 0; i < fits.size(); ++i)
+    rung(i == 0 ? "parameters" : fits[i].hypothesis.effects().back(), left[i], by_type[i]);
+  const Fitted& last = fits.back();
+  control(flights, last, coordinates_by(robot, last, std::vector<char>(flights.size(), 1)), threads, v);
+  agree(robot, flights, last, v);
+  return v;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,281 @@
+#include "model/beat_averaged.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+
+#include "io/toml_writer.hpp"
+
+namespace flappy::model {
+namespace {
+
+constexpr const char* kMotionNames[kMotionVariables] = {"v_x", "v_y", "v_z", "speed", "w_x", "w_y", "w_z", "battery"};
+constexpr const char* kTermKeys[] = {"force_x_N",   "force_y_N",   "force_z_N",
+                                     "moment_x_Nm", "moment_y_Nm", "moment_z_Nm"};
+constexpr const char* kRoles[] = {"flapping", "stroke_plane", "other"};
+constexpr const char* kAccepted =
+    "sums and products of numbers, coefficients, actuators and motion, as \"k * left * v_x\"";
+constexpr int kMostPower = 4;
+constexpr double kLargest = 1e6, kLongestLag_s = 2, kFarthest_m = 1;
+
+/// A factor, and the variables it multiplies.
+struct Monomial {
+  double factor = 1;
+  std::vector<std::size_t> variables;
+};
+using Sum = std::vector<Monomial>;
+
+Sum times(const Sum& a, const Sum& b) {
+  Sum all;
+  for (const Monomial& x : a)
+    for (const Monomial& y : b) {
+      all.push_back({x.factor * y.factor, x.variables});
+      all.back().variables.insert(all.back().variables.end(), y.variables.begin(), y.variables.end());
+    }
+  return all;
+}
+
+/// Reads an expression by recursive descent: sum = product {+- product}, product = power {* power}, power = atom [^ whole].
+class Reader {
+ public:
+  Reader(std::string_view text, const BeatAveraged& vehicle) : text_(text), vehicle_(vehicle) {}
+
+  Sum read() {
+    Sum all = sum();
+    if (at_ < text_.size()) fail("\"" + std::string(text_.substr(at_)) + "\" is left over");
+    return all;
+  }
+
+ private:
+  [[noreturn]] static void fail(const std::string& what, const std::string& accepted = kAccepted) {
+    throw ExpressionFault{what, accepted};
+  }
+
+  char next() {
+    while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_]))) ++at_;
+    return at_ < text_.size() ? text_[at_] : '\0';
+  }
+  bool take(char c) {
+    if (next() != c) return false;
+    ++at_;
+    return true;
+  }
+
+  Sum sum() {
+    Sum all;
+    for (bool first = true;; first = false) {
+      double sign = 1;
+      if (take('-')) sign = -1;
+      else if (!take('+') && !first) break;
+      for (Monomial& m : product()) all.push_back({sign * m.factor, std::move(m.variables)});
+    }
+    next();
+    return all;
+  }
+
+  Sum product() {
+    Sum all = power();
+    while (take('*')) all = times(all, power());
+    return all;
+  }
+
+  Sum power() {
+    const Sum base = atom();
+    if (!take('^')) return base;
+    next();
+    int n = 0;
+    const auto end = std::from_chars(text_.data() + at_, text_.data() + text_.size(), n);
+    if (end.ec != std::errc() || n < 1 || n > kMostPower)
+      fail("\"^\" is not followed by a power", "whole powers from 1 to " + std::to_string(kMostPower));
+    at_ = static_cast<std::size_t>(end.ptr - text_.data());
+    Sum all = base;
+    for (int i = 1; i < n; ++i) all = times(all, base);
+    return all;
+  }
+
+  Sum atom() {
+    if (take('(')) {
+      Sum inner = sum();
+      if (!take(')')) fail("a \"(\" is not closed");
+      return inner;
+    }
+    const char c = next();
+    if (std::isdigit(static_cast<unsigned char>(c)) || c == '.') {
+      double value = 0;
+      const auto end = std::from_chars(text_.data() + at_, text_.data() + text_.size(), value);
+      if (end.ec != std::errc()) fail("no number at \"" + std::string(text_.substr(at_)) + "\"");
+      at_ = static_cast<std::size_t>(end.ptr - text_.data());
+      return {{value, {}}};
+    }
+    const std::size_t from = at_;
+    while (at_ < text_.size() && (std::isalnum(static_cast<unsigned char>(text_[at_])) || text_[at_] == '_')) ++at_;
+    if (at_ == from)
+      fail(from < text_.size() ? "nothing can stand at \"" + std::string(text_.substr(from)) + "\""
+                               : "it ends too early");
+    return named(text_.substr(from, at_ - from));
+  }
+
+  Sum named(std::string_view name) const {
+    for (const BeatAveraged::Coefficient& c : vehicle_.coefficients)
+      if (c.name == name) return {{c.value, {}}};
+    for (std::size_t i = 0; i < vehicle_.actuators.size(); ++i)
+      if (vehicle_.actuators[i].name == name) return {{1, {i}}};
+    for (std::size_t i = 0; i < kMotionVariables; ++i)
+      if (kMotionNames[i] == name) return {{1, {vehicle_.actuators.size() + i}}};
+    std::vector<std::string> known;
+    for (const BeatAveraged::Coefficient& c : vehicle_.coefficients) known.push_back(c.name);
+    for (const BeatAveraged::Actuator& a : vehicle_.actuators) known.push_back(a.name);
+    known.insert(known.end(), std::begin(kMotionNames), std::end(kMotionNames));
+    fail("nothing is called \"" + std::string(name) + "\"",
+         io::joined(known) + io::did_you_mean(std::string(name), known));
+  }
+
+  std::string_view text_;
+  std::size_t at_ = 0;
+  const BeatAveraged& vehicle_;
+};
+
+/// A name that an expression can use, and that nothing else has.
+void check_name(const io::Table& table, const std::string& name, const BeatAveraged& v) {
+  const bool word =
+      !name.empty() && !std::isdigit(static_cast<unsigned char>(name.front())) &&
+      std::ranges::all_of(name, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; });
+  if (!word) table.fail(name, "no expression can name this", "letters, digits and underscores, a letter first");
+  const bool twice = std::ranges::count(v.actuators, name, &BeatAveraged::Actuator::name) > 0 ||
+                     std::ranges::count(kMotionNames, name) > 0 ||
+                     std::ranges::count(v.coefficients, name, &BeatAveraged::Coefficient::name) > 0;
+  if (twice) table.fail(name, "something else has this name", "another name");
+}
+
+}  // namespace
+
+std::optional<ExpressionFault> expression_fault(std::string_view text, const BeatAveraged& vehicle) {
+  try {
+    Reader(text, vehicle).read();
+  } catch (const ExpressionFault& fault) {
+    return fault;
+  }
+  return std::nullopt;
+}
+
+MeanWrench::MeanWrench(const BeatAveraged& vehicle) {
+  for (const BeatAveraged::Wrench& w : vehicle.wrenches) {
+    const double at[3] = {w.at_m.x, w.at_m.y, w.at_m.z};
+    for (std::size_t k = 0; k < w.terms.size(); ++k) {
+      if (w.terms[k].empty()) continue;
+      Sum sum;
+      try {
+        sum = Reader(w.terms[k], vehicle).read();
+      } catch (const ExpressionFault& fault) {
+        throw std::invalid_argument(fault.what);
+      }
+      for (const Monomial& m : sum) {
+        products_.push_back({k, m.factor, m.variables});
+        if (k >= 3) continue;
+        // its moment about the origin: at x force
+        const std::size_t next = (k + 1) % 3, last = (k + 2) % 3;
+        if (at[last] != 0) products_.push_back({3 + next, m.factor * at[last], m.variables});
+        if (at[next] != 0) products_.push_back({3 + last, -m.factor * at[next], m.variables});
+      }
+    }
+  }
+  has_moments_ = std::ranges::any_of(products_, [](const Product& p) { return p.component >= 3; });
+}
+
+MeanLoad MeanWrench::at(std::span<const double> variables) const {
+  MeanLoad load;
+  for (const Product& p : products_) {
+    double value = p.factor;
+    for (const std::size_t v : p.variables) value *= variables[v];
+    (p.component < 3 ? load.force_N[p.component] : load.moment_Nm[p.component - 3]) += value;
+  }
+  return load;
+}
+
+BeatAveraged read_beat_averaged(const io::Table& root) {
+  BeatAveraged v;
+  const io::Table beat = root.table("beat");
+  v.nominal_Hz = beat.number("nominal_Hz", {1e-3, 1e4});
+  v.bandwidth_Hz = beat.number("bandwidth_Hz", {1e-3, v.nominal_Hz / 2});
+  const io::Range any{-kLargest, kLargest};
+  const io::Table inputs = root.table("input");
+  for (const std::string& name : inputs.keys()) {
+    const io::Table t = inputs.table(name);
+    const double low = t.number("low", any);
+    v.inputs.push_back({name, low, t.number("high", {low, kLargest})});
+  }
+  std::vector<std::string> columns;
+  for (const BeatAveraged::Input& i : v.inputs) columns.push_back(i.name);
+  const io::Table actuators = root.table("actuator");
+  for (const std::string& name : actuators.keys()) {
+    check_name(actuators, name, v);
+    const io::Table t = actuators.table(name);
+    BeatAveraged::Actuator a{name, t.choice("input", columns)};
+    const std::string role = t.choice("role", {std::begin(kRoles), std::end(kRoles)});
+    a.role = static_cast<BeatAveraged::Role>(std::ranges::find(kRoles, role) - std::begin(kRoles));
+    a.gain = t.number("gain", any);
+    a.offset = t.number_or("offset", 0, any);
+    a.lag_s = t.number_or("lag_s", 0, {0, kLongestLag_s});
+    v.actuators.push_back(std::move(a));
+  }
+  if (v.actuators.empty()) root.fail("actuator", "there is none", "a table [actuator.NAME] for each");
+  if (const auto coefficients = root.optional_table("coefficients"))
+    for (const std::string& name : coefficients->keys()) {
+      check_name(*coefficients, name, v);
+      const bool known = coefficients->has(name + ".value");
+      v.coefficients.push_back({name, coefficients->number(known ? name + ".value" : name, any),
+                                known ? coefficients->number(name + ".sd", {0, kLargest}) : 0});
+    }
+  const io::Table wrenches = root.table("wrench");
+  for (const std::string& name : wrenches.keys()) {
+    const io::Table t = wrenches.table(name);
+    BeatAveraged::Wrench w{name, {}, {}};
+    const io::Range near{-kFarthest_m, kFarthest_m};
+    if (t.has("at_m")) w.at_m = {t.number("at_m.x", near), t.number("at_m.y", near), t.number("at_m.z", near)};
+    bool any_term = false;
+    for (std::size_t k = 0; k < w.terms.size(); ++k) {
+      w.terms[k] = t.string_or(kTermKeys[k], "");
+      if (w.terms[k].empty()) continue;
+      any_term = true;
+      if (const auto fault = expression_fault(w.terms[k], v)) t.fail(kTermKeys[k], fault->what, fault->accepted);
+    }
+    if (!any_term)
+      wrenches.fail(name, "has no force and no moment", io::joined({std::begin(kTermKeys), std::end(kTermKeys)}));
+    v.wrenches.push_back(std::move(w));
+  }
+  return v;
+}
+
+std::string beat_averaged_text(const BeatAveraged& v) {
+  std::string text;
+  const auto line = [&](const std::string& path, const std::string& value) { text += path + " = " + value + "\n"; };
+  const auto number = [&](const std::string& path, double value) { line(path, io::toml_number(value)); };
+  number("beat.nominal_Hz", v.nominal_Hz);
+  number("beat.bandwidth_Hz", v.bandwidth_Hz);
+  for (const BeatAveraged::Input& i : v.inputs) {
+    number("input." + i.name + ".low", i.low);
+    number("input." + i.name + ".high", i.high);
+  }
+  for (const BeatAveraged::Actuator& a : v.actuators) {
+    line("actuator." + a.name + ".input", io::toml_string(a.input));
+    line("actuator." + a.name + ".role", io::toml_string(kRoles[static_cast<int>(a.role)]));
+  }
+  for (const BeatAveraged::Coefficient& c : v.coefficients) {
+    number("coefficients." + c.name + ".value", c.value);
+    number("coefficients." + c.name + ".sd", c.sd);
+  }
+  for (const BeatAveraged::Wrench& w : v.wrenches) {
+    if (w.at_m.x != 0 || w.at_m.y != 0 || w.at_m.z != 0) {
+      number("wrench." + w.name + ".at_m.x", w.at_m.x);
+      number("wrench." + w.name + ".at_m.y", w.at_m.y);
+      number("wrench." + w.name + ".at_m.z", w.at_m.z);
+    }
+    for (std::size_t k = 0; k < w.terms.size(); ++k)
+      if (!w.terms[k].empty()) line("wrench." + w.name + "." + kTermKeys[k], io::toml_string(w.terms[k]));
+  }
+  return text;
+}
+
+}  // namespace flappy::model

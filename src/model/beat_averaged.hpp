@@ -1,0 +1,70 @@
+// A robot that is known by the beat: force and moment as means over its beats, at an instant, from what its actuators do and how it
+// moves. Its file says how:
+//
+//   model = "beat_averaged"
+//   [beat]                                   # nominal_Hz, bandwidth_Hz
+//   [torso]                                  # all of it: mass_kg, com_m, inertia_kg_m2
+//   [input.left_flap]                        # a column of command.csv: low, high
+//   [actuator.left_Hz]                       # input, role ("flapping", "stroke_plane", "other"), gain, offset, lag_s:
+//                                            #   a' = (gain u + offset - a) / lag_s
+//   [coefficients]                           # thrust_N_Hz = 0.035, or { value = 0.035, sd = 0.005 }: how well it is known
+//   [wrench.wings]                           # at_m, and any of force_x_N ... moment_z_Nm, in B:
+//   force_z_N = "thrust_N_Hz * (left_Hz + right_Hz) - heave_N_s_m * v_z"
+//
+// An expression is made of + - * ( ) ^ (a whole power) over numbers, coefficients, actuators and
+//   v_x v_y v_z   velocity of the torso's origin in the air, in B, m/s      speed   its length
+//   w_x w_y w_z   body rates in B, rad/s                                    battery  voltage over the nominal one, 1 where it is not known
+// so every force is a sum of products.
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "flappy/vehicle.hpp"
+#include "io/config.hpp"
+
+namespace flappy::model {
+
+/// What an expression may name besides coefficients and actuators, in this order.
+enum MotionVariable : int { kVx, kVy, kVz, kSpeed, kWx, kWy, kWz, kBatteryShare, kMotionVariables };
+
+/// Force and moment about the torso's origin, N and N m, in B.
+struct MeanLoad {
+  std::array<double, 3> force_N{}, moment_Nm{};
+};
+
+/// The expressions of a vehicle as sums of products.
+class MeanWrench {
+ public:
+  /// std::invalid_argument for a vehicle whose expressions are none; read_vehicle() refuses those by line and column.
+  explicit MeanWrench(const BeatAveraged& vehicle);
+
+  /// `variables`: the actuators in their order, then the motion variables.
+  MeanLoad at(std::span<const double> variables) const;
+  bool has_moments() const { return has_moments_; }
+
+ private:
+  struct Product {
+    std::size_t component;  ///< of force, then moment
+    double factor;
+    std::vector<std::size_t> variables;
+  };
+  std::vector<Product> products_;
+  bool has_moments_ = false;
+};
+
+/// What is wrong with an expression over these names, and what is accepted; empty: nothing.
+struct ExpressionFault {
+  std::string what, accepted;
+};
+std::optional<ExpressionFault> expression_fault(std::string_view text, const BeatAveraged& vehicle);
+
+/// Reads the tables beat, input, actuator, coefficients and wrench of a vehicle's file.
+BeatAveraged read_beat_averaged(const io::Table& root);
+/// Reads back the same.
+std::string beat_averaged_text(const BeatAveraged& vehicle);
+
+}  // namespace flappy::model

@@ -1,0 +1,211 @@
+// A robot that is known by the beat: what its file may say, what that means, and what effects do to it.
+#include "model/beat_averaged.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "flappy/vehicle_file.hpp"
+#include "model/effects/registry.hpp"
+#include "refusal.hpp"
+#include "vehicles.hpp"
+
+namespace flappy::model {
+namespace {
+
+BeatAveraged some() {
+  BeatAveraged b;
+  b.nominal_Hz = 15;
+  b.bandwidth_Hz = 3;
+  b.inputs = {{"left", 0, 1}};
+  b.actuators = {{"left_Hz", "left", BeatAveraged::Role::flapping, 25, 0, 0}};
+  b.coefficients = {{"k", 2, 0}, {"c", -0.5, 0.1}};
+  return b;
+}
+
+/// Of left_Hz = 3, v = (1, -2, 0.5), rates (0.1, 0.2, 0.3), battery 0.9.
+MeanLoad load_of(BeatAveraged b, std::size_t component, const std::string& text, Triple at = {}) {
+  b.wrenches = {{"wings", at, {}}};
+  b.wrenches[0].terms[component] = text;
+  const std::vector<double> variables = {3, 1, -2, 0.5, std::sqrt(5.25), 0.1, 0.2, 0.3, 0.9};
+  return MeanWrench(b).at(variables);
+}
+
+TEST(BeatAveraged, ExpressionsAreSumsOfProducts) {
+  const BeatAveraged b = some();
+  EXPECT_DOUBLE_EQ(load_of(b, 2, "k * left_Hz").force_N[2], 6);
+  EXPECT_DOUBLE_EQ(load_of(b, 2, "-c * v_y - 1.5").force_N[2], -1 - 1.5);
+  EXPECT_DOUBLE_EQ(load_of(b, 0, "k*(left_Hz + v_y)^2*(v_x - 3)").force_N[0], 2 * 1 * -2);
+  EXPECT_DOUBLE_EQ(load_of(b, 1, "- speed^2 * battery").force_N[1], -5.25 * 0.9);
+  EXPECT_DOUBLE_EQ(load_of(b, 5, "w_x + 10*w_y + 100*w_z").moment_Nm[2], 32.1);
+  EXPECT_DOUBLE_EQ(load_of(b, 0, "2e-1").force_N[0], 0.2);
+}
+
+TEST(BeatAveraged, ForceAtAPointHasAMoment) {
+  // r x F, r = (1, 2, 3)
+  const Triple at{0.1, 0.2, 0.3};
+  const MeanLoad x = load_of(some(), 0, "1", at), y = load_of(some(), 1, "1", at), z = load_of(some(), 2, "1", at);
+  EXPECT_EQ(x.moment_Nm, (std::array<double, 3>{0, 0.3, -0.2}));
+  EXPECT_EQ(y.moment_Nm, (std::array<double, 3>{-0.3, 0, 0.1}));
+  EXPECT_EQ(z.moment_Nm, (std::array<double, 3>{0.2, -0.1, 0}));
+}
+
+TEST(BeatAveraged, NamesWhatIsNoExpression) {
+  const auto fault = [](const std::string& text) {
+    const auto found = expression_fault(text, some());
+    return found ? found->what : "none";
+  };
+  EXPECT_EQ(fault("k * left_Hz"), "none");
+  EXPECT_EQ(fault("k * right_Hz"), "nothing is called \"right_Hz\"");
+  EXPECT_EQ(fault("k * (left_Hz"), "a \"(\" is not closed");
+  EXPECT_EQ(fault("k left_Hz"), "\"left_Hz\" is left over");
+  EXPECT_EQ(fault("k *"), "it ends too early");
+  EXPECT_EQ(fault("k ^ 0.5"), "\"^\" is not followed by a power");
+  EXPECT_EQ(fault("k / 2"), "\"/ 2\" is left over");
+  EXPECT_NE(expression_fault("left_hz", some())->accepted.find("did you mean"), std::string::npos);
+}
+
+TEST(BeatAveraged, ShippedVehiclesReadBackAsTheyWere) {
+  for (const char* name : {"flapper_nimble", "crazyflie"}) {
+    SCOPED_TRACE(name);
+    Vehicle v = read_any_vehicle(test::source_path("configs/vehicles/" + std::string(name) + ".toml"));
+    v.effects["flapping_counter_force"] = {{"x_per_s", 1.5}, {"y_per_s", 0}, {"z_per_s", 0.25}};
+    const std::string file = testing::TempDir() + "/" + name + ".toml";
+    std::ofstream(file) << vehicle_text(v);
+    Vehicle again = read_any_vehicle(file);
+    EXPECT_EQ(vehicle_text(again), vehicle_text(v));
+    const auto p = parameters(v), q = parameters(again);
+    ASSERT_EQ(p.size(), q.size());
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      EXPECT_EQ(p[i].path, q[i].path);
+      EXPECT_EQ(*p[i].value, *q[i].value) << p[i].path;
+    }
+    EXPECT_EQ(again.beat_averaged->coefficients[0].sd, v.beat_averaged->coefficients[0].sd);
+  }
+}
+
+class Refusal : public testing::Test {
+ protected:
+  /// What is said of the shipped file with a text for another, less its place.
+  std::string edited(const std::string& from, const std::string& to) const {
+    std::ifstream in(test::source_path("configs/vehicles/flapper_nimble.toml"));
+    std::string text((std::istreambuf_iterator<char>(in)), {});
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+    const std::string file = testing::TempDir() + "/edited.toml";
+    std::ofstream(file) << text;
+    const std::string what = test::refusal([&] { read_any_vehicle(file); });
+    if (what == "accepted") return what;
+    EXPECT_EQ(what.rfind(file + ":", 0), 0U) << what;
+    return what.substr(what.find(": ", file.size()) + 2);
+  }
+};
+
+TEST_F(Refusal, SaysWhatAndWhere) {
+  EXPECT_EQ(edited("input = \"left_flap\"", "input = \"left_flop\"").rfind("actuator.left_Hz.input: ", 0), 0U);
+  EXPECT_EQ(edited("role = \"flapping\"", "role = \"flap\"").rfind("actuator.left_Hz.role: ", 0), 0U);
+  EXPECT_EQ(edited("thrust_N_Hz * (left_Hz", "thrust_N_Hz * (left_hz")
+                .rfind("wrench.wings.force_z_N: nothing is called \"left_hz\"", 0),
+            0U);
+  EXPECT_EQ(edited("bandwidth_Hz = 3.0", "bandwidth_Hz = 10.0").rfind("beat.bandwidth_Hz: ", 0), 0U);
+  EXPECT_EQ(edited("[actuator.left_Hz]", "[actuator.v_x]").rfind("actuator.v_x: something else has this name", 0), 0U);
+  EXPECT_EQ(edited("[wrench.wings]", "[effects.wing_damage]\n[wrench.wings]")
+                .rfind("effects.wing_damage: unknown effect; accepted: com_offset,", 0),
+            0U);
+  EXPECT_EQ(edited("\"beat_averaged\"", "\"beat\"").rfind("model: ", 0), 0U);
+  EXPECT_EQ(
+      edited("lift_N = { value = 0.0, sd = 1.0 }", "lift_N = { value = 0.0 }").rfind("coefficients.lift_N.sd: ", 0),
+      0U);
+}
+
+TEST_F(Refusal, NothingFliesIt) {
+  const std::string what =
+      test::refusal([] { read_vehicle(test::source_path("configs/vehicles/flapper_nimble.toml")); });
+  EXPECT_NE(what.find("model: a robot that is known by the beat cannot be flown"), std::string::npos) << what;
+}
+
+// ---- effects
+
+MeanState<double> state() {
+  MeanState<double> s{};
+  s.attitude = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  s.velocity_B_m_s = {1, -2, 0.5};
+  s.rate_rad_s = {0, 0, 2};
+  s.turning_rad_s2 = {0, 3, 0};
+  s.mass_kg = 0.1, s.gravity_m_s2 = 9.81, s.air_density_kg_m3 = 1.2;
+  s.position_m = {0, 0, 1};
+  s.beat_share = 1.1, s.thrust_N = 1, s.stroke_plane = 0.2, s.stroke_plane_1_s = 4;
+  return s;
+}
+
+Vehicle known_by_the_beat() {
+  Vehicle v;
+  v.beat_averaged = some();
+  return v;
+}
+
+std::vector<double> load_of(const std::string& id, const std::vector<double>& q) {
+  MeanLoads<double> load{};
+  find_effect(known_by_the_beat(), id)->mean.load(q.data(), state(), load);
+  return {load.force_N.x, load.force_N.y, load.force_N.z, load.moment_Nm.x, load.moment_Nm.y, load.moment_Nm.z};
+}
+
+std::vector<double> seen_of(const std::string& id, const std::vector<double>& q) {
+  Vec3<double> f{};
+  find_effect(known_by_the_beat(), id)->mean.seen(q.data(), state(), f);
+  return {f.x, f.y, f.z};
+}
+
+void expect_near(const std::vector<double>& a, const std::vector<double>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-12) << i;
+}
+
+TEST(MeanEffects, FollowTheirEquations) {
+  expect_near(load_of("flapping_counter_force", {3, 2, 1}), {-0.1 * 1.1 * 3, 0.1 * 1.1 * 4, -0.1 * 1.1 * 0.5, 0, 0, 0});
+  const double drag = 0.5 * 1.2 * 0.02 * std::sqrt(5.25);
+  expect_near(load_of("body_drag", {0.02, 0}), {-drag, 2 * drag, -0.5 * drag, 0, 0, 0});
+  expect_near(load_of("translational_lift", {0.3}), {0, 0, 0.3 * 0.1 * 5, 0, 0, 0});
+  expect_near(load_of("stroke_plane_actuation", {10, -1}), {0.1 * (2 - 4), 0, 0, 0, 0, 0});
+  expect_near(load_of("thrust_axis_tilt", {0.1, 0.2}), {0.2, -0.1, 0, 0, 0, 0});
+  // d = (0.1, 0, 0): w x (w x d) = -4 d, a x d = (0, 3, 0) x d = (0, 0, -0.3)
+  expect_near(seen_of("marker_offset", {0.1, 0, 0}), {-0.4, 0, -0.3});
+  expect_near(seen_of("mocap_tilt", {0.01, 0.02}), {0.02 * 9.81, -0.01 * 9.81, 0});
+}
+
+TEST(MeanEffects, AreNoneWithoutSizes) {
+  for (const EffectEntry& e : catalogue_of(known_by_the_beat())) {
+    SCOPED_TRACE(e.info.id);
+    EXPECT_TRUE(e.change || e.mean.drive || e.mean.wind || e.mean.load || e.mean.seen);
+    std::vector<double> q = e.values({});
+    for (int k = 0; k < e.info.sizes; ++k) q[static_cast<std::size_t>(k)] = 0;
+    EXPECT_FALSE(e.acts(q));
+    if (e.mean.load) expect_near(load_of(e.info.id, q), {0, 0, 0, 0, 0, 0});
+    if (e.mean.seen) expect_near(seen_of(e.info.id, q), {0, 0, 0});
+    for (const EffectParameter& p : e.parameters) {
+      EXPECT_LE(p.low, p.prior_low) << p.name;
+      EXPECT_GE(p.high, p.prior_high) << p.name;
+    }
+  }
+}
+
+/// docs/effects.md lists each with its figures.
+TEST(MeanEffects, AreDocumented) {
+  std::ifstream in(test::source_path("docs/effects.md"));
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  const std::size_t from = text.find("## Of robots that are known by the beat");
+  ASSERT_NE(from, std::string::npos);
+  for (const EffectEntry& e : catalogue_of(known_by_the_beat())) {
+    const std::size_t row = text.find("| " + std::string(e.info.id) + " |", from);
+    ASSERT_NE(row, std::string::npos) << e.info.id;
+    const std::string line = text.substr(row, text.find('\n', row) - row);
+    for (const EffectParameter& p : e.parameters)
+      EXPECT_NE(line.find("`" + std::string(p.name) + "`"), std::string::npos) << e.info.id << " " << p.name;
+    EXPECT_NE(line.find(e.info.source), std::string::npos) << e.info.id;
+  }
+}
+
+}  // namespace
+}  // namespace flappy::model
