@@ -93,8 +93,7 @@ def test_film_of_frames_and_without_wings() -> None:
 
 
 def test_environment_renders() -> None:
-    import gymnasium
-
+    gymnasium = pytest.importorskip("gymnasium")
     env = gymnasium.make("flappy:flappy/Hover-v0", render_mode="rgb_array")
     env.reset(seed=0)
     before = env.render()
