@@ -111,7 +111,9 @@ class Carrier {
 
 }  // namespace
 
-gap::Rows predict_perturbed(const gap::Recording& r, const Perturbation& perturbation, std::uint64_t flight) {
+gap::Rows predict_perturbed(const gap::PredictedFlight& recorded, const Perturbation& perturbation,
+                            std::uint64_t flight) {
+  const gap::Recording& r = recorded.recording();
   const std::vector<double> samples = Carrier(r, perturbation, flight).fly();
   if (samples.empty()) return {};
   const gap::BeatProjection projection(r.beat, r.valid, r.beats,
@@ -124,6 +126,7 @@ gap::Rows predict_perturbed(const gap::Recording& r, const Perturbation& perturb
       for (std::size_t s = 0; s < kSignals; ++s)
         rows[j * gap::kRowsPerBeat + s * gap::kCoefficients + c] =
             together[(j * gap::kCoefficients + c) * kSignals + s];
+  recorded.weigh(rows);
   return rows;
 }
 
@@ -132,7 +135,7 @@ std::vector<gap::Residuals> predict_perturbed_flights(const std::vector<gap::Pre
   std::vector<gap::Residuals> result(perturbations.size(), gap::Residuals(flights.size()));
   io::parallel_for(perturbations.size() * flights.size(), threads, [&](std::size_t job) {
     const std::size_t perturbation = job / flights.size(), flight = job % flights.size();
-    result[perturbation][flight] = predict_perturbed(flights[flight].recording(), perturbations[perturbation], flight);
+    result[perturbation][flight] = predict_perturbed(flights[flight], perturbations[perturbation], flight);
   });
   for (gap::Residuals& s : result)
     if (std::ranges::any_of(s, [](const gap::Rows& rows) { return rows.empty(); })) s.clear();

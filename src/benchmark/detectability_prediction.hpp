@@ -20,7 +20,8 @@ struct Perturbation {
 
 /// As the sensors of a perturbed robot would have shown flight `flight` of its case, noise-free, in the rows of gap/replay/reset_prediction.hpp: torques
 /// and forces, the rest 0. Empty where it comes apart.
-gap::Rows predict_perturbed(const gap::Recording& recording, const Perturbation& perturbation, std::uint64_t flight);
+gap::Rows predict_perturbed(const gap::PredictedFlight& recorded, const Perturbation& perturbation,
+                            std::uint64_t flight);
 
 /// All flights under all perturbations: [perturbation][flight]; empty residuals for those that come apart. The same for any number of
 /// threads; 0: one for each processor.

@@ -203,7 +203,6 @@ Rows MeanPrediction::predict(const Candidate& candidate) const {
     s.gravity_m_s2 = log_.header.gravity_m_s2;
     s.air_density_kg_m3 = ambient.air_density_kg_m3;
     s.ground_z_m = ambient.ground_z_m;
-    s.ceiling_z_m = ambient.ceiling_z_m;
     double flapping = 0;
     for (std::size_t k = 0; k < b.actuators.size(); ++k) {
       const model::BeatAveraged::Actuator& a = b.actuators[k];

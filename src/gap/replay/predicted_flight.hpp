@@ -92,6 +92,8 @@ class Predictor {
   virtual const Rows& measured() const = 0;
   virtual const Rows& signal() const = 0;
   virtual std::vector<Rows> predict(const std::vector<const Candidate*>& candidates) const = 0;
+  /// Weighs rows of samples that were predicted elsewhere as `measured` and `predict` do.
+  virtual void weigh(Rows& /*rows*/) const {}
   virtual Rows declared_noise(std::uint64_t seed) const = 0;
   virtual std::vector<RegimeFunction> functions() const = 0;
   /// Pairs of functions, by name, whose product says what they do not.
@@ -125,6 +127,8 @@ class PredictedFlight {
   std::vector<Rows> predict(const std::vector<const Candidate*>& candidates) const {
     return predictor_->predict(candidates);
   }
+
+  void weigh(Rows& rows) const { predictor_->weigh(rows); }
 
   /// Rows of the sensors' declared noise alone: one of its many courses, the same for a seed.
   Rows declared_noise(std::uint64_t seed) const { return predictor_->declared_noise(seed); }

@@ -168,6 +168,10 @@ void ResetPrediction::smooth_forces(Rows& rows, const Eigen::Matrix3Xd& more_m_s
   }
 }
 
+void ResetPrediction::weigh(Rows& rows) const {
+  smooth_forces(rows, Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(recording_.beats)));
+}
+
 /// Of samples [interval][channel].
 Rows ResetPrediction::rows_of(const std::vector<double>& samples) const {
   Rows together(recording_.beats * kCoefficients * kSignals, 0), rows(recording_.beats * kRowsPerBeat, 0);
@@ -298,7 +302,7 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
     Rows& rows = result[lane];
     rows.resize(r.beats * kRowsPerBeat);
     put_channels(together, r.beats, kSignals, kVehicles, lane, 0, rows);
-    smooth_forces(rows, Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(r.beats)));
+    weigh(rows);
     if (r.log.power) put_channels(metered_together, r.beats, kMetered, kVehicles, lane, kBattery, rows);
   }
   return result;

@@ -23,6 +23,7 @@ class ResetPrediction final : public Predictor {
   const Rows& measured() const override { return measured_; }
   const Rows& signal() const override { return signal_; }
   std::vector<Rows> predict(const std::vector<const Candidate*>& candidates) const override;
+  void weigh(Rows& rows) const override;
   Rows declared_noise(std::uint64_t seed) const override;
   std::vector<RegimeFunction> functions() const override;
   std::vector<std::pair<std::string, std::string>> products() const override;
