@@ -97,7 +97,7 @@ struct Posterior {
 };
 
 /// A robot whose wings are not modelled: what acts on it as means over beats, from its inputs and its motion
-/// (src/model/beat_averaged.hpp). Its torso is all of it; sides, driver and extent say nothing.
+/// (src/model/beat_averaged.hpp). Its torso is all of it; sides and driver say nothing.
 struct BeatAveraged {
   double nominal_Hz = 0;    ///< beats, about
   double bandwidth_Hz = 0;  ///< up to which force and motion are compared, well below the beat

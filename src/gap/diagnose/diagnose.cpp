@@ -34,7 +34,6 @@ class Diagnoser {
         options_(options),
         rule_(options.rule),
         threads_(io::thread_count(options.threads)),
-        all_(flights.size(), 1),
         robot_(flights, uncertain, options.discrepancy, options.withheld, threads_) {}
 
   Diagnosis run() {
@@ -292,7 +291,7 @@ class Diagnoser {
         fits.push_back({Hypothesis(uncertain_, a.effects), &a.fit.point});
         of.push_back(&a.left);
       }
-    std::vector<int> each(all_.size());
+    std::vector<int> each(flights_.size());
     std::iota(each.begin(), each.end(), 0);
     std::vector<Residuals> left = held_out(robot_, flights_, fits, each, threads_);
     for (std::size_t i = 0; i < of.size(); ++i) *of[i] = std::move(left[i]);
@@ -320,7 +319,6 @@ class Diagnoser {
   const DiagnoseOptions& options_;
   const VerdictRule& rule_;
   int threads_;
-  std::vector<char> all_;
   RobotFit robot_;
   const sim::Randomisation& uncertain_ = robot_.uncertain();
   const Evidence& evidence_ = robot_.evidence();

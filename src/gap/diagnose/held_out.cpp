@@ -20,21 +20,9 @@ constexpr int kDraws = 1000, kCopies = 20;
 constexpr double kRidge = 0.01;
 
 /// The most probable coordinates by the chosen flights alone.
-VectorXd coordinates_by(const RobotFit& robot, const Fitted& fit, const std::vector<char>& use,
-                        Posterior* own = nullptr) {
+VectorXd coordinates_by(const RobotFit& robot, const Fitted& fit, const std::vector<char>& use) {
   const Linearised& l = *fit.point;
-  const Columns c = robot.fitter().columns_of(l);
-  const BasisCoefficients sd = (robot.evidence().discrepancy_sd().array().square() +
-                                robot.fitter().form_error(fit.hypothesis, l).array().square())
-                                   .sqrt();
-  const Posterior p =
-      Evidence::posterior(robot.evidence().reduce(l.statistics, c.columns, use, sd), c.chosen, c.mean());
-  VectorXd at = l.at;
-  Index i = 0;
-  for (std::size_t k = 0; k < l.columns.size(); ++k)
-    if (l.columns[k].size() > 0) at += p.mean[i++] * l.directions.axes.col(static_cast<Index>(k));
-  if (own != nullptr) *own = p;
-  return fit.hypothesis.bounded(at);
+  return fit.hypothesis.bounded(l.at + l.directions.axes * robot.fitter().posterior(fit.hypothesis, l, use).mean);
 }
 
 /// "level_flight" of level_flight_2: names without a number at their end.
@@ -172,21 +160,14 @@ void control(const std::vector<PredictedFlight>& flights, const Fitted& all, con
 
 void agree(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Fitted& fit, Validation& to) {
   const Hypothesis& h = fit.hypothesis;
-  std::vector<VectorXd> means;
-  std::vector<VectorXd> sds;
+  const Eigen::MatrixXd& axes = fit.point->directions.axes;
+  std::vector<VectorXd> means, sds;
   for (std::size_t f = 0; f < flights.size(); ++f) {
     std::vector<char> use(flights.size(), 0);
     use[f] = 1;
-    Posterior p;
-    means.push_back(coordinates_by(robot, fit, use, &p));
-    Eigen::MatrixXd axes(h.size(), 0);
-    for (std::size_t k = 0; k < fit.point->columns.size(); ++k)
-      if (fit.point->columns[k].size() > 0) {
-        axes.conservativeResize(Eigen::NoChange, axes.cols() + 1);
-        axes.rightCols(1) = fit.point->directions.axes.col(static_cast<Index>(k));
-      }
-    const Eigen::MatrixXd covariance = axes * p.covariance.topLeftCorner(axes.cols(), axes.cols()) * axes.transpose();
-    sds.push_back(covariance.diagonal().cwiseMax(0).cwiseSqrt());
+    const Posterior p = robot.fitter().posterior(h, *fit.point, use);
+    means.push_back(h.bounded(fit.point->at + axes * p.mean));
+    sds.push_back((axes * p.covariance * axes.transpose()).diagonal().cwiseSqrt());
   }
   for (Index i = h.shared(); i < h.size(); ++i) {
     const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
@@ -231,24 +212,34 @@ std::vector<Residuals> held_out(const RobotFit& robot, const std::vector<Predict
 Residuals smoothed_away(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Residuals& residual) {
   const RegimeBasis& basis = robot.evidence().basis();
   Residuals left = residual;
-  for (const int channel : channels_of(flights))
-    for (std::size_t out = 0; out < flights.size(); ++out) {
-      Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(basis.size(), basis.size());
-      VectorXd right = VectorXd::Zero(basis.size());
+  for (const int channel : channels_of(flights)) {
+    struct Sums {
+      Eigen::MatrixXd normal;
+      VectorXd right;
       double n = 0;
-      for_rows(flights, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
-        if ((f == out && flights.size() > 1) || residual[f].empty()) return;
-        const VectorXd b = basis.values(f).row(static_cast<Index>(j)).transpose();
-        normal.noalias() += b * b.transpose();
-        right += residual[f][row] * b;
-        n += 1;
-      });
-      normal.diagonal().array() += kRidge * n;
-      const VectorXd fit = normal.ldlt().solve(right);
-      for_rows(flights, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
-        if (f == out && !left[f].empty()) left[f][row] -= basis.values(f).row(static_cast<Index>(j)).dot(fit);
-      });
+      void operator+=(const Sums& o) { normal += o.normal, right += o.right, n += o.n; }
+    };
+    const Sums none{Eigen::MatrixXd::Zero(basis.size(), basis.size()), VectorXd::Zero(basis.size())};
+    std::vector<Sums> of(flights.size(), none);
+    for_rows(flights, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
+      if (residual[f].empty()) return;
+      const auto b = basis.values(f).row(static_cast<Index>(j));
+      of[f].normal.noalias() += b.transpose() * b;
+      of[f].right += residual[f][row] * b.transpose();
+      of[f].n += 1;
+    });
+    std::vector<VectorXd> fits;
+    for (std::size_t out = 0; out < flights.size(); ++out) {
+      Sums others = none;
+      for (std::size_t f = 0; f < flights.size(); ++f)
+        if (f != out || flights.size() == 1) others += of[f];
+      others.normal.diagonal().array() += kRidge * others.n;
+      fits.push_back(others.normal.ldlt().solve(others.right));
     }
+    for_rows(flights, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
+      if (!left[f].empty()) left[f][row] -= basis.values(f).row(static_cast<Index>(j)).dot(fits[f]);
+    });
+  }
   return left;
 }
 
@@ -269,6 +260,7 @@ Validation validate(const RobotFit& robot, const std::vector<PredictedFlight>& f
   const sim::Randomisation& uncertain = robot.uncertain();
   // the largest set that the conclusion holds, and those on the way to it
   std::vector<Fitted> fits = {{Hypothesis(uncertain, {}), &d.parameters.point}};
+  std::vector<const Residuals*> left = {&d.refit};
   const ScoredHypothesis& concluded = d.hypotheses[d.conclusion.hypothesis];
   for (std::size_t n = 1; n <= concluded.effects.size(); ++n) {
     const std::vector<std::string> set(concluded.effects.begin(),
@@ -276,18 +268,18 @@ Validation validate(const RobotFit& robot, const std::vector<PredictedFlight>& f
     const auto found = std::ranges::find_if(d.hypotheses, [&](const ScoredHypothesis& a) {
       return a.fitted() && a.kind == ScoredHypothesis::Kind::effect && a.effects == set;
     });
-    if (found != d.hypotheses.end()) fits.push_back({Hypothesis(uncertain, set), &found->fit.point});
+    if (found == d.hypotheses.end()) continue;
+    fits.push_back({Hypothesis(uncertain, set), &found->fit.point});
+    left.push_back(&found->left);
   }
-  std::vector<int> each, type;
+  std::vector<int> type;
   std::vector<std::string> kinds;
   for (std::size_t f = 0; f < flights.size(); ++f) {
     const std::string kind = kind_of(flights[f].name());
     if (!std::ranges::count(kinds, kind)) kinds.push_back(kind);
-    each.push_back(static_cast<int>(f));
     type.push_back(static_cast<int>(std::ranges::find(kinds, kind) - kinds.begin()));
   }
-  const std::vector<Residuals> left = held_out(robot, flights, fits, each, threads),
-                               by_type = held_out(robot, flights, fits, type, threads);
+  const std::vector<Residuals> by_type = held_out(robot, flights, fits, type, threads);
   const auto rung = [&](const std::string& added, const Residuals& own, const Residuals& own_by_type) {
     v.ladder.push_back({added, {}});
     for (const int channel : channels_of(flights))
@@ -295,7 +287,7 @@ Validation validate(const RobotFit& robot, const std::vector<PredictedFlight>& f
   };
   rung("file", d.nominal, d.nominal);
   for (std::size_t i = 0; i < fits.size(); ++i)
-    rung(i == 0 ? "parameters" : fits[i].hypothesis.effects().back(), left[i], by_type[i]);
+    rung(i == 0 ? "parameters" : fits[i].hypothesis.effects().back(), *left[i], by_type[i]);
   const Fitted& last = fits.back();
   control(flights, last, coordinates_by(robot, last, std::vector<char>(flights.size(), 1)), threads, v);
   agree(robot, flights, last, v);

@@ -230,6 +230,13 @@ BasisCoefficients Fitter::form_error(const Hypothesis& hypothesis, const Lineari
   return squares.cwiseSqrt();
 }
 
+Posterior Fitter::posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const {
+  const Columns columns = columns_of(point);
+  const BasisCoefficients sd =
+      (evidence_.discrepancy_sd().cwiseAbs2() + form_error(hypothesis, point).cwiseAbs2()).cwiseSqrt();
+  return solve(point, columns, evidence_.reduce(point.statistics, columns.columns, use, sd));
+}
+
 Reduced Fitter::reduce(const Linearised& point, const Columns& columns) const {
   return evidence_.reduce(point.statistics, columns.columns, all_flights(), evidence_.discrepancy_sd());
 }

@@ -72,6 +72,8 @@ class Fitter {
   Columns columns_of(const Linearised& point) const;
   /// The same with the background of a robot whose scale is 1.
   Columns unscaled_columns_of(const Linearised& point) const;
+  /// What some of the flights say alone, along all directions of a point.
+  Posterior posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const;
   /// What the equations of its effects get wrong of themselves: shares of all that the sizes of each change.
   BasisCoefficients form_error(const Hypothesis& hypothesis, const Linearised& point) const;
 

@@ -240,18 +240,17 @@ RowContext row_context_of(const std::vector<PredictedFlight>& flights, std::vect
   for (int g = 0; g < kGroups; ++g)
     s.rows.push_back(!flights.empty() && flights.front().has_rows(g / kCoefficients, g % kCoefficients) ? 1 : 0);
   // those that all flights have
-  const auto gather = [&](auto&& of, std::vector<Quantity>& to) {
-    if (flights.empty()) return;
-    for (const RegimeQuantity& q : of(flights.front())) {
-      Quantity all{q.name, q.unit, {}};
-      for (const PredictedFlight& f : flights)
-        for (RegimeQuantity& own : of(f))
-          if (own.name == q.name) all.values.push_back(std::move(own.values));
-      if (all.values.size() == flights.size()) to.push_back(std::move(all));
-    }
+  const auto gather = [&](std::vector<RegimeQuantity> (PredictedFlight::*of)() const, std::vector<Quantity>& to) {
+    for (const PredictedFlight& f : flights)
+      for (RegimeQuantity& own : (f.*of)()) {
+        auto at = std::ranges::find(to, own.name, &Quantity::name);
+        if (at == to.end()) at = to.insert(at, {own.name, own.unit, {}});
+        at->values.push_back(std::move(own.values));
+      }
+    std::erase_if(to, [&](const Quantity& q) { return q.values.size() < flights.size(); });
   };
-  gather([](const PredictedFlight& f) { return f.regimes(); }, s.regimes);
-  gather([](const PredictedFlight& f) { return f.inputs(); }, s.inputs);
+  gather(&PredictedFlight::regimes, s.regimes);
+  gather(&PredictedFlight::inputs, s.inputs);
   return s;
 }
 

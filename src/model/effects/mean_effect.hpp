@@ -28,7 +28,7 @@ struct MeanState {
   Vec3<T> velocity_B_m_s;  ///< of it
   Vec3<T> rate_rad_s, turning_rad_s2;
   Vec3<T> com_m;
-  T mass_kg, gravity_m_s2, air_density_kg_m3, ground_z_m, ceiling_z_m;
+  T mass_kg, gravity_m_s2, air_density_kg_m3, ground_z_m;
   T beat_share;                      ///< mean of the flapping actuators over the nominal frequency
   T stroke_plane, stroke_plane_1_s;  ///< sum of the actuators that tilt it, and its rate
   Vec3<T> wind_B_m_s;                ///< known from mean_load() on, as the next

@@ -13,10 +13,10 @@ namespace {
 namespace fs = std::filesystem;
 const fs::path kMappings = fs::path(FLAPPY_SOURCE_DIR) / "configs" / "mapping";
 
-/// What a person sees of the ROS 2 mapping with `old` in it replaced.
-std::string edited(const std::string& old, const std::string& fresh) {
+/// What a person sees of a shipped mapping with `old` in it replaced.
+std::string edited_of(const char* shipped, const std::string& old, const std::string& fresh) {
   const io::TemporaryFolder folder;
-  std::string text = io::read_text(kMappings / "ros2.toml");
+  std::string text = io::read_text(kMappings / shipped);
   const std::size_t at = text.find(old);
   if (at == std::string::npos) return "\"" + old + "\" is not there";
   text.replace(at, old.size(), fresh);
@@ -25,6 +25,9 @@ std::string edited(const std::string& old, const std::string& fresh) {
   const std::string place = folder.path().string() + "/";
   return line.starts_with(place) ? line.substr(place.size()) : line;
 }
+
+/// Of that of ROS 2.
+std::string edited(const std::string& old, const std::string& fresh) { return edited_of("ros2.toml", old, fresh); }
 
 TEST(Mapping, ShippedOnesAreRead) {
   int count = 0;
@@ -87,17 +90,9 @@ TEST(Mapping, RefusesFaults) {
             "m.toml:30:13: mocap.latency_s: -1 is out of range; accepted: a number from 0 to 10");
 }
 
-/// What a person sees of a mapping of declared inputs with `old` in it replaced.
+/// Of that of declared inputs.
 std::string edited_inputs(const std::string& old, const std::string& fresh) {
-  const io::TemporaryFolder folder;
-  std::string text = io::read_text(kMappings / "flapper_nimble.toml");
-  const std::size_t at = text.find(old);
-  if (at == std::string::npos) return "\"" + old + "\" is not there";
-  text.replace(at, old.size(), fresh);
-  std::ofstream(folder / "m.toml") << text;
-  const std::string line = test::refusal([&] { read_mapping(folder / "m.toml"); });
-  const std::string place = folder.path().string() + "/";
-  return line.starts_with(place) ? line.substr(place.size()) : line;
+  return edited_of("flapper_nimble.toml", old, fresh);
 }
 
 TEST(Mapping, OfInputsRefusesFaults) {
