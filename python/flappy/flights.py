@@ -10,8 +10,8 @@ def read_flight(folder: str | Path, *, frames: bool = False) -> dict[str, Any]:
     """Reads a flight log.
 
     Returns:
-        "header", the text of flight.toml, and the streams "command", "mocap", "imu", "power", "wings" and "attitude", those that the log has:
-        each a dict of columns, float64 (samples,), or a pandas frame (`frames`). Names of columns end with their units.
+        "header", the text of flight.toml, and the streams "command", "mocap", "imu", "power", "wings" and "attitude", those that the
+        log has: each a dict of columns, float64 (samples,), or a pandas frame (`frames`). Names of columns end with their units.
 
     Raises:
         InputError: "folder/file:line: what is wrong; what is accepted".

@@ -49,7 +49,7 @@ def fresh(folder, engine="lanes", more=()):
     return words
 
 
-def end(processes, seconds=90):
+def end(processes, seconds=300):
     return [(p.communicate(timeout=seconds), p.returncode) for p in processes]
 
 
