@@ -12,7 +12,8 @@
 
 namespace flappy::sim {
 
-/// The wing-beat inputs of one flapper. Clipped to the limits of its driver.
+/// The wing-beat inputs of one flapper. Clipped to the limits of its driver. Of one that is known by the beat, what its own inputs mix, in their
+/// units (model/beat_averaged.hpp).
 struct Input {
   double amplitude_V = 0;   ///< thrust
   double difference_V = 0;  ///< left plus, right minus: roll
@@ -48,7 +49,7 @@ struct BatchOptions {
   int threads = 0;  ///< 0: one for each processor
   World world;
   std::string instruction_set;  ///< "scalar", "x86-64-v2", "-v3", "-v4"; empty: the best this processor has
-  bool meters_energy = false;   ///< for energy_J()
+  bool meters_energy = false;   ///< for energy_J(), where there are motors
 };
 
 /// The best instruction set of this processor that the library was built for.
@@ -86,7 +87,8 @@ class Batch {
   FlapperState state(std::size_t i) const;
   std::uint32_t status(std::size_t i) const;
   HeldImpulse held_impulse(std::size_t i) const;
-  /// What both motors drew since the reset, V i in every step; what they give back counts. std::logic_error unless it is metered.
+  /// What both motors drew since the reset, V i in every step; what they give back counts. std::logic_error unless it is metered,
+  /// as it never is of robots that are known by the beat.
   double energy_J(std::size_t i) const;
   /// What holds flapper `i` now: a standing one flies once its wings have carried it.
   Start support(std::size_t i) const;

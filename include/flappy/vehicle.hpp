@@ -104,6 +104,8 @@ struct BeatAveraged {
   struct Input {            ///< a column of command.csv
     std::string name;
     double low = 0, high = 0;
+    double neutral = 0;              ///< of a controller that says nothing
+    std::array<double, 4> mix = {};  ///< of its amplitude, difference, bias and split cycle: what each adds
   };
   enum class Role { flapping, stroke_plane, other };
   struct Actuator {  ///< gain x input + offset, behind a first-order lag

@@ -457,6 +457,10 @@ std::vector<std::span<std::byte>> Fleet<T>::memory() {
     all.push_back(std::as_writable_bytes(std::span(body.effect_rows)));
     all.push_back(std::as_writable_bytes(std::span(body.effect_states)));
   }
+  if (body.mean) {
+    all.push_back(std::as_writable_bytes(std::span(body.mean->rows)));
+    all.push_back(std::as_writable_bytes(std::span(body.mean->memory)));
+  }
   return all;
 }
 

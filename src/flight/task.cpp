@@ -294,6 +294,9 @@ std::vector<std::pair<std::string, std::vector<Signal>>> Task::observed_parts() 
   for (std::size_t i = 0; i < part_infos().size(); ++i) {
     if (!(parts >> i & 1)) continue;
     list.emplace_back(part_infos()[i].name, part_infos()[i].signals);
+    if (static_cast<Part>(i) == Part::trim)
+      for (Signal& s : list.back().second)
+        if (s.unit == "V") s.unit = input_unit;
     if (static_cast<Part>(i) != Part::previous_action) continue;
     for (Signal s : action()) {
       s.name = (sets_voltages() ? "previous_" : "added_") + s.name;
@@ -319,7 +322,7 @@ std::vector<Signal> Task::action() const {
   static constexpr const char* kVoltages[] = {"left_voltage", "right_voltage"};
   std::vector<Signal> list;
   for (int i = 0; i < actions(); ++i)
-    list.push_back({sets_voltages() ? kVoltages[i] : kInputs[i], i < 3 ? "V" : "1", constants.action_low[i],
+    list.push_back({sets_voltages() ? kVoltages[i] : kInputs[i], i < 3 ? input_unit : "1", constants.action_low[i],
                     constants.action_high[i]});
   return list;
 }

@@ -132,6 +132,8 @@ struct Task {
   std::uint32_t history = 1;        ///< observations that a policy sees at once: now, and at its last actions
   std::uint32_t action_repeat = 1;  ///< control periods for which a policy's action stays
   ActionKind action_kind = ActionKind::wing_beat;
+  std::string input_unit =
+      "V";  ///< of a wing beat's first three inputs; "1" where a vehicle that is known by the beat mixes them
   TaskConstants<double> constants{};
 
   /// Names of the parts observed, with their signals as they are now.

@@ -14,6 +14,7 @@ namespace {
 constexpr const char* kMotionNames[kMotionVariables] = {"v_x", "v_y", "v_z", "speed", "w_x", "w_y", "w_z", "battery"};
 constexpr const char* kTermKeys[] = {"force_x_N",   "force_y_N",   "force_z_N",
                                      "moment_x_Nm", "moment_y_Nm", "moment_z_Nm"};
+constexpr const char* kMixKeys[] = {"amplitude", "difference", "bias", "split_cycle"};
 constexpr const char* kRoles[] = {"flapping", "stroke_plane", "other"};
 constexpr const char* kAccepted =
     "sums and products of numbers, coefficients, actuators and motion, as \"k * left * v_x\"";
@@ -204,7 +205,10 @@ BeatAveraged read_beat_averaged(const io::Table& root) {
   for (const std::string& name : inputs.keys()) {
     const io::Table t = inputs.table(name);
     const double low = t.number("low", any);
-    v.inputs.push_back({name, low, t.number("high", {low, kLargest})});
+    BeatAveraged::Input input{name, low, t.number("high", {low, kLargest})};
+    input.neutral = t.number_or("neutral", std::clamp(0.0, low, input.high), {low, input.high});
+    for (std::size_t k = 0; k < input.mix.size(); ++k) input.mix[k] = t.number_or(kMixKeys[k], 0, any);
+    v.inputs.push_back(std::move(input));
   }
   std::vector<std::string> columns;
   for (const BeatAveraged::Input& i : v.inputs) columns.push_back(i.name);
@@ -220,7 +224,9 @@ BeatAveraged read_beat_averaged(const io::Table& root) {
     a.lag_s = t.number_or("lag_s", 0, {0, kLongestLag_s});
     v.actuators.push_back(std::move(a));
   }
-  if (v.actuators.empty()) root.fail("actuator", "there is none", "a table [actuator.NAME] for each");
+  if (v.actuators.empty() || v.actuators.size() > kMostActuators)
+    root.fail("actuator", v.actuators.empty() ? "there is none" : "there are too many",
+              "1 to " + std::to_string(kMostActuators) + " tables [actuator.NAME]");
   if (const auto coefficients = root.optional_table("coefficients"))
     for (const std::string& name : coefficients->keys()) {
       check_name(*coefficients, name, v);
@@ -257,6 +263,9 @@ std::string beat_averaged_text(const BeatAveraged& v) {
   for (const BeatAveraged::Input& i : v.inputs) {
     number("input." + i.name + ".low", i.low);
     number("input." + i.name + ".high", i.high);
+    if (i.neutral != 0) number("input." + i.name + ".neutral", i.neutral);
+    for (std::size_t k = 0; k < i.mix.size(); ++k)
+      if (i.mix[k] != 0) number("input." + i.name + "." + kMixKeys[k], i.mix[k]);
   }
   for (const BeatAveraged::Actuator& a : v.actuators) {
     line("actuator." + a.name + ".input", io::toml_string(a.input));

@@ -4,7 +4,8 @@
 //   model = "beat_averaged"
 //   [beat]                                   # nominal_Hz, bandwidth_Hz
 //   [torso]                                  # all of it: mass_kg, com_m, inertia_kg_m2
-//   [input.left_flap]                        # a column of command.csv: low, high
+//   [input.left_flap]                        # a column of command.csv: low, high; and where it flies, what a controller makes of it:
+//                                            #   neutral + amplitude A + difference D + bias B + split_cycle S, within low and high
 //   [actuator.left_Hz]                       # input, role ("flapping", "stroke_plane", "other"), gain, offset, lag_s:
 //                                            #   a' = (gain u + offset - a) / lag_s
 //   [coefficients]                           # thrust_N_Hz = 0.035, or { value = 0.035, sd = 0.005 }: how well it is known
@@ -31,6 +32,9 @@ namespace flappy::model {
 /// What an expression may name besides coefficients and actuators, in this order.
 enum MotionVariable : int { kVx, kVy, kVz, kSpeed, kWx, kWy, kWz, kBatteryShare, kMotionVariables };
 
+/// Actuators of a robot, at most, and inputs of one that flies: a controller has four outputs.
+inline constexpr std::size_t kMostActuators = 16, kMostInputs = 4;
+
 /// Force and moment about the torso's origin, N and N m, in B.
 struct MeanLoad {
   std::array<double, 3> force_N{}, moment_Nm{};
@@ -46,12 +50,15 @@ class MeanWrench {
   MeanLoad at(std::span<const double> variables) const;
   bool has_moments() const { return has_moments_; }
 
- private:
   struct Product {
     std::size_t component;  ///< of force, then moment
     double factor;
     std::vector<std::size_t> variables;
   };
+  /// In the order of the file: vehicles of the same expressions have the same but for factors.
+  const std::vector<Product>& products() const { return products_; }
+
+ private:
   std::vector<Product> products_;
   bool has_moments_ = false;
 };

@@ -72,18 +72,6 @@ SideParameters<double> derive_side(const Side& s, double air_density, double ste
   return p;
 }
 
-/// The vehicle as it is built, for effects that are part of it.
-Vehicle built(Vehicle v) {
-  const auto given = v.effects;
-  for (const EffectEntry& e : effects()) {
-    const auto own = given.find(e.info.id);
-    if (e.change == nullptr || own == given.end()) continue;
-    const std::vector<double> values = e.values(own->second);
-    if (e.acts(values)) e.change(values.data(), v);
-  }
-  return v;
-}
-
 /// Means over the span of c^3 and c^3 x, c the chord per mean chord and x = r/R, which a planform does not state. The chord is
 /// the quadratic of its moments r00, r11, r22, its projection on Legendre's polynomials P_k(2x - 1), integrated by Gauss's rule
 /// with five points, exact for these powers. What the quadratic misses of the stated means of c^2, c^2 x and c^4, between
@@ -136,7 +124,19 @@ SideFigures<double> side_figures(const Side& s, double air_density) {
 
 }  // namespace
 
+Vehicle built(Vehicle v) {
+  const auto given = v.effects;
+  for (const EffectEntry& e : catalogue_of(v)) {
+    const auto own = given.find(e.info.id);
+    if (e.change == nullptr || own == given.end()) continue;
+    const std::vector<double> values = e.values(own->second);
+    if (e.acts(values)) e.change(values.data(), v);
+  }
+  return v;
+}
+
 Sides<SideFigures<double>> effect_figures(const Vehicle& vehicle) {
+  if (vehicle.beat_averaged) return {};
   const Vehicle v = built(vehicle);
   return {side_figures(v.left, v.air_density_kg_m3), side_figures(v.right, v.air_density_kg_m3)};
 }
@@ -148,9 +148,11 @@ double total_mass_kg(const Vehicle& vehicle) {
 
 Parameters<double> derive(const Vehicle& vehicle, double step_s) {
   const Vehicle v = built(vehicle);
-  Parameters<double> p;
-  p.left = derive_side(v.left, v.air_density_kg_m3, step_s);
-  p.right = derive_side(v.right, v.air_density_kg_m3, step_s);
+  Parameters<double> p{};
+  if (!v.beat_averaged) {
+    p.left = derive_side(v.left, v.air_density_kg_m3, step_s);
+    p.right = derive_side(v.right, v.air_density_kg_m3, step_s);
+  }
   p.inverse_mass_1_kg = 1 / (v.torso.mass_kg + wing_mass(v.left) + wing_mass(v.right));
   p.fixed_moment_kg_m =
       first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
@@ -160,7 +162,7 @@ Parameters<double> derive(const Vehicle& vehicle, double step_s) {
   p.below_m = v.extent.below_m;
   p.above_m = v.extent.above_m;
   p.around_m = v.extent.around_m;
-  p.beat_steps = 2 / (v.driver.flapping_Hz * step_s);
+  p.beat_steps = 2 / ((v.beat_averaged ? v.beat_averaged->nominal_Hz : v.driver.flapping_Hz) * step_s);
   return p;
 }
 

@@ -9,6 +9,9 @@ namespace flappy::model {
 /// Constants of one flapper in double precision. `step_s`: physics step, s.
 Parameters<double> derive(const Vehicle& vehicle, double step_s);
 
+/// The vehicle with those of its effects that are part of it.
+Vehicle built(Vehicle vehicle);
+
 /// What effects need to know besides.
 Sides<SideFigures<double>> effect_figures(const Vehicle& vehicle);
 

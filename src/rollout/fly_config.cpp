@@ -6,6 +6,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "io/sha256.hpp"
 #include "io/toml_writer.hpp"
+#include "model/beat_averaged.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::rollout {
@@ -110,6 +111,7 @@ class Reader {
     if (root_.has("actor")) c_.actor = fitting_actor(root_, c_.fleet.task);
     root_.finish();
     if (c_.fleet.task.sets_voltages()) refuse_inputs();
+    if (c_.vehicle.beat_averaged) refuse_wings();
     if (c_.welded && c_.fleet.task.start.settled)
       root_.fail("flight.support",
                  "is \"welded\", but task " + io::toml_string(c_.fleet.task.name) + " starts from hover", "\"task\"");
@@ -143,8 +145,11 @@ class Reader {
 
   void read_files() {
     const std::filesystem::path vehicle = root_.file("vehicle");
-    c_.vehicle = for_file("vehicle", [&] { return model::read_vehicle(vehicle, to_["vehicle"]); });
+    c_.vehicle = for_file("vehicle", [&] { return model::read_any_vehicle(vehicle, to_["vehicle"]); });
     const io::Config vehicle_config = file("vehicle");
+    if (c_.vehicle.beat_averaged && c_.vehicle.beat_averaged->inputs.size() > model::kMostInputs)
+      vehicle_config.root().fail("input", "there are too many to be flown",
+                                 "at most " + std::to_string(model::kMostInputs));
     c_.vehicle_file_name = vehicle.filename().string();
     const bool as_filed = to_["vehicle"].empty();
     c_.vehicle_text = as_filed ? io::read_text(vehicle) : vehicle_config.resolved();
@@ -186,12 +191,28 @@ class Reader {
     if (c_.excitation.changes()) root_.fail("excitation", "is added to inputs of the wing beat, " + sets, "none");
   }
 
+  /// A robot that is known by the beat has neither motors nor wings.
+  void refuse_wings() {
+    const std::string but = ", but vehicle " + io::toml_string(c_.vehicle.name) + " is known by the beat";
+    const flight::Task& task = c_.fleet.task;
+    if (task.sets_voltages())
+      root_.fail("task", io::toml_string(task.name) + " sets voltages of motors" + but,
+                 "a task whose actions are of the wing beat");
+    for (const auto part : {flight::Part::beat_phase, flight::Part::wings})
+      if (task.parts >> static_cast<int>(part) & 1)
+        root_.fail("task", io::toml_string(task.name) + " observes wings or their phase" + but,
+                   "a task of other parts");
+    for (const char* key : {"log.power", "log.wings"})
+      if (root_.has(key)) root_.fail(key, "is asked for" + but, "no such log");
+    c_.fleet.task.input_unit = "1";
+  }
+
   void check_times() const {
     const flight::FleetOptions& o = c_.fleet;
     const double step = o.batch.step_s;
     if (!whole(1 / (o.control_hz * step)))
       root_.fail("flight.control_hz", "its period is no whole number of steps", "1 / (n step_s)");
-    if (!whole(c_.vehicle.driver.hold_s / step))
+    if (!c_.vehicle.beat_averaged && !whole(c_.vehicle.driver.hold_s / step))
       root_.fail("flight.step_s",
                  "does not divide the driver's hold of " + io::shortest_digits(c_.vehicle.driver.hold_s) + " s",
                  "hold_s / n");
@@ -201,7 +222,8 @@ class Reader {
                    "is longer than the " + io::shortest_digits(1 / rate) + " s between samples of a sensor",
                    "a shorter step, or a slower sensor");
     const char* const delay = model::CommandDelay::kInfo.id;
-    if (const auto found = c_.vehicle.effects.find(delay); found != c_.vehicle.effects.end()) {
+    if (const auto found = c_.vehicle.effects.find(delay);
+        found != c_.vehicle.effects.end() && !c_.vehicle.beat_averaged) {
       constexpr int kKept = model::CommandDelay::kSlots - 2;
       const auto e = static_cast<std::size_t>(model::effect_index(delay));
       const double late_s = model::effects()[e].values(found->second)[0];

@@ -138,7 +138,13 @@ struct Recorder<T>::Storage {
     h.imu = imu_header(o.sensors.imu);
     h.power = config.log.power;
     h.wings = config.log.wings;
-    if (!o.task.sets_voltages()) log.command.inputs.emplace(), log.command.phase_rad.emplace();
+    if (vehicle.beat_averaged) {
+      h.flapping_Hz = vehicle.beat_averaged->nominal_Hz;
+      for (const model::BeatAveraged::Input& input : vehicle.beat_averaged->inputs) h.inputs.push_back(input.name);
+      log.command.declared.resize(h.inputs.size());
+    } else if (!o.task.sets_voltages()) {
+      log.command.inputs.emplace(), log.command.phase_rad.emplace();
+    }
     if (h.power) log.power.emplace(), power = TickSampler(h.power->rate_hz);
     if (h.wings) log.wings.emplace(), wings = TickSampler(h.wings->rate_hz);
     if (h.power) {  // a meter needs the rows of effects, whatever is in force
@@ -214,6 +220,13 @@ struct Recorder<T>::Storage {
     c.phase_rad->push_back(2 * kPi * 0x1p-32 * u.phase);
   }
 
+  /// Of a robot that is known by the beat.
+  void add_inputs(std::int64_t step) {
+    const std::vector<double> inputs = sim::storage_of(fleet.batch()).inputs_of(flapper);
+    log.command.t_s.push_back(time_s(step));
+    for (std::size_t k = 0; k < inputs.size(); ++k) log.command.declared[k].push_back(inputs[k]);
+  }
+
   double normal(sim::Stream stream, std::uint32_t index) {
     key.stream = stream;
     return sim::normal(key, index);
@@ -268,11 +281,13 @@ struct Recorder<T>::Storage {
     const auto sample_tick = [&] {
       if (!std::exchange(sampled, true) && log.power) add_power(time_s(begin));
     };
-    for (const DriverUpdate& u : driver_updates(fleet, flapper)) {
-      if (u.step > begin) sample_tick();
-      add_command(u);
-      sample_tick();
-    }
+    if (!log.header.inputs.empty()) add_inputs(begin);
+    else
+      for (const DriverUpdate& u : driver_updates(fleet, flapper)) {
+        if (u.step > begin) sample_tick();
+        add_command(u);
+        sample_tick();
+      }
     sample_tick();
     if (log.wings) add_wings(time_s(begin));
 
@@ -354,7 +369,10 @@ bool Recorder<T>::write(const std::filesystem::path& folder) const {
 template <class T>
 double Recorder<T>::bytes_per_s(const FlyConfig& c) {
   const flight::FleetOptions& o = c.fleet;
-  const double numbers = 8 / c.vehicle.driver.hold_s + 7 * o.sensors.imu.rate_hz + 8 * o.sensors.mocap.rate_hz +
+  const double commands = c.vehicle.beat_averaged
+                              ? static_cast<double>(1 + c.vehicle.beat_averaged->inputs.size()) * o.control_hz
+                              : 8 / c.vehicle.driver.hold_s;
+  const double numbers = commands + 7 * o.sensors.imu.rate_hz + 8 * o.sensors.mocap.rate_hz +
                          static_cast<double>(kTruthNames.size() + 9) * o.control_hz;
   return 2 * sizeof(double) * numbers;  // vectors grow by doubling
 }

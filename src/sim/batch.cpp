@@ -30,6 +30,7 @@ Vec3<double> com_minus_origin_velocity(const Parameters<double>& p, const State<
 template <class T>
 std::vector<T> motor_rows(const model::Vehicle& v) {
   std::vector<T> rows;
+  if (v.beat_averaged) return rows;
   for (const model::Motor& m : {v.left.motor, v.right.motor}) {
     rows.push_back(static_cast<T>(1 / m.resistance_ohm));
     rows.push_back(static_cast<T>(m.gear_ratio * m.torque_constant_Nm_A / m.resistance_ohm));
@@ -70,9 +71,21 @@ void Batch<T>::Storage::clear_energy(std::size_t i) {
   if (!motors.empty()) motors[i / kLanes<T>].energy_J[i % kLanes<T>] = 0;
 }
 
+/// Of a robot that is known by the beat: its own rows have the others.
+template <class T>
+void Batch<T>::Storage::put_effects_of_sensors(std::size_t i, const model::Vehicle& v) {
+  model::Vehicle seen;
+  for (const auto& [id, values] : v.effects) {
+    const int e = model::effect_index(id.c_str());
+    if (e >= 0 && model::sensor_effects() >> e & 1) seen.effects.emplace(id, values);
+  }
+  put_effects(i, seen);
+}
+
 /// A lane without an effect that its block has gets the sizes at which the effect vanishes.
 template <class T>
 void Batch<T>::Storage::put_effects(std::size_t i, const model::Vehicle& v) {
+  if (v.beat_averaged) return put_effects_of_sensors(i, v);
   if (v.effects.empty() && lane_effects.empty()) return;
   std::uint64_t named = 0;
   for (const auto& [id, values] : v.effects) {
@@ -177,7 +190,8 @@ template <class T>
 Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOptions& options)
     : storage_(std::make_unique<Storage>()) {
   Storage& s = *storage_;
-  const double steps = vehicle.driver.hold_s / options.step_s;
+  // inputs of a robot that is known by the beat are held for as long as its controller says
+  const double steps = vehicle.beat_averaged ? 1 : vehicle.driver.hold_s / options.step_s;
   if (!(options.step_s > 0) || std::llround(steps) < 1 || std::abs(steps - std::round(steps)) > 1e-6)
     throw std::invalid_argument("the driver's hold (" + std::to_string(vehicle.driver.hold_s) +
                                 " s) is no whole number of physics steps");
@@ -187,7 +201,8 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
   s.steps_per_update = static_cast<int>(std::llround(steps));
   s.world = options.world;
   s.hold_s = vehicle.driver.hold_s;
-  s.kernel = step_kernel<T>(options.instruction_set);
+  s.kernel =
+      vehicle.beat_averaged ? mean_step_kernel<T>(options.instruction_set) : step_kernel<T>(options.instruction_set);
   s.blocks.resize((count + kLanes<T> - 1) / kLanes<T>);
   // lanes beyond the last flapper fly along as copies, so that no lane ever holds numbers of no vehicle
   Block<T> block{};
@@ -198,7 +213,8 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
     put(x, block.state, lane);
   }
   for (Block<T>& b : s.blocks) b = block;
-  if (options.meters_energy) s.motors.resize(s.blocks.size());
+  for (std::size_t i = 0; vehicle.beat_averaged && i < s.blocks.size() * kLanes<T>; ++i) s.put_mean(i, vehicle);
+  if (options.meters_energy && !vehicle.beat_averaged) s.motors.resize(s.blocks.size());
   for (std::size_t i = 0; i < count; ++i) s.put_motors(i, motor_rows<T>(vehicle));
   for (std::size_t i = 0; i < count && !vehicle.effects.empty(); ++i) s.put_effects(i, vehicle);
 }
@@ -219,8 +235,11 @@ template <class T>
 void Batch<T>::set_vehicle(std::size_t i, const model::Vehicle& vehicle) {
   if (vehicle.driver.hold_s != storage_->hold_s)
     throw std::invalid_argument("all flappers of a batch share the driver's hold");
+  if (vehicle.beat_averaged.has_value() != (storage_->mean != nullptr))
+    throw std::invalid_argument("all flappers of a batch have wings, or all are known by the beat");
   const auto [block, lane] = storage_->at(i);
   storage_->put_vehicle(block, lane, vehicle);
+  if (storage_->mean) storage_->put_mean(i, vehicle);
   storage_->put_effects(i, vehicle);
   storage_->put_motors(i, motor_rows<T>(vehicle));
 }
@@ -263,6 +282,7 @@ void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   block.phase[lane] = 0;
   storage_->clear_energy(i);
   storage_->for_states(i, ~std::uint64_t{0}, [](T& number) { number = 0; });
+  if (storage_->mean) *storage_->mean->memory_of(i) = 0;
 }
 
 template <class T>
@@ -368,6 +388,7 @@ std::uint64_t Batch<T>::hash(std::size_t first, std::size_t last) const {
     h = mixed(mixed(h, block.phase[lane]), block.status[lane]);
     storage_->for_states(i, storage_->effects_of_lane(i) & ~model::sensor_effects(),
                          [&](T number) { h = mixed(h, bits_of(number)); });
+    if (storage_->mean) storage_->mean->for_memory(i, [&](T number) { h = mixed(h, bits_of(number)); });
     all = mixed(all, h);
   }
   return all;

@@ -9,6 +9,8 @@ namespace flappy::sim {
 
 FLAPPY_KERNELS(Kernel<float>, kernel_float);
 FLAPPY_KERNELS(Kernel<double>, kernel_double);
+FLAPPY_KERNELS(Kernel<float>, mean_float);
+FLAPPY_KERNELS(Kernel<double>, mean_double);
 
 std::vector<std::string> instruction_sets() {
 #if defined(__aarch64__)
@@ -44,5 +46,12 @@ StepBlock<T> step_kernel(std::string_view instruction_set) {
 }
 template StepBlock<float> step_kernel<float>(std::string_view);
 template StepBlock<double> step_kernel<double>(std::string_view);
+
+template <class T>
+StepBlock<T> mean_step_kernel(std::string_view instruction_set) {
+  return kernel_of<T>(mean_floats, mean_doubles, instruction_set).step;
+}
+template StepBlock<float> mean_step_kernel<float>(std::string_view);
+template StepBlock<double> mean_step_kernel<double>(std::string_view);
 
 }  // namespace flappy::sim

@@ -3,6 +3,7 @@
 
 #include "flappy/world.hpp"
 #include "sim/block.hpp"
+#include "sim/mean_block.hpp"
 
 namespace flappy::sim {
 
@@ -35,6 +36,8 @@ struct BlockEffects {
   T* meter = nullptr;
   /// Where energy is metered, if it is.
   MotorRows<T>* motors = nullptr;
+  /// Of robots that are known by the beat.
+  MeanRows<T> mean;
 };
 
 /// Rows of a meter: the source's voltage as a share of its nominal one, currents of the left and of the right motor, A.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <bit>
+#include <memory>
 
 #include "flappy/batch.hpp"
 #include "model/effects/registry.hpp"
@@ -36,6 +37,26 @@ std::uint64_t bits_of(T value) {
   else return std::bit_cast<std::uint64_t>(value);
 }
 
+/// Rows of robots that are known by the beat.
+template <class T>
+struct Mean {
+  MeanProgram program;
+  std::vector<T> rows, memory;  // [block][row][lane]
+  std::size_t slots = 0;        // inputs that are remembered
+  std::uint64_t effects = 0;    // of MeanEffects, that some robot has
+
+  std::size_t memory_rows() const { return 1 + program.actuators.size() + slots * program.inputs; }
+  /// Of one robot, a number each.
+  T* row_of(std::size_t i) { return &rows[i / kLanes<T> * program.rows() * kLanes<T> + i % kLanes<T>]; }
+  T* memory_of(std::size_t i) { return &memory[i / kLanes<T> * memory_rows() * kLanes<T> + i % kLanes<T>]; }
+  /// Calls `use(number)` for each that moves a robot: past inputs of one that is late alone.
+  void for_memory(std::size_t i, const auto& use) {
+    const bool late = row_of(i)[(program.effect_rows() - 1) * kLanes<T>] > 0;  // the last of MeanBody
+    const std::size_t used = late ? memory_rows() : 1 + program.actuators.size();
+    for (std::size_t k = 0; k < used; ++k) use(memory_of(i)[k * kLanes<T>]);
+  }
+};
+
 template <class T>
 struct Batch<T>::Storage {
   std::size_t count = 0;
@@ -53,6 +74,7 @@ struct Batch<T>::Storage {
   std::uint64_t effects_kept = 0;            // effects that some vehicle has named, whose memory is
   std::vector<T> effect_states;              // [block][row][lane]
   std::vector<MotorRows<T>> motors;          // of each block, where energy is metered
+  std::unique_ptr<Mean<T>> mean;             // where robots are known by the beat
 
   struct Place {
     Block<T>& block;
@@ -78,6 +100,9 @@ struct Batch<T>::Storage {
       all = {block_effects[b], &effect_rows[b * model::kEffectRows * kLanes<T>], effects_kept,
              effect_states.data() + b * state_size()};
     if (!motors.empty()) all.motors = &motors[b];
+    if (mean)
+      all.mean = {&mean->program, mean->row_of(b * kLanes<T>), mean->memory_of(b * kLanes<T>), mean->slots,
+                  mean->effects};
     return all;
   }
   /// Numbers of a block that effects remember.
@@ -99,11 +124,20 @@ struct Batch<T>::Storage {
   }
 
   void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v);
+  /// std::invalid_argument where it shares not the batch's inputs, actuators and expressions.
+  void put_mean(std::size_t i, const model::Vehicle& v);
+  void keep_inputs(std::size_t slots);
+  /// Inputs of a robot that is known by the beat, as its controller has set them.
+  std::vector<double> inputs_of(std::size_t i);
+  /// Rows and memory of a robot that is known by the beat, to be put to one of any batch; none otherwise.
+  std::pair<std::vector<T>, std::vector<T>> get_mean(std::size_t i) const;
+  void put_mean(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
   /// What a meter of flapper `i` needs to know of its motors, to be put to a flapper of any batch.
   std::vector<T> get_motors(std::size_t i) const;
   void put_motors(std::size_t i, const std::vector<T>& rows);
   void clear_energy(std::size_t i);
   void put_effects(std::size_t i, const model::Vehicle& v);
+  void put_effects_of_sensors(std::size_t i, const model::Vehicle& v);
   void put_effect_rows(std::size_t i, const model::Vehicle& v);
   /// The effects of flapper `i` with their parameters and what they remember, to be put to a flapper of any batch.
   std::uint64_t get_effects(std::size_t i, std::vector<T>& rows, std::vector<T>& states);

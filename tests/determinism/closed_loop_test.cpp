@@ -19,10 +19,49 @@ struct Case {
 };
 constexpr Case kCases[] = {{"pid", 0xc10ee1b178424d2a, 0xe75aa050a549d8be},
                            {"arc", 0xf5c1f353f7772075, 0x09d4e56cfd8d8bca},
-                           {"actor", 0x54f8be77e5f165bc, 0xb59c7058671bf3b3}};
+                           {"actor", 0x54f8be77e5f165bc, 0xb59c7058671bf3b3},
+                           {"beat_averaged", 0x72d2f06ed6f723ff, 0x0b27535666c0d83e}};
 
 constexpr std::size_t kFlappers = 272, kSmall = 17;
 constexpr int kPeriods = 10;
+
+/// Known by the beat.
+model::Vehicle beat_averaged() {
+  using model::BeatAveraged;
+  model::Vehicle v;
+  v.name = "beat_averaged";
+  v.air_density_kg_m3 = 1.2;
+  v.torso = {0.1, {0.004, -0.003, 0.006}, {5e-4, 3e-4, 4e-4, 3e-5, -2e-5, 4e-5}};
+  v.extent = {0.01, 0.1, 0.2};
+  BeatAveraged& b = v.beat_averaged.emplace();
+  b.nominal_Hz = 15;
+  b.bandwidth_Hz = 3;
+  b.inputs = {{"left", 0, 1, 0.5, {0.05, 0.03, 0, 0}},
+              {"right", 0, 1, 0.5, {0.05, -0.03, 0, 0}},
+              {"servo", -1, 1, 0, {0, 0, -0.1, 0.2}}};
+  b.actuators = {{"left_Hz", "left", BeatAveraged::Role::flapping, 25, 1, 0.05},
+                 {"right_Hz", "right", BeatAveraged::Role::flapping, 25, 1, 0},
+                 {"tilt", "servo", BeatAveraged::Role::stroke_plane, 1, 0, 0.03}};
+  b.coefficients = {{"k", 0.03, 0.003}, {"d", 0.004, 0.001}, {"r", 2e-5, 0}};
+  b.wrenches = {{"left", {0, 0.08, 0.02}, {"0.1 * tilt", "", "k * left_Hz", "", "", ""}},
+                {"right", {0, -0.08, 0.02}, {"0.1 * tilt", "", "k * right_Hz", "", "", ""}},
+                {"air",
+                 {},
+                 {"-d * (left_Hz + right_Hz) * v_x", "-2 * d * speed * v_y", "", "-r * 30 * w_x", "-r * 30 * w_y",
+                  "-r * 30 * w_z^2 * w_z"}}};
+  return v;
+}
+
+/// Whose coefficients and effects differ.
+model::Vehicle beat_averaged(std::size_t id) {
+  static const sim::Randomisation randomisation(beat_averaged(), io::Config::parse("", "none").root());
+  model::Vehicle v = randomisation.sample({.seed = 11, .flapper = static_cast<std::uint32_t>(id), .episode = 2});
+  if (id % 5 == 0) v.effects["flapping_counter_force"] = {{"x_per_s", 3}, {"y_per_s", 2}, {"z_per_s", 1}};
+  if (id % 7 == 0) v.effects["ground_effect"] = {{"gain", 0.2}, {"length_m", 0.05}};
+  if (id % 3 == 0) v.effects["command_delay"] = {{"delay_s", 0.0017}};
+  if (id % 11 == 0) v.effects["marker_offset"] = {{"x_m", 0.01}, {"y_m", 0}, {"z_m", 0.02}};
+  return v;
+}
 
 model::Vehicle vehicle(std::size_t id) {
   static const sim::Randomisation randomisation = [] {
@@ -97,13 +136,14 @@ FleetOptions options(const std::string& name) {
 }
 
 template <class T>
-Fleet<T> fly(const FleetOptions& common, bool acting, std::size_t first, std::size_t count, int threads,
+Fleet<T> fly(const FleetOptions& common, const std::string& name, std::size_t first, std::size_t count, int threads,
              const std::string& set) {
   FleetOptions o = common;
   o.first_flapper = static_cast<std::uint32_t>(first);
   o.batch.threads = threads;
   o.batch.instruction_set = set;
-  Fleet<T> fleet(count, test::identified(), o);
+  const bool acting = name == "actor", winged = name != "beat_averaged";
+  Fleet<T> fleet(count, winged ? test::identified() : beat_averaged(), o);
   if (acting) fleet.set_actor(actor(o.task));
   fleet.set_exploration({0.3, 0.3, 0.4});
   const auto start = [&](std::size_t i, std::uint32_t episode) {
@@ -111,7 +151,7 @@ Fleet<T> fly(const FleetOptions& common, bool acting, std::size_t first, std::si
     else fleet.start(i, episode);
   };
   for (std::size_t i = 0; i < count; ++i) {
-    fleet.set_vehicle(i, vehicle(first + i));
+    fleet.set_vehicle(i, winged ? vehicle(first + i) : beat_averaged(first + i));
     start(i, 0);
     if (!o.task.sets_voltages()) fleet.set_added(i, {0.1 * static_cast<double>((first + i) % 9), 0, 0, 0.001});
   }
@@ -126,11 +166,10 @@ Fleet<T> fly(const FleetOptions& common, bool acting, std::size_t first, std::si
 template <class T>
 void one_hash(const Case& c, std::uint64_t golden) {
   const FleetOptions o = options(c.name);
-  const bool acting = std::string(c.name) == "actor";
   std::uint64_t small = 0;
   for (const std::string& set : test::instruction_sets())
     for (const int threads : test::kThreads) {
-      const Fleet<T> fleet = fly<T>(o, acting, 0, kFlappers, threads, set);
+      const Fleet<T> fleet = fly<T>(o, c.name, 0, kFlappers, threads, set);
       EXPECT_EQ(fleet.hash(), golden) << c.name << ", " << set << ", " << threads << " threads: 0x" << std::hex
                                       << fleet.hash();
       EXPECT_EQ(fleet.batch().count_status(sim::kFrozen), 0u);
@@ -141,7 +180,7 @@ void one_hash(const Case& c, std::uint64_t golden) {
     for (const std::size_t size : test::kBatchSizes) {
       std::uint64_t all = 0;
       for (std::size_t first = 0; first < kSmall; first += size) {
-        const Fleet<T> fleet = fly<T>(o, acting, first, size, 2, set);
+        const Fleet<T> fleet = fly<T>(o, c.name, first, size, 2, set);
         for (std::size_t i = 0; i < size; ++i) all = all * 31 + fleet.hash(i, i + 1);
       }
       EXPECT_EQ(all, small) << c.name << ", " << set << ", batches of " << size;
@@ -205,7 +244,7 @@ std::uint64_t hash_by_voltages(std::size_t size, int threads, const std::string&
   o.task.action_repeat = 2, o.task.history = 2;
   std::uint64_t all = 0;
   for (std::size_t first = 0; first < kSmall; first += size) {
-    const Fleet<T> fleet = fly<T>(o, true, first, std::min(size, kSmall - first), threads, set);
+    const Fleet<T> fleet = fly<T>(o, "actor", first, std::min(size, kSmall - first), threads, set);
     EXPECT_EQ(fleet.batch().count_status(sim::kFrozen), 0u);
     for (std::size_t i = 0; i < fleet.size(); ++i) all = all * 31 + fleet.hash(i, i + 1);
   }
@@ -228,16 +267,16 @@ TEST(ClosedLoopDeterminism, VoltagesInDouble) { one_hash_by_voltages<double>(kGo
 
 TEST(ClosedLoopDeterminism, HashSeesNoiseActionsAndTime) {
   const FleetOptions o = options("pid");
-  Fleet<float> a = fly<float>(o, false, 0, 3, 1, ""), b = fly<float>(o, false, 0, 3, 1, "");
+  Fleet<float> a = fly<float>(o, "pid", 0, 3, 1, ""), b = fly<float>(o, "pid", 0, 3, 1, "");
   EXPECT_EQ(a.hash(), b.hash());
   b.set_action(1, std::array{0.0F, 0.0F, 0.0F, 1e-6F});
   EXPECT_NE(a.hash(), b.hash());
   EXPECT_EQ(a.hash(0, 1), b.hash(0, 1));
   FleetOptions other = o;
   other.seed += std::uint64_t{1} << 40;
-  EXPECT_NE(fly<float>(other, false, 0, 3, 1, "").hash(), a.hash());
+  EXPECT_NE(fly<float>(other, "pid", 0, 3, 1, "").hash(), a.hash());
   // losses, corrections, contact with a task's limits: all of it happened to someone
-  const Fleet<float> many = fly<float>(o, false, 0, kFlappers, 1, "");
+  const Fleet<float> many = fly<float>(o, "pid", 0, kFlappers, 1, "");
   int corrected = 0, out = 0, back = 0;
   for (std::size_t i = 0; i < kFlappers; ++i) {
     corrected += many.innovation(i).first > 0;

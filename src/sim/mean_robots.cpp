@@ -1,0 +1,164 @@
+// Robots of a batch that are known by the beat: from a vehicle to its rows.
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "model/derive.hpp"
+#include "model/effects/registry.hpp"
+#include "sim/storage.hpp"
+
+namespace flappy::sim {
+namespace {
+
+using model::BeatAveraged;
+using model::Vec3;
+
+MeanProgram program_of(const model::Vehicle& v, const model::MeanWrench& wrench) {
+  const BeatAveraged& b = *v.beat_averaged;
+  if (b.inputs.size() > kMostInputs)
+    throw std::invalid_argument("a robot of " + std::to_string(b.inputs.size()) + " inputs; at most " +
+                                std::to_string(kMostInputs) + " can be flown");
+  MeanProgram p;
+  p.inputs = b.inputs.size();
+  p.nominal_Hz = b.nominal_Hz;
+  for (const BeatAveraged::Actuator& a : b.actuators) {
+    const auto input = std::ranges::find(b.inputs, a.input, &BeatAveraged::Input::name) - b.inputs.begin();
+    p.actuators.push_back({static_cast<std::size_t>(input), a.role});
+  }
+  for (const model::MeanWrench::Product& x : wrench.products()) p.products.push_back({x.component, x.variables});
+  return p;
+}
+
+MeanBody<double> body_of(const model::RigidBody& torso, double late_steps) {
+  const model::InertiaTensor& i = torso.inertia_kg_m2;
+  const model::Sym3<double> inertia{i.xx, i.yy, i.zz, i.xy, i.yz, i.xz};
+  const auto [adjugate, scale] = model::inverse(inertia);
+  return {torso.mass_kg,
+          {torso.com_m.x, torso.com_m.y, torso.com_m.z},
+          inertia,
+          {scale * adjugate.xx, scale * adjugate.yy, scale * adjugate.zz, scale * adjugate.xy, scale * adjugate.yz,
+           scale * adjugate.xz},
+          late_steps};
+}
+
+}  // namespace
+
+template <class T>
+void Batch<T>::Storage::put_mean(std::size_t i, const model::Vehicle& as_filed) {
+  const model::Vehicle v = model::built(as_filed);
+  const BeatAveraged& b = *v.beat_averaged;
+  const model::MeanWrench wrench(b);
+  const MeanProgram program = program_of(v, wrench);
+  if (!mean) {
+    mean = std::make_unique<Mean<T>>();
+    mean->program = program;
+    mean->rows.assign(blocks.size() * program.rows() * kLanes<T>, T(0));
+    mean->memory.assign(blocks.size() * mean->memory_rows() * kLanes<T>, T(0));
+  }
+  if (program != mean->program)
+    throw std::invalid_argument("robots of a batch share inputs, actuators and expressions");
+
+  model::MeanDrive<double> drive;
+  std::vector<double> of_effects;
+  std::uint64_t bit = 1;
+  for (const model::EffectEntry& e : model::catalogue_of(v)) {
+    const auto own = v.effects.find(e.info.id);
+    std::vector<double> values = e.values(own != v.effects.end() ? own->second : std::map<std::string, double>{});
+    if (own == v.effects.end()) std::fill_n(values.begin(), e.info.sizes, 0.0);
+    if (e.acts(values)) {
+      mean->effects |= bit;
+      if (e.mean.drive != nullptr) e.mean.drive(values.data(), drive);
+    }
+    of_effects.insert(of_effects.end(), values.begin(), values.end());
+    bit <<= 1;
+  }
+  if (drive.delay_s > kLongestDelay_s)
+    throw std::invalid_argument("inputs " + std::to_string(drive.delay_s) + " s late; at most " +
+                                std::to_string(kLongestDelay_s) + " s are remembered");
+  const double late_steps = drive.delay_s / step_s;
+  if (late_steps > 0 && mean->slots == 0)
+    keep_inputs(static_cast<std::size_t>(std::ceil(kLongestDelay_s / step_s)) + 2);
+
+  std::vector<double> all;
+  const auto add = [&](const auto& s) {
+    const double* from = reinterpret_cast<const double*>(&s);
+    all.insert(all.end(), from, from + sizeof s / sizeof(double));
+  };
+  for (const BeatAveraged::Input& u : b.inputs)
+    add(MeanInput<double>{u.low, u.high, u.neutral, {u.mix[0], u.mix[1], u.mix[2], u.mix[3]}});
+  for (const BeatAveraged::Actuator& a : b.actuators) {
+    const double lag_s = a.lag_s + drive.lag_s;
+    add(MeanActuator<double>{a.gain, a.offset, lag_s > 0 ? model::exp(-step_s / (2 * lag_s)) : 0});
+  }
+  for (const model::MeanWrench::Product& p : wrench.products()) all.push_back(p.factor);
+  add(body_of(v.torso, late_steps));
+  all.insert(all.end(), of_effects.begin(), of_effects.end());
+  T* row = mean->row_of(i);
+  for (const double x : all) *row = static_cast<T>(x), row += kLanes<T>;
+}
+
+template <class T>
+std::vector<double> Batch<T>::Storage::inputs_of(std::size_t i) {
+  const auto [block, lane] = at(i);
+  const model::WingBeat<double> u = get<Drive<double>>(block.drive, lane).input;
+  const double four[] = {u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle};
+  std::vector<double> list;
+  const T* row = mean->row_of(i);
+  const auto next = [&] {
+    const T number = *row;
+    row += kLanes<T>;
+    return static_cast<double>(number);
+  };
+  for (std::size_t k = 0; k < mean->program.inputs; ++k) {
+    const double low = next(), high = next();
+    double sum = next();
+    for (const double says : four) sum += next() * says;
+    list.push_back(model::clamp(sum, low, high));
+  }
+  return list;
+}
+
+/// Gives all robots memory of their last inputs; what there was of it stays.
+template <class T>
+void Batch<T>::Storage::keep_inputs(std::size_t slots) {
+  const std::vector<T> from = mean->memory;
+  const std::size_t before = mean->memory_rows() * kLanes<T>;
+  mean->slots = slots;
+  const std::size_t now = mean->memory_rows() * kLanes<T>;
+  mean->memory.assign(blocks.size() * now, T(0));
+  for (std::size_t b = 0; b < blocks.size(); ++b)
+    std::copy_n(&from[b * before], std::min(before, now), &mean->memory[b * now]);
+}
+
+template <class T>
+std::pair<std::vector<T>, std::vector<T>> Batch<T>::Storage::get_mean(std::size_t i) const {
+  std::pair<std::vector<T>, std::vector<T>> all;
+  if (!mean) return all;
+  const T *row = mean->row_of(i), *memory = mean->memory_of(i);
+  for (std::size_t k = 0; k < mean->program.rows(); ++k) all.first.push_back(row[k * kLanes<T>]);
+  for (std::size_t k = 0; k < mean->memory_rows(); ++k) all.second.push_back(memory[k * kLanes<T>]);
+  return all;
+}
+
+template <class T>
+void Batch<T>::Storage::put_mean(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory) {
+  if (!mean) return;
+  if (memory.size() > mean->memory_rows())
+    keep_inputs((memory.size() - 1 - mean->program.actuators.size()) / mean->program.inputs);
+  T* row = mean->row_of(i);
+  for (std::size_t k = 0; k < rows.size(); ++k) row[k * kLanes<T>] = rows[k];
+  T* to = mean->memory_of(i);
+  for (std::size_t k = 0; k < memory.size(); ++k) to[k * kLanes<T>] = memory[k];
+}
+
+#define FLAPPY_MEAN(T)                                                                               \
+  template void Batch<T>::Storage::put_mean(std::size_t, const model::Vehicle&);                     \
+  template void Batch<T>::Storage::keep_inputs(std::size_t);                                         \
+  template std::vector<double> Batch<T>::Storage::inputs_of(std::size_t);                            \
+  template std::pair<std::vector<T>, std::vector<T>> Batch<T>::Storage::get_mean(std::size_t) const; \
+  template void Batch<T>::Storage::put_mean(std::size_t, const std::vector<T>&, const std::vector<T>&)
+FLAPPY_MEAN(float);
+FLAPPY_MEAN(double);
+#undef FLAPPY_MEAN
+
+}  // namespace flappy::sim
