@@ -99,9 +99,10 @@ struct Posterior {
 /// A robot whose wings are not modelled: what acts on it as means over beats, from its inputs and its motion
 /// (src/model/beat_averaged.hpp). Its torso is all of it; sides and driver say nothing.
 struct BeatAveraged {
-  double nominal_Hz = 0;    ///< beats, about
-  double bandwidth_Hz = 0;  ///< up to which force and motion are compared, well below the beat
-  struct Input {            ///< a column of command.csv
+  double nominal_Hz = 0;         ///< beats, about
+  double bandwidth_Hz = 0;       ///< up to which force and motion are compared, well below the beat
+  bool compares_moments = true;  ///< with flights; forces always
+  struct Input {                 ///< a column of command.csv
     std::string name;
     double low = 0, high = 0;
     double neutral = 0;              ///< of a controller that says nothing

@@ -200,6 +200,7 @@ BeatAveraged read_beat_averaged(const io::Table& root) {
   const io::Table beat = root.table("beat");
   v.nominal_Hz = beat.number("nominal_Hz", {1e-3, 1e4});
   v.bandwidth_Hz = beat.number("bandwidth_Hz", {1e-3, v.nominal_Hz / 2});
+  v.compares_moments = beat.boolean_or("compares_moments", true);
   const io::Range any{-kLargest, kLargest};
   const io::Table inputs = root.table("input");
   for (const std::string& name : inputs.keys()) {
@@ -260,6 +261,7 @@ std::string beat_averaged_text(const BeatAveraged& v) {
   const auto number = [&](const std::string& path, double value) { line(path, io::toml_number(value)); };
   number("beat.nominal_Hz", v.nominal_Hz);
   number("beat.bandwidth_Hz", v.bandwidth_Hz);
+  if (!v.compares_moments) line("beat.compares_moments", "false");
   for (const BeatAveraged::Input& i : v.inputs) {
     number("input." + i.name + ".low", i.low);
     number("input." + i.name + ".high", i.high);

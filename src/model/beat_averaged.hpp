@@ -2,7 +2,8 @@
 // moves. Its file says how:
 //
 //   model = "beat_averaged"
-//   [beat]                                   # nominal_Hz, bandwidth_Hz
+//   [beat]                                   # nominal_Hz, bandwidth_Hz; compares_moments = false: moments are not held against flights, in
+//                                            #   which they answer what the autopilot does against them
 //   [torso]                                  # all of it: mass_kg, com_m, inertia_kg_m2
 //   [input.left_flap]                        # a column of command.csv: low, high; and where it flies, what a controller makes of it:
 //                                            #   neutral + amplitude A + difference D + bias B + split_cycle S, within low and high

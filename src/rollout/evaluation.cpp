@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -30,7 +31,8 @@ class Part {
  public:
   Part(FlyConfig config, std::size_t count, const policy::Policy* policy, std::vector<flight::Snapshot<T>>& hover,
        Detail detail)
-      : flights_(std::move(config), count, policy, &hover),
+      : electrical_(!config.vehicle.beat_averaged),
+        flights_(std::move(config), count, policy, &hover),
         fleet_(flights_.fleet()),
         outcomes_(count),
         drawn_J_(count) {
@@ -47,7 +49,8 @@ class Part {
     const flight::Target goal = fleet_.target(0);  // of all, as they started together
     flights_.each([&](std::size_t i) {
       note(i);
-      const double drawn_J = fleet_.batch().energy_J(i), more_J = drawn_J - std::exchange(drawn_J_[i], drawn_J);
+      const double drawn_J = electrical_ ? fleet_.batch().energy_J(i) : std::numeric_limits<double>::quiet_NaN(),
+                   more_J = drawn_J - std::exchange(drawn_J_[i], drawn_J);
       if (monitors_[i].manoeuvring(t_s)) monitors_[i].spend(more_J, fleet_.period_s(), fleet_.handed_back(i));
       monitors_[i].see(fleet_.truth(i), goal, t_s, outcomes_[i]);
     });
@@ -74,6 +77,7 @@ class Part {
     o.ended = fleet_.ended(i);
   }
 
+  bool electrical_;  // motors draw energy
   Rollout<T> flights_;
   Fleet<T>& fleet_;
   std::vector<Outcome> outcomes_;

@@ -156,8 +156,8 @@ Summary summarise(std::span<const Outcome> flights) {
     strict_s.push_back(o.strict_s > 0 ? o.strict_s : std::numeric_limits<double>::infinity());
     position.push_back(o.position_error_m);
     heading.push_back(o.heading_error_rad);
-    energy.push_back(o.energy_J);
-    if (o.manoeuvre_s > 0) power.push_back(o.energy_J / o.manoeuvre_s);
+    if (!std::isnan(o.energy_J)) energy.push_back(o.energy_J);
+    if (!std::isnan(o.energy_J) && o.manoeuvre_s > 0) power.push_back(o.energy_J / o.manoeuvre_s);
     ++s.failures[static_cast<std::size_t>(o.failure)];
     for (const double x : {o.captured_s, o.lost_s, o.strict_s, o.overshoot_m, o.position_error_m, o.heading_error_rad,
                            o.energy_J, o.manoeuvre_s})

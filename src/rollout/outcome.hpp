@@ -47,7 +47,8 @@ struct Outcome {
   double strict_s = 0;                ///< when the strict goal was first reached; 0: never
   double overshoot_m = 0;             ///< of a flight that captured
   double position_error_m = 0, heading_error_rad = 0;  ///< at the end
-  double energy_J = 0, manoeuvre_s = 0;  ///< electrical, of both motors, until hand-back or until capture is too late
+  /// Electrical, of both motors, until hand-back or until capture is too late; not a number where no voltage is modelled.
+  double energy_J = 0, manoeuvre_s = 0;
 
   std::uint64_t hash = 0;  ///< of how the vehicle moves, at the end
 };
@@ -93,7 +94,7 @@ struct Summary {
   Quantiles capture_s;    ///< of flights that captured
   Quantiles strict_s;     ///< of all; infinite for those that never reached it
   Quantiles overshoot_m;  ///< of flights that captured
-  Quantiles position_error_m, heading_error_rad, energy_J, power_W;  ///< of all
+  Quantiles position_error_m, heading_error_rad, energy_J, power_W;  ///< of all; no energy where no voltage is modelled
   std::array<std::size_t, kTaskFailures> failures{};                 ///< by TaskFailure; none: the successes
   std::array<std::size_t, kDemands> missing{};                       ///< by Demand, of those that never captured
   std::uint64_t hash = 0;                                            ///< of all outcomes in order

@@ -7,8 +7,10 @@ nanobench/*.csv.gz. Prints the tables of docs/real.md; keeps every diagnosis in 
 
 import itertools
 import json
+import math
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -125,6 +127,54 @@ def withheld(flights, corrected, sets):
     return rows
 
 
+def shifted_inputs(flights):
+    """Copies of flights whose inputs are those of half a flight later."""
+    for flight in flights:
+        to = OUT / "shifted" / flight.name
+        shutil.rmtree(to, ignore_errors=True)
+        shutil.copytree(flight, to)
+        head, *rows = (flight / "command.csv").read_text().splitlines()
+        times, inputs = zip(*(row.split(",", 1) for row in rows), strict=True)
+        half = len(rows) // 2
+        (to / "command.csv").write_text("\n".join([head, *(f"{t},{u}" for t, u in zip(times, inputs[half:] + inputs[:half], strict=True))]) + "\n")
+    return [OUT / "shifted" / f.name for f in flights]
+
+
+def trained(name, vehicle):
+    shutil.rmtree(OUT / name, ignore_errors=True)
+    code, _, err = run(BIN / "flappy-train", PROJECT / "configs/train/flapper_dash.toml", "--out", OUT / name, "--set", f'vehicle="{vehicle}"')
+    if code != 0:
+        sys.exit(err)
+    return OUT / name / "best.json"
+
+
+def flown(policy, vehicle):
+    """Rms distance from where it is meant to be, m, and how many of 100 flights ended early."""
+    code, out, err = run(BIN / "flappy-fly", PROJECT / "configs/fly/flapper_dash.toml", "--count", "100", "--set", f'vehicle="{vehicle}"', "--set",
+                         f'actor="{policy}"')
+    if code != 0:
+        sys.exit(err)
+    axes = re.search(r"from 1 s on +\S+ +\S+ +\S+ +(\S+) +(\S+) +(\S+)", out)
+    ended = re.search(r"out_of_bounds: (\d+)", out)
+    return math.hypot(*(float(x) / 1000 for x in axes.groups())), int(ended.group(1)) if ended else 0
+
+
+def policies(flights, file):
+    """Whether a policy that was trained on what some flights corrected flies what others did better than one trained on the file."""
+    halves = {"A": flights[::2], "B": flights[1::2]}
+    vehicles = {}
+    for name, some in halves.items():
+        diagnose(f"half_{name}", file, some)
+        vehicles[name] = (OUT / f"half_{name}" / "vehicle_corrected.toml").resolve()
+    by_file = trained("policy_file", file.resolve())
+    print(f"  trained on the file, flown on it: {flown(by_file, file.resolve())[0]:.3f} m")
+    for name, other in (("A", "B"), ("B", "A")):
+        policy = trained(f"policy_{name}", vehicles[name])
+        (on_file, lost), (corrected, lost_too) = flown(by_file, vehicles[other]), flown(policy, vehicles[other])
+        print(f"  flown on what flights {', '.join(f.name for f in halves[other])} correct: trained on the file {on_file:.3f} m ({lost} of 100 ended early), "
+              f"on what {', '.join(f.name for f in halves[name])} correct {corrected:.3f} m ({lost_too}): {corrected / on_file:.2f} times")
+
+
 def main():
     OUT.mkdir(parents=True, exist_ok=True)
     flapper, nano = imported("flapper", "flapper_nimble.toml"), imported("nanobench", "crazyflie.toml")
@@ -141,8 +191,11 @@ def main():
     print("controls")
     _, said, _ = diagnose("wrong_robot", nimble, nano)
     print(f"  Crazyflie's logs, Flapper's vehicle: {said}")
-    print("an effect of the Flapper withheld")
     corrected = (OUT / "flapper" / "vehicle_corrected.toml").read_text()
+    (OUT / "known.toml").write_text(corrected.split("posterior.names")[0])
+    c, _, _ = diagnose("shifted_inputs", OUT / "known.toml", shifted_inputs(flapper))
+    print(f"  inputs of half a flight later, the corrected vehicle: {c['verdict']['kind']} {', '.join(c['verdict']['effects'])} at {c['verdict']['probability']:.3f}")
+    print("an effect of the Flapper withheld")
     everyone = tuple(range(len(flapper)))
     sets = [everyone] + [s for s in itertools.combinations(everyone, len(flapper) - 1)]
     rows = withheld(flapper, corrected, sets)
@@ -154,6 +207,8 @@ def main():
     if stated:
         print(f"  stated {sum(p for p, _ in stated) / len(stated):.3f} on average, right {sum(s for _, s in stated) / len(stated):.3f} of {len(stated)}")
     (OUT / "withheld.json").write_text(json.dumps(rows, indent=1))
+    print("rms distance of a Flapper from the point that it follows")
+    policies(flapper, nimble)
 
 
 main()

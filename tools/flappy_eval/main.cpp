@@ -319,7 +319,7 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
     if (e.stopped) return std::nullopt;
     return rollout::summarise(e.flights);
   };
-  const double all = static_cast<double>(model::effects().size() * std::size(kSizes)) + 1;
+  const double all = static_cast<double>(model::catalogue_of(config.vehicle).size() * std::size(kSizes)) + 1;
   const auto without = fly(config);
   progress.show(++done / all);
   Json list = Json::array();
@@ -329,7 +329,7 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
     std::snprintf(text, sizeof text, "%8.1f", flown ? 100 * flown->success.value : 0);
     return flown ? std::string(text) : "       -";
   };
-  for (const model::EffectEntry& effect : model::effects()) {
+  for (const model::EffectEntry& effect : model::catalogue_of(config.vehicle)) {
     std::string row;
     Json json = {{"effect", effect.info.id}, {"typical", Json::object()}, {"success", Json::array()}};
     for (int i = 0; i < effect.info.sizes; ++i) {
@@ -405,7 +405,8 @@ void evaluate(Request request, io::Program& program) {
     return evaluate_effects(request, config, {policy ? nullptr : config.actor, policy.get()}, program);
   }
   std::vector<std::pair<const char*, Controller>> alone;
-  if (!request.no_baselines && !task.sets_voltages())  // to which no controller can add
+  // to voltages no controller can add, and those of the project are tuned to its own flappers
+  if (!request.no_baselines && !task.sets_voltages() && !config.vehicle.beat_averaged)
     alone = {{"PID alone", controller_named("pid", config)}, {"ARC alone", controller_named("arc", config)}};
 
   Evaluation evaluation(request, config);

@@ -77,7 +77,8 @@ MeanPrediction::MeanPrediction(const std::filesystem::path& folder, flightlog::F
   const bool moments = model::MeanWrench(b).has_moments();
   for (int channel = 0; channel <= kForceZ; ++channel)
     shown_[static_cast<std::size_t>(channel)] =
-        (channel >= kForceX || moments) && (channels.empty() || std::ranges::count(channels, channel) > 0);
+        (channel >= kForceX || moments) &&
+        (channels.empty() ? channel >= kForceX || b.compares_moments : std::ranges::count(channels, channel) > 0);
   for (const model::BeatAveraged::Input& i : b.inputs) {
     const auto at = std::ranges::find(log_.header.inputs, i.name);
     if (at == log_.header.inputs.end())
