@@ -10,6 +10,7 @@
 #include "gap/replay/mean_prediction.hpp"
 #include "io/config.hpp"
 #include "refusal.hpp"
+#include "rollout/simulated_flight.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::gap {
@@ -147,6 +148,59 @@ TEST(MeanDiagnosis, KnowsThatItDoesNotKnow) {
   EXPECT_EQ(
       diagnose_robot({.drag_x = 3, .drag_y = 2, .heave = 1}, {"flapping_counter_force", "body_drag"}).conclusion.kind,
       Conclusion::Kind::unknown);
+}
+
+/// What is left of the rms of each channel where a candidate predicts a flight.
+std::array<double, 6> left(const MeanPrediction& flight, const model::Vehicle& vehicle) {
+  const Candidate candidate{vehicle};
+  const Rows rows = flight.predict(std::vector<const Candidate*>{&candidate})[0];
+  std::array<double, 6> rms{};
+  for (int channel = 0; channel < 6; ++channel) {
+    double n = 0;
+    for (std::size_t j = 0; j < flight.beats(); ++j) {
+      if (!flight.covers(j, channel)) continue;
+      const std::size_t row = j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients;
+      n += 1;
+      rms[static_cast<std::size_t>(channel)] += std::pow(flight.measured()[row] - rows[row], 2);
+    }
+    rms[static_cast<std::size_t>(channel)] = std::sqrt(rms[static_cast<std::size_t>(channel)] / n);
+  }
+  return rms;
+}
+
+// What flies a robot and what predicts its logs are two readings of one file: a flight of the simulator, its sensors nearly ideal, is predicted
+// but for what a filter of 3 Hz makes of products of what is faster.
+TEST(MeanDiagnosis, PredictsWhatTheSimulatorFlies) {
+  rollout::FlyConfig config = rollout::read_fly_config(
+      test::source_path("configs/fly/flapper_nimble.toml"),
+      {"flight.duration_s=30", "task.end.time_s=30", "vehicle.beat.compares_moments=true", "vehicle.extent.below_m=0",
+       "world.ground_z_m=-50", "sensors.mocap.position_noise_m=1e-6", "sensors.mocap.attitude_noise_rad=1e-6",
+       "sensors.mocap.latency_s=0", "sensors.imu.gyro_noise_rad_s=1e-6", "vehicle.torso.com_m.z=-0.02",
+       "vehicle.effects.flapping_counter_force.x_per_s=3", "vehicle.effects.flapping_counter_force.y_per_s=2",
+       "vehicle.effects.stroke_plane_actuation.shift_m_s2=10", "vehicle.effects.driver_bandwidth.lag_s=0.03"});
+  std::string waves;
+  for (const char* wave :
+       {"difference_V\"\nrms = 0.02", "amplitude_V\"\nrms = 0.04", "bias_V\"\nrms = 0.04", "split_cycle\"\nrms = 0.1"})
+    waves += std::string(
+                 "[[excitation]]\nkind = \"multisine\"\nfrom_hz = 0.2\nto_hz = 2.0\ncount = 10\nperiod_s = 30.0\ninput "
+                 "= \"") +
+             wave + "\n";
+  config.excitation = flight::read_excitation(io::Config::parse(waves, "waves").root(), 30);
+  const auto log = rollout::simulate(config, config.vehicle, 1)[0].log;
+  ASSERT_TRUE(log);
+  const MeanPrediction flight("flight", *log, config.vehicle);
+  const auto with = left(flight, config.vehicle);
+  const auto without = [&](const std::string& effect) {
+    model::Vehicle v = config.vehicle;
+    v.effects.erase(effect);
+    return left(flight, v);
+  };
+  for (int c = 0; c < 6; ++c) EXPECT_LT(with[static_cast<std::size_t>(c)], c < 3 ? 0.4 : 0.06) << channel_name(c);
+  EXPECT_GT(without("flapping_counter_force")[kForceX], 5 * with[kForceX]);
+  EXPECT_GT(without("flapping_counter_force")[kForceY], 4 * with[kForceY]);
+  EXPECT_GT(without("stroke_plane_actuation")[kForceX], 5 * with[kForceX]);
+  for (const int c : {kTorqueX, kTorqueY, kTorqueZ})
+    EXPECT_GT(without("driver_bandwidth")[static_cast<std::size_t>(c)], 4 * with[static_cast<std::size_t>(c)]);
 }
 
 TEST(MeanDiagnosis, RefusesLogsOfAnotherRobot) {
