@@ -61,40 +61,50 @@ constexpr int mean_rows_before() {
 
 }  // namespace FLAPPY_ISA
 
-/// What robots of a batch share, and where their rows are: first those of inputs, actuators and the factors of products, then the body's and the
-/// effects'.
+/// An actuator of all robots of a batch.
+struct DrivenActuator {
+  std::size_t input;
+  model::BeatAveraged::Role role;
+  bool operator==(const DrivenActuator&) const = default;
+};
+
+/// A product of the expressions, whose factor is each robot's own.
+struct MeanProduct {
+  std::size_t component;    // of force, then moment, about the torso's origin
+  std::size_t first, last;  // of MeanProgram::variables
+  bool operator==(const MeanProduct&) const = default;
+};
+
+/// What robots of a batch share.
 struct MeanProgram {
-  struct Actuator {
-    std::size_t input;
-    model::BeatAveraged::Role role;
-    bool operator==(const Actuator&) const = default;
-  };
-  struct Product {
-    std::size_t component;               // of force, then moment, about the torso's origin
-    std::vector<std::size_t> variables;  // actuators, then motion
-    bool operator==(const Product&) const = default;
-  };
   std::size_t inputs = 0;
-  std::vector<Actuator> actuators;
-  std::vector<Product> products;
+  std::vector<DrivenActuator> actuators;
+  std::vector<MeanProduct> products;
+  std::vector<std::size_t> variables;  // of products: actuators, then motion
   double nominal_Hz = 0;
   bool operator==(const MeanProgram&) const = default;
 
-  std::size_t actuator_rows() const { return inputs * model::kRows<MeanInput>; }
-  std::size_t product_rows() const { return actuator_rows() + actuators.size() * model::kRows<MeanActuator>; }
-  std::size_t body_rows() const { return product_rows() + products.size(); }
-  std::size_t effect_rows() const { return body_rows() + model::kRows<MeanBody>; }
-  std::size_t rows() const { return effect_rows() + mean_rows_before<kMeanEffects>(); }
+  // Where their rows are: first those of inputs, actuators and the factors of products, then the body's and the effects'.
+  std::size_t actuator_row() const { return inputs * model::kRows<MeanInput>; }
+  std::size_t product_row() const { return actuator_row() + actuators.size() * model::kRows<MeanActuator>; }
+  std::size_t body_row() const { return product_row() + products.size(); }
+  std::size_t effect_row() const { return body_row() + model::kRows<MeanBody>; }
+  std::size_t rows() const { return effect_row() + mean_rows_before<kMeanEffects>(); }
 };
 
-/// A block's part of them. Its memory: whether it has flown, the actuators, then the inputs of the last `slots` steps.
+/// A block's part, plain, as kernels are not to share code. Memory: whether it has flown, the actuators, then the inputs of the last `slots` steps.
 template <class T>
 struct MeanRows {
-  const MeanProgram* program = nullptr;
   const T* rows = nullptr;
   T* memory = nullptr;
   std::size_t slots = 0;      // none where no robot is late
   std::uint64_t effects = 0;  // bit i: entry i of MeanEffects, of some robot
+  std::size_t inputs = 0, actuator_count = 0, product_count = 0;
+  const DrivenActuator* actuators = nullptr;
+  const MeanProduct* products = nullptr;
+  const std::size_t* variables = nullptr;
+  double nominal_Hz = 0;
+  std::size_t actuator_row = 0, product_row = 0, body_row = 0, effect_row = 0;
 };
 
 }  // namespace flappy::sim

@@ -25,7 +25,11 @@ MeanProgram program_of(const model::Vehicle& v, const model::MeanWrench& wrench)
     const auto input = std::ranges::find(b.inputs, a.input, &BeatAveraged::Input::name) - b.inputs.begin();
     p.actuators.push_back({static_cast<std::size_t>(input), a.role});
   }
-  for (const model::MeanWrench::Product& x : wrench.products()) p.products.push_back({x.component, x.variables});
+  for (const model::MeanWrench::Product& x : wrench.products()) {
+    const std::size_t first = p.variables.size();
+    p.variables.insert(p.variables.end(), x.variables.begin(), x.variables.end());
+    p.products.push_back({x.component, first, p.variables.size()});
+  }
   return p;
 }
 

@@ -32,12 +32,11 @@ class MeanLanes {
  public:
   MeanLanes(const MeanRows<T>& mean, const Block<T>& block, const StepPlan& plan, int first)
       : mean_(mean),
-        program_(*mean.program),
         plan_(plan),
         first_(first),
-        body_(load_rows<MeanBody<L>>(rows(program_.body_rows()), first)),
+        body_(load_rows<MeanBody<L>>(rows(mean.body_row), first)),
         parameters_(view_rows<Parameters<L>>(block.parameters, first)) {
-    for (std::size_t k = 0; k < program_.actuators.size(); ++k) end_[k] = memory(1 + k);
+    for (std::size_t k = 0; k < mean_.actuator_count; ++k) end_[k] = memory(1 + k);
   }
 
   const MeanBody<L>& body() const { return body_; }
@@ -45,10 +44,10 @@ class MeanLanes {
   /// Inputs for these steps, from what the controller says.
   void set_inputs(const WingBeat<L>& says) {
     const L four[] = {says.amplitude_V, says.difference_V, says.bias_V, says.split_cycle};
-    for (std::size_t k = 0; k < program_.inputs; ++k) {
+    for (std::size_t k = 0; k < mean_.inputs; ++k) {
       const auto input = load_rows<MeanInput<L>>(rows(k * model::kRows<MeanInput>), first_);
       L sum = input.neutral;
-      for (std::size_t i = 0; i < std::size(four); ++i) sum += input.mix[i] * four[i];
+      for (int i = 0; i < 4; ++i) sum += input.mix[i] * four[i];
       input_[k] = clamp(sum, input.low, input.high);
     }
     start_fresh();
@@ -57,13 +56,13 @@ class MeanLanes {
   /// Actuators follow their inputs for a step; the loads are those half-way.
   void drive(std::int64_t step) {
     L late[kMostInputs];
-    for (std::size_t k = 0; k < program_.inputs; ++k) late[k] = input_[k];
+    for (std::size_t k = 0; k < mean_.inputs; ++k) late[k] = input_[k];
     if (mean_.slots > 0) remember(static_cast<std::size_t>(step) % mean_.slots, late);
     const L per_step(1 / plan_.step_s);
     stroke_plane_ = stroke_plane_1_s_ = beat_share_ = L(0);
     int flapping = 0;
-    for (std::size_t k = 0; k < program_.actuators.size(); ++k) {
-      const MeanProgram::Actuator& a = program_.actuators[k];
+    for (std::size_t k = 0; k < mean_.actuator_count; ++k) {
+      const DrivenActuator& a = mean_.actuators[k];
       const auto figures = actuator(k);
       const L wanted = figures.gain * late[a.input] + figures.offset, before = end_[k];
       value_[k] = wanted + figures.kept * L(before - wanted);
@@ -76,7 +75,7 @@ class MeanLanes {
         ++flapping;
       }
     }
-    if (flapping > 0) beat_share_ = L(1 / (flapping * program_.nominal_Hz)) * beat_share_;
+    if (flapping > 0) beat_share_ = L(1 / (flapping * mean_.nominal_Hz)) * beat_share_;
   }
 
   Acceleration<L> accelerate(const Body<L>& x) const {
@@ -118,8 +117,7 @@ class MeanLanes {
   /// `moves`: lanes of which it is kept.
   void store(typename L::Mask moves) const {
     where(moves, L(1), memory(0)).store(memory_at(0));
-    for (std::size_t k = 0; k < program_.actuators.size(); ++k)
-      where(moves, end_[k], memory(1 + k)).store(memory_at(1 + k));
+    for (std::size_t k = 0; k < mean_.actuator_count; ++k) where(moves, end_[k], memory(1 + k)).store(memory_at(1 + k));
   }
 
  private:
@@ -129,29 +127,29 @@ class MeanLanes {
   T* memory_at(std::size_t row) const { return mean_.memory + row * kLanes<T> + first_; }
   L memory(std::size_t row) const { return L::load(memory_at(row)); }
   MeanActuator<L> actuator(std::size_t k) const {
-    return load_rows<MeanActuator<L>>(rows(program_.actuator_rows() + k * model::kRows<MeanActuator>), first_);
+    return load_rows<MeanActuator<L>>(rows(mean_.actuator_row + k * model::kRows<MeanActuator>), first_);
   }
 
   /// A robot starts as if its first inputs had been there for long.
   void start_fresh() {
     const auto fresh = memory(0) == L(0);
     if (!any(fresh)) return;
-    for (std::size_t k = 0; k < program_.actuators.size(); ++k) {
+    for (std::size_t k = 0; k < mean_.actuator_count; ++k) {
       const auto figures = actuator(k);
-      end_[k] = where(fresh, L(figures.gain * input_[program_.actuators[k].input] + figures.offset), end_[k]);
+      end_[k] = where(fresh, L(figures.gain * input_[mean_.actuators[k].input] + figures.offset), end_[k]);
     }
     for (std::size_t slot = 0; slot < mean_.slots; ++slot)
-      for (std::size_t k = 0; k < program_.inputs; ++k)
+      for (std::size_t k = 0; k < mean_.inputs; ++k)
         where(fresh, input_[k], memory(row_of(slot, k))).store(memory_at(row_of(slot, k)));
   }
 
   std::size_t row_of(std::size_t slot, std::size_t input) const {
-    return 1 + program_.actuators.size() + slot * program_.inputs + input;
+    return 1 + mean_.actuator_count + slot * mean_.inputs + input;
   }
 
   /// Keeps the inputs of a step, and makes of them those that arrive now.
   void remember(std::size_t now, L (&inputs)[kMostInputs]) const {
-    for (std::size_t k = 0; k < program_.inputs; ++k) {
+    for (std::size_t k = 0; k < mean_.inputs; ++k) {
       inputs[k].store(memory_at(row_of(now, k)));
       for (int i = 0; i < kWidth<T>; ++i) {
         const auto whole = static_cast<std::size_t>(body_.late_steps.raw[i]);
@@ -166,7 +164,7 @@ class MeanLanes {
   /// Force and moment of the vehicle's expressions, about the torso's origin.
   MeanLoads<L> own_load(const MeanState<L>& s) const {
     const Vec3<L> air = s.velocity_B_m_s - s.wind_B_m_s;
-    const std::size_t n = program_.actuators.size();
+    const std::size_t n = mean_.actuator_count;
     L variables[kMostActuators + kMotionVariables];
     for (std::size_t k = 0; k < n; ++k) variables[k] = value_[k];
     L* const motion = variables + n;
@@ -175,10 +173,10 @@ class MeanLanes {
     motion[kWx] = s.rate_rad_s.x, motion[kWy] = s.rate_rad_s.y, motion[kWz] = s.rate_rad_s.z;
     motion[kBatteryShare] = L(1);  // nothing empties it
     L sum[6] = {L(0), L(0), L(0), L(0), L(0), L(0)};
-    for (std::size_t k = 0; k < program_.products.size(); ++k) {
-      const MeanProgram::Product& p = program_.products[k];
-      L value = L::load(rows(program_.product_rows() + k)[0] + first_);
-      for (const std::size_t v : p.variables) value = value * variables[v];
+    for (std::size_t k = 0; k < mean_.product_count; ++k) {
+      const MeanProduct& p = mean_.products[k];
+      L value = L::load(rows(mean_.product_row + k)[0] + first_);
+      for (std::size_t i = p.first; i < p.last; ++i) value = value * variables[mean_.variables[i]];
       sum[p.component] += value;
     }
     return {{sum[0], sum[1], sum[2]}, {sum[3], sum[4], sum[5]}};
@@ -192,8 +190,7 @@ class MeanLanes {
         constexpr int kCount = mean_parameters_of<MeanEffectAt<I>>();
         L q[kCount];
         for (int k = 0; k < kCount; ++k)
-          q[k] =
-              L::load(rows(program_.effect_rows() + static_cast<std::size_t>(mean_rows_before<I>() + k))[0] + first_);
+          q[k] = L::load(rows(mean_.effect_row + static_cast<std::size_t>(mean_rows_before<I>() + k))[0] + first_);
         use.template operator()<MeanEffectAt<I>>(q);
       }
       for_effects<I + 1>(use);
@@ -201,7 +198,6 @@ class MeanLanes {
   }
 
   const MeanRows<T>& mean_;
-  const MeanProgram& program_;
   const StepPlan& plan_;
   int first_;
   const MeanBody<L> body_;

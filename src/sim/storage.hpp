@@ -49,9 +49,27 @@ struct Mean {
   /// Of one robot, a number each.
   T* row_of(std::size_t i) { return &rows[i / kLanes<T> * program.rows() * kLanes<T> + i % kLanes<T>]; }
   T* memory_of(std::size_t i) { return &memory[i / kLanes<T> * memory_rows() * kLanes<T> + i % kLanes<T>]; }
+  MeanRows<T> block(std::size_t b) {
+    const MeanProgram& p = program;
+    return {row_of(b * kLanes<T>),
+            memory_of(b * kLanes<T>),
+            slots,
+            effects,
+            p.inputs,
+            p.actuators.size(),
+            p.products.size(),
+            p.actuators.data(),
+            p.products.data(),
+            p.variables.data(),
+            p.nominal_Hz,
+            p.actuator_row(),
+            p.product_row(),
+            p.body_row(),
+            p.effect_row()};
+  }
   /// Calls `use(number)` for each that moves a robot: past inputs of one that is late alone.
   void for_memory(std::size_t i, const auto& use) {
-    const bool late = row_of(i)[(program.effect_rows() - 1) * kLanes<T>] > 0;  // the last of MeanBody
+    const bool late = row_of(i)[(program.effect_row() - 1) * kLanes<T>] > 0;  // the last of MeanBody
     const std::size_t used = late ? memory_rows() : 1 + program.actuators.size();
     for (std::size_t k = 0; k < used; ++k) use(memory_of(i)[k * kLanes<T>]);
   }
@@ -100,9 +118,7 @@ struct Batch<T>::Storage {
       all = {block_effects[b], &effect_rows[b * model::kEffectRows * kLanes<T>], effects_kept,
              effect_states.data() + b * state_size()};
     if (!motors.empty()) all.motors = &motors[b];
-    if (mean)
-      all.mean = {&mean->program, mean->row_of(b * kLanes<T>), mean->memory_of(b * kLanes<T>), mean->slots,
-                  mean->effects};
+    if (mean) all.mean = mean->block(b);
     return all;
   }
   /// Numbers of a block that effects remember.
