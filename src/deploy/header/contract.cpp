@@ -39,8 +39,26 @@ void list(std::ostringstream& text, const char* title, const std::vector<Signal>
 bool holds_trim(const FlyConfig& config) { return config.fleet.task.constants.holds_trim > 0; }
 bool sets_voltages(const FlyConfig& config) { return config.fleet.task.sets_voltages(); }
 
+double beats_Hz(const FlyConfig& config) {
+  const auto& robot = config.vehicle.beat_averaged;
+  return robot ? robot->nominal_Hz : config.vehicle.driver.flapping_Hz;
+}
+
 std::string meaning_of_action(const FlyConfig& config) {
   if (sets_voltages(config)) return "It is the voltage of the left and of the right motor.\n";
+  std::string inputs;  // as the vehicle mixes them
+  if (const auto& robot = config.vehicle.beat_averaged) {
+    for (const model::BeatAveraged::Input& i : robot->inputs) {
+      inputs += i.name + " = " + io::shortest_digits(i.neutral);
+      for (std::size_t k = 0; k < i.mix.size(); ++k)
+        if (i.mix[k] != 0) inputs += " + " + io::shortest_digits(i.mix[k]) + " " + config.fleet.task.action()[k].name;
+      inputs += ", within " + io::shortest_digits(i.low) + " to " + io::shortest_digits(i.high) + "\n";
+    }
+    inputs = "The robot's inputs are\n" + inputs;
+  }
+  if (config.fleet.controller.kind == flight::kNoController)
+    return "It is all that flies the robot: no controller adds to it.\n" + inputs;
+  if (!inputs.empty()) return "The action is added to the output of the feedback controller.\n" + inputs;
   const std::string beats =
       "The wings beat at " + io::shortest_digits(config.vehicle.driver.flapping_Hz) + " Hz. The action is added to\n";
   return beats + (holds_trim(config)
@@ -54,7 +72,7 @@ Periods periods_of(const FlyConfig& config) {
   const double control_s = 1 / config.fleet.control_hz;
   return {whole_us("a control period", control_s),
           whole_us("a policy's period", control_s * config.fleet.task.action_repeat),
-          whole_us("the driver's hold", config.vehicle.driver.hold_s)};
+          whole_us("the driver's hold", config.vehicle.beat_averaged ? control_s : config.vehicle.driver.hold_s)};
 }
 
 std::string contract_text(const FlyConfig& config, const policy::RunInfo& run) {
@@ -106,7 +124,7 @@ std::string contract_macros(const std::string& prefix, const FlyConfig& config, 
   define("DIRTY", run.dirty ? "1" : "0");
   define("CONTROL_US", std::to_string(p.control_us) + "U");
   define("PERIOD_US", std::to_string(p.policy_us) + "U");
-  define("FLAPPING_HZ", c_number(static_cast<float>(config.vehicle.driver.flapping_Hz)));
+  define("FLAPPING_HZ", c_number(static_cast<float>(beats_Hz(config))));
   define("HOLDS_TRIM", holds_trim(config) ? "1" : "0");
   return text.str();
 }

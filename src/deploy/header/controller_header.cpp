@@ -223,6 +223,8 @@ std::string about(const rollout::FlyConfig& config, const policy::RunInfo& run, 
 std::string no_controller(const rollout::FlyConfig& config) {
   const flight::Task& task = config.fleet.task;
   if (task.sets_voltages()) return "the policy sets the motors' voltages by itself";
+  if (config.vehicle.beat_averaged) return "the vehicle is known by the beat, and has an autopilot of its own";
+  if (config.fleet.controller.kind == flight::kNoController) return "the policy flies by itself";
   if (task.parts >> static_cast<int>(flight::Part::wings) & 1)
     return "the policy sees the wings, which it has no sensor for";
   return "";

@@ -327,6 +327,17 @@ TEST(PolicyHeader, SetsVoltagesAsTheLanesDo) {
   EXPECT_EQ(no_controller(escape({8}, Activation::relu)), "");
 }
 
+TEST(PolicyHeader, SaysWhatARobotThatIsKnownByTheBeatMixes) {
+  const rollout::FlyConfig config = rollout::read_fly_config(test::source_path("configs/fly/flapper_dash.toml"));
+  const std::string text = contract_text(config, {});
+  EXPECT_TRUE(text.find("It is all that flies the robot: no controller adds to it.\n") != std::string::npos) << text;
+  EXPECT_TRUE(text.find("left_flap = 0 + 1 amplitude + 1 difference, within 0 to 1\n") != std::string::npos) << text;
+  EXPECT_TRUE(text.find("pitch_servo = 0.5 + -1 bias, within 0 to 1\n") != std::string::npos) << text;
+  EXPECT_TRUE(text.find("amplitude              1       0.2 to 1") != std::string::npos) << text;  // it has no unit
+  EXPECT_TRUE(contract_macros("P_", config, {}).find("#define P_FLAPPING_HZ 0x1.d66666p+3") != std::string::npos);
+  EXPECT_EQ(no_controller(config), "the vehicle is known by the beat, and has an autopilot of its own");
+}
+
 TEST(PolicyHeader, SaysWhatItCannotExport) {
   rollout::FlyConfig config = escape({8}, Activation::relu);
   config.vehicle.driver.hold_s = 1e-3 / 3;
