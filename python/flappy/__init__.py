@@ -1,24 +1,23 @@
 """Flapping-wing micro air vehicles by the thousand.
 
 `gymnasium.make("flappy/Hover-v0")` and `gymnasium.make_vec("flappy/Hover-v0", num_envs=4096)` are the environments (`flappy.envs`).
-Below them: `Batch` flies open loop, `Fleet` in closed loop. `read_flight` and `write_flight` are flight logs, `Policy` is what
-`flappy-train` or `flappy-export` left, `export` writes a torch module as C, `diagnose` and `identify` are what `flappy-gap` and
-`flappy-identify` say. SI units; quaternions w, x, y, z, body to world; left before right.
+Below them: `Batch` flies open loop, `Fleet` in closed loop. `read_flight` and `write_flight` are flight logs, `show` is their page,
+`Policy` is what `flappy-train` or `flappy-export` left, `export` writes a torch module as C, `diagnose` and `identify` are what
+`flappy-gap` and `flappy-identify` say. SI units; quaternions w, x, y, z, body to world; left before right.
 """
 
-from collections.abc import Mapping
 from importlib.util import find_spec
-from typing import Any
 
 from ._core import Batch, Fleet, InputError, Vehicle, Wall, World, diagnose, fly, identify, instruction_sets, write_flight
 from .export import export
-from .flights import read_flight
+from .flights import Page, read_flight, show
 from .policy import Policy
 
 __all__ = [
     "Batch",
     "Fleet",
     "InputError",
+    "Page",
     "Policy",
     "Vehicle",
     "Wall",
@@ -32,13 +31,6 @@ __all__ = [
     "show",
     "write_flight",
 ]
-
-
-def show(flight: Mapping[str, Any], fps: float = 25) -> Any:
-    """A flight of `read_flight` as a film for notebooks, front, side and top; `.save("flight.gif")`. Needs Pillow."""
-    from .render import show as film
-
-    return film(flight, fps)
 
 
 if find_spec("gymnasium") is not None:  # pip installs it; the rest does without

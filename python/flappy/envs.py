@@ -6,7 +6,9 @@ Environment i depends on (seed, first + i, episode) and its actions: not on `num
 names in `env.unwrapped.observation_names`.
 """
 
+import json
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +90,12 @@ class _Named:
         """True motion and wings of environment `i`: position_m (3,), attitude (4,), stroke_rad (2,), target_m (3,), ..., t_s."""
         return self._core.pose(i)
 
+    @cached_property
+    def scene(self) -> dict[str, Any]:
+        """What stays the same while it flies: the vehicle's shape, and "ambient": ground, ceiling and walls."""
+        scene: dict[str, Any] = json.loads(self._core.scene())
+        return scene
+
     def hash(self, first: int = 0, last: int | None = None) -> int:
         """Of how vehicles [first, last) move, as `flappy-fly` prints it."""
         return self._core.hash(first, self._core.count if last is None else last)
@@ -139,14 +147,14 @@ class FlappyEnv(_Named, gymnasium.Env[Floats, Floats]):
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """An image, uint8 (height, width, 3): front, side and top, with the way flown since the last reset."""
+        """An image, uint8 (480, 640, 3): the robot in its flight page's scene, with the way flown since the last reset."""
         if self.render_mode is None:
             return None
         from .render import draw
 
         pose = self.pose()
         self._trail.append(pose["position_m"])
-        return draw(pose, np.array(self._trail))
+        return draw(pose, self.scene, np.array(self._trail))
 
     def close(self) -> None:
         """Frees the simulator. Calls after it raise RuntimeError."""
@@ -224,12 +232,12 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Any]):
         return observation, reward, terminated, truncated, info
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """The first environments' images, at most 16, uint8 (height, width, 3) each."""
+        """The first environments' images, at most 16, uint8 (480, 640, 3) each."""
         if self.render_mode is None:
             return None
         from .render import draw
 
-        return tuple(draw(self.pose(i)) for i in range(min(self.num_envs, 16)))
+        return tuple(draw(self.pose(i), self.scene) for i in range(min(self.num_envs, 16)))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Frees the simulator. Calls after it raise RuntimeError."""

@@ -1,13 +1,12 @@
-"""Pictures of a flapper: `draw` one moment of an environment, `show` a flight in a notebook. Needs Pillow.
+"""Pictures of a flapper without a browser: the scene of the flight page, drawn by NumPy and Pillow in a few milliseconds.
 
-Three views beside each other, parallel projections to one scale: from the front (y to the right), from its right side (x to the right),
-and from above (x up, y to the left). Wings and shoulders are those of the hummingbird robot; the body's outline is free.
+The robot's shape is the page's (src/view/shape.hpp), and so are the chase camera, the colours, the grid of decimetres, trail and goal
+(src/view/web/scene.js). What is nearer is drawn later: there is no depth buffer.
 """
 
-import base64
-import io
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,28 +18,22 @@ except ImportError as error:
     raise ImportError("flappy.render needs Pillow: pip install flappy[render]") from error
 
 Doubles = NDArray[np.float64]
+Colour = tuple[int, ...]
 
-#: Rows: what points right, up and to the viewer.
-VIEWS = {
-    "front": np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]]),
-    "side": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
-    "top": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
-}
-SHOULDER_M = (0.0, 0.01395, 0.0189913)  # left; configs/vehicles/hummingbird_nominal.toml
-#: Outline of a wing of 70 mm and a mean chord of 21 mm: along the span, and down from the leading edge.
-WING_M = np.array([[0, 0], [0.066, 0], [0.069, 0.001], [0.070, 0.004], [0.069, 0.0145], [0.067, 0.0157], [0.004, 0.0268]])
-#: Outline of the body, which is round: height and radius.
-BODY_M = np.array(
-    [
-        *([-0.040, 0], [-0.030, 0.004], [-0.016, 0.009], [0.0, 0.0105], [0.012, 0.0085], [0.022, 0.0045]),
-        *([0.026, 0.0062], [0.031, 0.0068], [0.036, 0.0048], [0.0375, 0]),
-    ]
-)
-BEAK_M = np.array([[0.0, 0, 0.031], [0.022, 0, 0.029]])
-SMALLEST_M = 0.13  # half of what a view shows: the span and a rim
-FINE = 3  # drawn so much larger, then averaged
+FINE = 2  # drawn so much larger, then averaged
+FIELD_RAD, NEAR_M = np.radians(35), 0.01  # of the camera, from bottom to top
+AZIMUTH_RAD, ELEVATION_RAD, DISTANCE_M = -2.3, 0.35, 0.55  # from which the robot is followed
+FAR_M = 50  # what lies farther away is not there
+FLOOR_STEP_M = 0.1  # without a ground the grid is below the flight, and goes down with it in such steps
+VELOCITY_ARROW_S = 0.12
+TRAIL_POINTS = 400
+SUN = np.array([-1, -2, 4]) / np.sqrt(21)
 
-GREY, WING, EDGE, TRAIL, TARGET, TEXT = (125, 133, 144), (47, 129, 247, 110), (31, 94, 190), (150, 190, 240), (224, 112, 44), (60, 66, 75)
+SKY, FLOOR, GRID, GRID_IN_AIR = (246, 248, 250), (235, 239, 243), (196, 204, 212), (216, 222, 228)
+CEILING, WALL, SHADOW = (175, 184, 193, 64), (140, 149, 159, 77), (87, 96, 106)
+WING, TRAIL, DARK, BODY = (0, 114, 178), (49, 141, 192), (36, 41, 47), np.array([139, 152, 165])
+VELOCITY, GOAL, GOAL_TEXT = (0, 158, 115), (204, 121, 167), (138, 61, 102)
+AXES = (("x", (213, 94, 0)), ("y", VELOCITY), ("z", WING))
 
 
 def _rotation(attitude: ArrayLike) -> Doubles:
@@ -55,162 +48,214 @@ def _rotation(attitude: ArrayLike) -> Doubles:
     )
 
 
-def wing(side: int, stroke_rad: float, rotation_rad: float) -> Doubles:
-    """Outline of a wing in the body's frame, (points, 3) in m.
+def wing(side: Mapping[str, Any], sign: int, stroke_rad: float, rotation_rad: float) -> Doubles:
+    """Outline of a wing in the body's frame, (points, 3) in m: root, trailing edge, tip, leading edge.
 
-    The wing hangs down from its leading edge, which points sideways at stroke 0. Stroke turns it about the body's z (left, `side` 1) or
-    -z (right, `side` -1), rotation about the leading edge's y: both move it backwards on either side.
+    It hangs down from its leading edge, which points sideways at stroke 0. Stroke turns it about the body's z (left, `sign` 1) or -z
+    (right, `sign` -1), rotation about the leading edge: both move it backward on either side.
     """
-    span, chord = WING_M.T
-    beta = side * stroke_rad
-    x = -chord * np.sin(rotation_rad)
-    outline = np.stack([x, side * span, -chord * np.cos(rotation_rad)])
-    turn = np.array([[np.cos(beta), -np.sin(beta), 0], [np.sin(beta), np.cos(beta), 0], [0, 0, 1]])
-    turned: Doubles = (turn @ outline).T + np.multiply(SHOULDER_M, (1, side, 1))
+    outline = np.asarray(side["outline_m"], float)
+    span, chord = np.vstack([[outline[0, 0], 0], outline, [outline[-1, 0], 0]]).T
+    x, y, z = -chord * np.sin(rotation_rad), sign * span, -chord * np.cos(rotation_rad)
+    c, s = np.cos(sign * stroke_rad), np.sin(sign * stroke_rad)
+    turned: Doubles = np.stack([c * x - s * y, s * x + c * y, z], 1) + side["shoulder_m"]
     return turned
 
 
-def _window(points: Doubles, centre: Doubles) -> float:
-    """Half of what views show, in m: steps of a quarter, so that pictures of one flight rarely change their scale."""
-    need = np.abs(points - centre).max() + 0.09
-    steps = np.ceil(max(0.0, np.log(need / SMALLEST_M) / np.log(1.25)))
-    return float(SMALLEST_M * 1.25**steps)
+@cache
+def _body(profile: tuple[tuple[float, float], ...], sides: int = 16) -> tuple[Doubles, Doubles]:
+    """Faces of the body (n, 4, 3), and their normals (n, 3), in its frame."""
+    height, radius = np.array(profile).T
+    angle = np.linspace(0, 2 * np.pi, sides + 1)
+    ring = np.stack([np.outer(radius, np.cos(angle)), np.outer(radius, np.sin(angle)), np.repeat(height[:, None], sides + 1, 1)], 2)
+    faces = np.stack([ring[:-1, :-1], ring[:-1, 1:], ring[1:, 1:], ring[1:, :-1]], 2).reshape(-1, 4, 3)
+    normals = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
+    return faces, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def _picture(pose: Mapping[str, Any], trail: Doubles, size: tuple[int, int], centre: Doubles, half_m: float) -> Image.Image:
-    position, R = np.asarray(pose["position_m"], float), _rotation(pose["attitude"])  # noqa: N806
-    wings = [wing(s, *angles) for s, angles in zip((1, -1), zip(pose["stroke_rad"], pose["rotation_rad"], strict=True), strict=True)]
-    height = np.linspace(BODY_M[0, 0], BODY_M[-1, 0], 80)
-    middle = np.outer(height, R[:, 2]) + position
-    beak, bar = BEAK_M @ R.T + position, np.multiply(SHOULDER_M, [[1, 1, 1], [1, -1, 1]]) @ R.T + position
-    wings = [w @ R.T + position for w in wings]
+class _Pen:
+    """Draws things of the world as a camera sees them."""
 
-    panel, high = size[0] // 3 * FINE, size[1] * FINE
-    pixels = min(panel, high) / 2 / half_m
-    radius = np.interp(height, *BODY_M.T) * pixels
-    image = Image.new("RGB", (size[0] * FINE, high), "white")
-    for k, view in enumerate(VIEWS.values()):
-        part = Image.new("RGB", (panel, high), "white")
-        pen = ImageDraw.Draw(part, "RGBA")
+    def __init__(self, size: tuple[int, int], target: Doubles) -> None:
+        self.wide, self.high = size[0] * FINE, size[1] * FINE
+        self.image = Image.new("RGB", (self.wide, self.high), SKY)
+        self.ink = ImageDraw.Draw(self.image, "RGBA")
+        level = np.cos(ELEVATION_RAD)
+        away = np.array([level * np.cos(AZIMUTH_RAD), level * np.sin(AZIMUTH_RAD), np.sin(ELEVATION_RAD)])
+        right = np.array([-np.sin(AZIMUTH_RAD), np.cos(AZIMUTH_RAD), 0])
+        self.eye = target + DISTANCE_M * away
+        self.view = np.stack([right, np.cross(away, right), -away])  # rows: right, up, ahead
+        self.focal = self.high / 2 / np.tan(FIELD_RAD / 2)
 
-        def at(points: Doubles, view: Doubles = view) -> list[tuple[float, float]]:
-            right, up, _ = view @ (points - centre).T
-            return list(zip((panel / 2 + right * pixels).tolist(), (high / 2 - up * pixels).tolist(), strict=True))
+    def seen(self, points: ArrayLike) -> Doubles:
+        """Points (..., 3) in W, as right, up, ahead of the camera."""
+        seen: Doubles = (np.asarray(points, float) - self.eye) @ self.view.T
+        return seen
 
-        if len(trail) > 1:
-            thin = [*range(0, len(trail) - 1, len(trail) // 400 + 1), len(trail) - 1]
-            pen.line(at(trail[thin]), TRAIL, 2 * FINE, "curve")
-        depths = [(w @ view[2]).mean() for w in wings]
-        behind = [w for w, depth in zip(wings, depths, strict=True) if depth < view[2] @ position]
-        before = [w for w, depth in zip(wings, depths, strict=True) if depth >= view[2] @ position]
-        for points in [*behind, None, *before]:
-            if points is None:
-                pen.line(at(beak), GREY, 2 * FINE)
-                pen.line(at(bar), GREY, 4 * FINE)
-                for (u, v), r in zip(at(middle), radius, strict=True):
-                    pen.ellipse((u - r, v - r, u + r, v + r), GREY)
-            else:
-                pen.polygon(at(points), WING)
-                pen.line(at(points[[*range(len(points)), 0]]), EDGE, FINE)
-                pen.line(at(points[:2]), EDGE, 2 * FINE)
-        if "target_m" in pose:
-            ((u, v),), arm = at(np.array([pose["target_m"]], float)), 6 * FINE
-            pen.line([(u - arm, v), (u + arm, v)], TARGET, 2 * FINE)
-            pen.line([(u, v - arm), (u, v + arm)], TARGET, 2 * FINE)
-        image.paste(part, (k * panel, 0))
-    image = image.resize(size, Image.Resampling.BOX)
+    def at(self, seen: Doubles) -> Doubles:
+        """Pixels (..., 2) of what is ahead."""
+        across = self.focal * seen[..., :2] / seen[..., 2:]
+        return np.stack([self.wide / 2 + across[..., 0], self.high / 2 - across[..., 1]], -1)
 
-    pen = ImageDraw.Draw(image)
-    for k, (name, view) in enumerate(VIEWS.items()):
-        left, down = k * panel // FINE, size[1] - 12
-        if k:
-            pen.line([(left, 8), (left, size[1] - 8)], (225, 228, 232))
-        pen.text((left + 8, 6), name, TEXT)
-        corner = left + panel // FINE - 36
-        for letter, (right, up, depth) in zip("xyz", view.T, strict=True):
-            if not depth:
-                pen.line([(corner, down), (corner + 14 * right, down - 14 * up)], GREY)
-                pen.text((corner + 21 * right, down - 20 * up), letter, TEXT, anchor="mm")
-    if "t_s" in pose:
-        pen.text((size[0] - 8, 6), f"{float(pose['t_s']):.2f} s", TEXT, anchor="ra")
-    long_m = 10 ** np.floor(np.log10(0.6 * half_m))
-    long_m *= max(f for f in (1, 2, 5) if f * long_m <= 0.6 * half_m)
-    end = 8 + long_m * pixels / FINE
-    pen.line([(8, size[1] - 10), (end, size[1] - 10)], TEXT, 2)
-    pen.text((end + 6, size[1] - 10), f"{long_m * 1e3:.0f} mm" if long_m < 1 else f"{long_m:.0f} m", TEXT, anchor="lm")
-    return image
+    def area(self, points: ArrayLike, colour: Colour) -> None:
+        """A flat polygon, cut where it is behind the camera."""
+        seen = self.seen(points)
+        if (seen[:, 2] < NEAR_M).any():
+            kept = []
+            for a, b in zip(seen, np.roll(seen, -1, 0), strict=True):
+                if a[2] >= NEAR_M:
+                    kept.append(a)
+                if (a[2] >= NEAR_M) != (b[2] >= NEAR_M):
+                    kept.append(a + (b - a) * (NEAR_M - a[2]) / (b[2] - a[2]))
+            seen = np.array(kept).reshape(-1, 3)
+        if len(seen) > 2:
+            self.ink.polygon(self.at(seen).ravel().tolist(), colour)
+
+    def line(self, points: ArrayLike, colour: Colour, wide_m: float = 0) -> None:
+        """A path, as wide as it is there, and a pixel at least; what is behind the camera is left out."""
+        seen = self.seen(points)
+        ahead = seen[:, 2] >= NEAR_M
+        if not ahead.any():
+            return
+        wide = max(FINE, round(wide_m * self.focal / seen[ahead, 2].mean())) if wide_m > 0 else FINE
+        if ahead.all():
+            self.ink.line(self.at(seen).ravel().tolist(), colour, wide, "curve" if wide > FINE else None)
+            return
+        for a, b in pairwise(seen):
+            if max(a[2], b[2]) <= NEAR_M:
+                continue
+            ends = [p if p[2] >= NEAR_M else p + (o - p) * (NEAR_M - p[2]) / (o[2] - p[2]) for p, o in ((a, b), (b, a))]
+            self.ink.line(self.at(np.array(ends)).ravel().tolist(), colour, wide)
+
+    def dot(self, centre: Doubles, radius_m: float, colour: Colour) -> None:
+        seen = self.seen(centre)
+        if seen[2] >= NEAR_M:
+            (x, y), radius = self.at(seen), max(FINE, radius_m * self.focal / seen[2])
+            self.ink.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
+
+    def arrow(self, start: Doubles, along: Doubles, colour: Colour) -> None:
+        length = float(np.linalg.norm(along))
+        if length < 0.004:
+            return
+        way = along / length
+        neck, tip = start + way * max(1e-4, length - 0.012), start + way * length
+        aside = np.cross(way, self.view[2])
+        aside *= 0.0042 / max(1e-9, float(np.linalg.norm(aside)))
+        self.line([start, neck], colour, 0.0026)
+        self.area([neck + aside, tip, neck - aside], colour)
 
 
-def draw(pose: Mapping[str, Any], trail: ArrayLike | None = None, size: tuple[int, int] = (640, 240)) -> NDArray[np.uint8]:
-    """A picture of one moment.
+def _draw_place(pen: _Pen, ambient: Mapping[str, Any], way: Doubles) -> tuple[float, list[tuple[Doubles, str, Colour]]]:
+    """Ground, grid, ceiling and walls; the floor's height, and names that are to stand beside things."""
+    low, high = way.min(0), way.max(0)
+    middle, extent = (low + high) / 2, max(0.25, float((high - low).max()))
+    ground = abs(ambient["ground_z_m"] - low[2]) < FAR_M
+    floor = ambient["ground_z_m"] if ground else FLOOR_STEP_M * np.floor((low[2] - 0.12) / FLOOR_STEP_M)
+    half = np.ceil(5 * extent + 5) / 10 + 0.4
+    x, y = np.round(middle[:2], 1)
+    corners = np.array([[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]])
+
+    def level(z: float) -> Doubles:
+        return np.column_stack([corners, np.full(4, z)])
+
+    if ground:
+        pen.area(level(floor), FLOOR)
+    for k in np.linspace(-half, half, round(20 * half) + 1):
+        for line in ([[x + k, y - half, floor], [x + k, y + half, floor]], [[x - half, y + k, floor], [x + half, y + k, floor]]):
+            pen.line(line, GRID if ground else GRID_IN_AIR)
+    if abs(ambient["ceiling_z_m"] - high[2]) < FAR_M:
+        pen.area(level(ambient["ceiling_z_m"]), CEILING)
+    for wall_x, wall_y, normal_x, normal_y in ambient["walls"]:
+        away = (middle[0] - wall_x) * normal_x + (middle[1] - wall_y) * normal_y
+        if abs(away) <= FAR_M:
+            foot, along = middle[:2] - away * np.array([normal_x, normal_y]), half * np.array([-normal_y, normal_x])
+            pen.area([[*(foot + s * along), z] for s, z in ((-1, floor), (1, floor), (1, high[2] + 0.3), (-1, high[2] + 0.3))], WALL)
+    corner = np.array([x - half + 0.1, y - half + 0.1, floor])
+    names: list[tuple[Doubles, str, Colour]] = []
+    for (name, colour), axis in zip(AXES, np.eye(3), strict=True):
+        pen.arrow(corner, 0.1 * axis, colour)
+        names.append((corner + 0.125 * axis, name, DARK))
+    return float(floor), names
+
+
+def _draw_robot(pen: _Pen, shape: Mapping[str, Any], pose: Mapping[str, Any]) -> None:
+    position, turn = np.asarray(pose["position_m"], float), _rotation(pose["attitude"])
+    size = shape["left"]["outline_m"][-1][0] / 0.07
+
+    def body() -> None:
+        faces, normals = _body(tuple(map(tuple, shape["profile_m"])))
+        faces, normals = faces @ turn.T + position, normals @ turn.T
+        towards = ((pen.eye - faces.mean(1)) * normals).sum(1) > 0
+        faces, normals = faces[towards], normals[towards]
+        # the page's two lights on three.js's standard material, which is half a metal; its gloss is left out
+        light = 0.625 * (0.892 + 0.108 * (0.5 + 0.5 * normals[:, 1])) + 0.275 * np.maximum(0, normals @ SUN)
+        colours = (light[:, None] * BODY).astype(int).tolist()
+        seen = pen.seen(faces)
+        pixels = pen.at(seen).reshape(-1, 8).tolist()
+        for k in np.argsort(-seen[:, :, 2].mean(1)):
+            pen.ink.polygon(pixels[k], tuple(colours[k]))
+
+    def beak() -> None:
+        pen.line(size * np.array([[0.005, 0, 0.03], [0.017, 0, 0.03]]) @ turn.T + position, DARK, 0.003 * size)
+        pen.line(size * np.array([[0.017, 0, 0.03], [0.029, 0, 0.03]]) @ turn.T + position, DARK, 0.0014 * size)
+
+    parts = [(position, body), (position + turn @ [0.017 * size, 0, 0.03 * size], beak)]
+    for k, (name, sign) in enumerate((("left", 1), ("right", -1))):
+        outline = wing(shape[name], sign, pose["stroke_rad"][k], pose["rotation_rad"][k]) @ turn.T + position
+        root = turn @ shape[name]["shoulder_m"] + position
+
+        def membrane(outline: Doubles = outline, root: Doubles = root) -> None:
+            pen.area(outline, (*WING, 140))
+            pen.line(outline[1:], WING)
+            pen.line([root, outline[-1]], DARK, 0.0021)
+
+        parts.append((outline.mean(0), membrane))
+    for _, draw_part in sorted(parts, key=lambda part: -float(pen.seen(part[0])[2])):
+        draw_part()
+
+
+def draw(
+    pose: Mapping[str, Any], scene: Mapping[str, Any], trail: ArrayLike | None = None, size: tuple[int, int] = (640, 480)
+) -> NDArray[np.uint8]:
+    """A picture of one moment, the robot in the middle.
 
     Args:
-        pose: as of `env.pose(i)`: position_m (3,), attitude (4,), stroke_rad (2,), rotation_rad (2,), and, where known, target_m (3,), t_s.
+        pose: as of `env.unwrapped.pose(i)`: position_m (3,), attitude (4,), stroke_rad (2,), rotation_rad (2,), and, where known,
+            velocity_m_s (3,), target_m (3,), t_s.
+        scene: as of `env.unwrapped.scene`: the vehicle's shape and what is around it.
         trail: positions so far, (n, 3) in m.
         size: width and height in pixels.
 
     Returns:
-        uint8 (height, width, 3): from the front, from the side and from above; the target in the middle.
+        uint8 (height, width, 3).
     """
     position = np.asarray(pose["position_m"], float)
-    way = np.zeros((0, 3)) if trail is None else np.asarray(trail, float).reshape(-1, 3)
-    centre = np.asarray(pose["target_m"], float) if "target_m" in pose else position
-    return np.asarray(_picture(pose, way, size, centre, _window(np.vstack([way, position]), centre)))
+    path = np.zeros((0, 3)) if trail is None else np.asarray(trail, float).reshape(-1, 3)
+    pen = _Pen(size, position)
+    way = np.vstack([path, position, *([pose["target_m"]] if "target_m" in pose else [])])
+    floor, names = _draw_place(pen, scene["ambient"], way)
+    round_ = np.linspace(0, 2 * np.pi, 33)[:-1]
+    circle = 0.03 * np.stack([np.cos(round_), np.sin(round_), 0 * round_], 1)
+    opacity = 0.35 / (1 + 4 * max(0.0, position[2] - floor))
+    pen.area(np.add(circle, (position[0], position[1], floor)), (*SHADOW, round(255 * opacity)))
+    if len(path) > 1:
+        extent = max(0.25, float(np.ptp(way, 0).max()))
+        pen.line(path[np.unique(np.linspace(0, len(path) - 1, TRAIL_POINTS).astype(int))], TRAIL, 2 * min(0.003, 0.0005 + 0.0006 * extent))
+    if "target_m" in pose:
+        goal = np.asarray(pose["target_m"], float)
+        pen.line(np.vstack([circle, circle[:2]]) + goal, GOAL, 0.0032)
+        pen.dot(goal, 0.004, GOAL)
+        names.append((np.add(goal, (0, 0, 0.06)), "goal", GOAL_TEXT))
+    _draw_robot(pen, scene["vehicle"], pose)
+    if "velocity_m_s" in pose:
+        pen.arrow(position, VELOCITY_ARROW_S * np.asarray(pose["velocity_m_s"], float), VELOCITY)
 
-
-class Film:
-    """Pictures of a flight, which notebooks play."""
-
-    def __init__(self, pictures: Sequence[Image.Image], fps: float) -> None:
-        self.pictures = pictures
-        self.fps = fps
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes an animation: .gif, .webp or .png, by the name."""
-        with open(path, "wb") as file:
-            self._write(file, os.path.splitext(path)[1].lstrip(".").lower())
-
-    def _write(self, file: Any, kind: str) -> None:
-        if kind not in ("gif", "webp", "png"):
-            raise ValueError(f"path: ends in {kind!r}; accepted: .gif, .webp, .png")
-        first, *rest = self.pictures
-        if kind == "gif":
-            first = first.quantize(64)
-            rest = [p.quantize(palette=first, dither=Image.Dither.NONE) for p in rest]
-        first.save(file, kind, save_all=True, append_images=rest, duration=round(1000 / self.fps), loop=0)
-
-    def _repr_html_(self) -> str:
-        data = io.BytesIO()
-        self._write(data, "gif")
-        return f'<img alt="flight" src="data:image/gif;base64,{base64.b64encode(data.getvalue()).decode()}">'
-
-
-def show(flight: Mapping[str, Any], fps: float = 25, size: tuple[int, int] = (640, 240)) -> Film:
-    """A flight as a film: `show(flappy.read_flight(folder))`.
-
-    Args:
-        flight: "mocap" with t_s, x_m, y_m, z_m, qw, qx, qy, qz, and, where recorded, "wings" with t_s, left_stroke_rad, left_rotation_rad,
-            right_stroke_rad, right_rotation_rad; dicts of arrays or pandas frames. Without wings, they are drawn spread.
-        fps: pictures for each second of flight; a wing beat is shorter than the time between two.
-        size: width and height in pixels.
-
-    Returns:
-        What a notebook plays; `save("flight.gif")` writes it.
-    """
-    mocap, wings = flight["mocap"], flight.get("wings")
-    t_s = np.asarray(mocap["t_s"], float)
-    way = np.stack([np.asarray(mocap[name], float) for name in ("x_m", "y_m", "z_m")], 1)
-    attitude = np.stack([np.asarray(mocap[name], float) for name in ("qw", "qx", "qy", "qz")], 1)
-    moments = np.arange(t_s[0], t_s[-1] + 1e-9, 1 / fps)
-    angles = np.zeros((len(moments), 4))  # left stroke, right stroke, left rotation, right rotation
-    if wings is not None and len(wings["t_s"]):
-        names = ("left_stroke_rad", "right_stroke_rad", "left_rotation_rad", "right_rotation_rad")
-        angles = np.stack([np.interp(moments, np.asarray(wings["t_s"], float), np.asarray(wings[name], float)) for name in names], 1)
-    centre = (way.min(0) + way.max(0)) / 2
-    half_m = _window(way, centre)
-    pictures = []
-    for t, angle in zip(moments, angles, strict=True):
-        k = int(np.searchsorted(t_s, t + 1e-9)) - 1
-        pose = {"position_m": way[k], "attitude": attitude[k], "stroke_rad": angle[:2], "rotation_rad": angle[2:], "t_s": t}
-        pictures.append(_picture(pose, way[: k + 1], size, centre, half_m))
-    return Film(pictures, fps)
+    image = pen.image.reduce(FINE)
+    ink = ImageDraw.Draw(image)
+    for where, name, colour in names:
+        seen = pen.seen(where)
+        if seen[2] > NEAR_M:
+            ink.text(tuple(pen.at(seen) / FINE), name, colour, anchor="mm")
+    if "t_s" in pose:
+        ink.text((size[0] - 8, 6), f"{float(pose['t_s']):.2f} s", DARK, anchor="ra")
+    return np.asarray(image)

@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "bind.hpp"
+#include "view/shape.hpp"
 
 namespace flappy::python {
 namespace {
@@ -148,6 +149,18 @@ class PyEnvironments {
     return d;
   }
 
+  /// What stays the same while it flies, as a flight page has it.
+  std::string scene() const {
+    const rollout::FlyConfig& config = all().config();
+    const sim::World& world = config.fleet.batch.world;
+    nlohmann::json walls = nlohmann::json::array();
+    for (const sim::Wall& w : world.walls) walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
+    return nlohmann::json(
+               {{"vehicle", view::shape_of(config.vehicle)},
+                {"ambient", {{"ground_z_m", world.ground_z_m}, {"ceiling_z_m", world.ceiling_z_m}, {"walls", walls}}}})
+        .dump();
+  }
+
   void close() {
     const Turn turn(busy_, "the environment");
     all_.reset();
@@ -230,6 +243,8 @@ void bind_environments(nb::module_& m) {
            "how many ended.")
       .def("ended", &PyEnvironments::ended, "Episodes that ended in the last step.")
       .def("pose", &PyEnvironments::pose, "i"_a, "True pose and wings of one, SI units.")
+      .def("scene", &PyEnvironments::scene,
+           "JSON: the vehicle's shape (src/view/shape.hpp), and ground, ceiling and walls.")
       .def(
           "hash",
           [](const PyEnvironments& e, std::size_t first, std::size_t last) {

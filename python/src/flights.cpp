@@ -1,4 +1,6 @@
 // Closed-loop fleets, and flight logs.
+#include <nanobind/stl/array.h>
+
 #include <variant>
 
 #include "bind.hpp"
@@ -7,6 +9,7 @@
 #include "rollout/fly.hpp"
 #include "rollout/rollout.hpp"
 #include "sim/storage.hpp"
+#include "view/flight_section.hpp"
 
 namespace flappy::python {
 namespace {
@@ -217,8 +220,8 @@ nb::dict read_flight(const std::filesystem::path& folder) {
   return flight;
 }
 
-/// As texts, so that what is wrong is said as of a log that is read.
-void write_flight(const std::filesystem::path& folder, const nb::dict& flight) {
+/// By way of texts, so that what is wrong is said as of a log that is read, in `folder`.
+FlightLog log_of(const nb::dict& flight, const std::filesystem::path& folder) {
   flightlog::LogFiles files;
   for (const auto [key, value] : flight) {
     const std::string name = nb::cast<std::string>(key);
@@ -244,7 +247,32 @@ void write_flight(const std::filesystem::path& folder, const nb::dict& flight) {
         text += io::shortest_digits(columns[k].data()[row]) + (k + 1 < columns.size() ? "," : "\n");
     files[name + ".csv"] = text;
   }
-  flightlog::write_flight_log(folder, flightlog::parse_flight_log(files, folder));
+  return flightlog::parse_flight_log(files, folder);
+}
+
+void write_flight(const std::filesystem::path& folder, const nb::dict& flight) {
+  flightlog::write_flight_log(folder, log_of(flight, folder));
+}
+
+/// The page of flights, each a folder or what read_flight returns; these are named by their place.
+std::string flights_page(const nb::list& flights, const std::optional<std::filesystem::path>& vehicle,
+                         const std::optional<std::array<double, 3>>& goal_m) {
+  std::vector<view::ShownFlight> shown;
+  for (const nb::handle flight : flights) {
+    if (nb::isinstance<nb::dict>(flight)) {
+      const std::string name = "flight " + std::to_string(shown.size() + 1);
+      shown.push_back({name, name, log_of(nb::cast<nb::dict>(flight), name)});
+    } else {
+      const auto folder = nb::cast<std::filesystem::path>(flight);
+      const std::filesystem::path full = std::filesystem::absolute(folder / "").lexically_normal();
+      shown.push_back({full.parent_path().filename().string(), folder, flightlog::read_flight_log(folder)});
+    }
+  }
+  const nb::gil_scoped_release free;
+  view::Packing packing;
+  const view::Section section =
+      view::flight_section(shown, {vehicle ? found(*vehicle) : std::filesystem::path(), goal_m}, packing);
+  return view::page_text(section.title(), {section}, packing);
 }
 
 /// Seconds that `steps` steps of `periods` control periods take the fleet alone: what environments are measured by.
@@ -291,6 +319,8 @@ void bind_flights(nb::module_& m) {
   m.def("write_flight", &write_flight, "folder"_a, "flight"_a,
         "Writes what read_flight reads, whole or not at all; streams may be pandas frames. InputError for what would "
         "be refused when read.");
+  m.def("flights_page", &flights_page, "flights"_a, "vehicle"_a = nb::none(), "goal_m"_a = nb::none(),
+        "What flappy-report writes of flights, folders or what read_flight returns: the text of an HTML file.");
   m.def("fleet_seconds", &fleet_seconds, "config"_a, "overrides"_a, "count"_a, "periods"_a, "steps"_a);
   m.def("fly", &fly, "config"_a, "overrides"_a = std::vector<std::string>{}, "count"_a = 1, "log"_a = nb::none(),
         "What flappy-fly does: hash, successes, flown_s, logs.");

@@ -1,95 +1,146 @@
-"""Pictures of flappers."""
+"""Pictures of flappers, and pages of flights."""
 
+import html
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import flappy
+from flappy import _core
+
+SCENE = json.loads(_core.Environments(Path("fly/hover_direct.toml"), [], 1, "disabled", True).scene())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short flight's."""
+    log = tmp_path_factory.mktemp("flights") / "hover"
+    flappy.fly("fly/hover.toml", overrides=["flight.duration_s=0.3"], log=log)
+    return log
+
+
+def report(page: flappy.Page) -> dict[str, Any]:
+    """The data of a page."""
+    text = page.html.split('id="report">')[1].split("</script>")[0]
+    data: dict[str, Any] = json.loads(text)["sections"][0]["blocks"][0]
+    return data
+
+
+def test_page_of_a_folder_is_that_of_its_arrays_and_frames(folder: Path) -> None:
+    whole, arrays = flappy.show(folder, goal_m=(1, 2, 3)), flappy.show(flappy.read_flight(folder))
+    (flight,), (same,) = report(whole)["flights"], report(arrays)["flights"]
+    assert (flight["name"], same["name"], report(whole)["goal_m"]) == ("hover", "flight 1", [1, 2, 3])
+    assert flight["vehicle"] == SCENE["vehicle"] | {"name": "hummingbird_identified"}
+    assert flight["streams"] == same["streams"]
+    packed = [page.html.split('id="packed">')[1].split("</script>")[0] for page in (whole, arrays)]
+    assert len(packed[0]) > 1000
+    assert packed[0] == packed[1]
+    pytest.importorskip("pandas")
+    assert flappy.show(flappy.read_flight(folder, frames=True)).html == arrays.html
+    assert [f["name"] for f in report(flappy.show(folder, folder))["flights"]] == ["hover", "hover"]
+
+
+def test_page_stands_in_a_notebook_and_is_saved(folder: Path, tmp_path: Path) -> None:
+    page = flappy.show(folder)
+    cell = page._repr_html_()
+    source = cell.split('srcdoc="')[1].split('"')[0]
+    assert html.unescape(source) == page.html
+    assert cell.endswith('"></iframe>')
+    page.save(tmp_path / "flight.html")
+    assert (tmp_path / "flight.html").read_text(encoding="utf-8") == page.html
+
+
+def test_what_cannot_be_shown_is_said(folder: Path) -> None:
+    with pytest.raises(ValueError, match="no flight is given"):
+        flappy.show()
+    with pytest.raises(flappy.InputError, match="none: cannot be read"):
+        flappy.show(folder.parent / "none")
+    flight = flappy.read_flight(folder)
+    flight["header"] = flight["header"].replace("hummingbird_identified", "bird")
+    with pytest.raises(flappy.InputError, match=r"flight 1/flight\.toml: vehicle: there is no bird\.toml .* vehicle=FILE"):
+        flappy.show(flight)
+    assert report(flappy.show(flight, vehicle="vehicles/hummingbird_nominal.toml"))["flights"][0]["vehicle"] == SCENE["vehicle"]
+
+
 pytest.importorskip("PIL")
 
-from flappy.render import draw, show, wing
-
-WING = (np.array([47, 129, 247]) * 110 + 255 * 145) // 255  # as drawn on white
+from flappy.render import GOAL, WING, draw, wing
 
 
-def pose(roll_rad: float = 0, **other: Any) -> dict[str, Any]:
-    """At the target, level but for its roll."""
-    attitude = [np.cos(roll_rad / 2), np.sin(roll_rad / 2), 0, 0]
+def pose(**other: Any) -> dict[str, Any]:
+    """Level, at the goal."""
     wings = {"stroke_rad": [0.4, 0.4], "rotation_rad": [0.5, 0.5]}
-    return {"position_m": [0, 0, 0], "attitude": attitude, "target_m": [0, 0, 0]} | wings | other
+    return {"position_m": [0, 0, 0], "attitude": [1, 0, 0, 0]} | wings | other
+
+
+def near(image: np.ndarray, colour: Any, tolerance: int = 60) -> np.ndarray:
+    """Where a colour is, (n, 2): right and down."""
+    return np.argwhere(np.abs(image.astype(int) - colour).sum(-1) < tolerance)[:, ::-1]
 
 
 def wings(image: np.ndarray) -> np.ndarray:
-    """Where wings are."""
-    return np.abs(image.astype(int) - WING).sum(-1) < 8
+    """Where wings are: their blue, on the sky."""
+    return near(image, 0.55 * np.array(WING) + 0.45 * 248)
 
 
-def flight() -> dict[str, Any]:
-    """A second of climbing turns."""
-    t = np.linspace(0, 1, 201)
-    mocap = {"t_s": t, "x_m": 0.1 * t, "y_m": 0 * t, "z_m": 0.2 * t, "qw": np.cos(t), "qx": 0 * t, "qy": 0 * t, "qz": np.sin(t)}
-    names = ("left_stroke_rad", "left_rotation_rad", "right_stroke_rad", "right_rotation_rad")
-    return {"mocap": mocap, "wings": {"t_s": t} | {name: np.sin(200 * t) for name in names}}
+def pixel(point_m: Any, watched_m: Any, size: tuple[int, int] = (640, 480)) -> np.ndarray:
+    """Where the page's chase camera sees a point: 35 degrees high, 0.55 m from the robot, from azimuth -2.3 and elevation 0.35."""
+    away = np.array([np.cos(0.35) * np.cos(-2.3), np.cos(0.35) * np.sin(-2.3), np.sin(0.35)])
+    right = np.cross([0, 0, 1], away) / np.cos(0.35)
+    p = np.subtract(point_m, watched_m) - 0.55 * away
+    scale = size[1] / 2 / np.tan(np.radians(17.5)) / -(p @ away)
+    return np.array([size[0] / 2 + scale * (p @ right), size[1] / 2 - scale * (p @ np.cross(away, right))])
 
 
-def test_picture_has_its_size_and_three_views() -> None:
-    image = draw(pose(), size=(480, 200))
-    assert image.shape == (200, 480, 3)
-    assert image.dtype == np.uint8
-    assert all((image[50:150, k * 160 + 20 : k * 160 + 140] == (125, 133, 144)).any() for k in range(3))
-
-
-def test_level_wings_are_symmetrical_from_the_front_and_from_above() -> None:
-    image = wings(draw(pose(), size=(630, 240)))
-    for view in (image[:, :210], image[:, 420:]):
-        assert np.mean(view != view[:, ::-1]) < 0.005
-        assert view.sum() > 300
-
-
-def test_roll_to_the_right_lowers_the_right_wing() -> None:
-    """From the front, the right wing is on the left."""
-    high, wide = np.nonzero(wings(draw(pose(roll_rad=0.5), size=(630, 240))[:, :210]))
-    assert high[wide < 80].mean() > high[wide > 130].mean() + 20
-
-
-@pytest.mark.parametrize("side", [1, -1])
-def test_wing_hangs_down_and_strokes_backwards(side: int) -> None:
-    still, back, turned = wing(side, 0, 0), wing(side, 0.5, 0), wing(side, 0, 0.5)
+@pytest.mark.parametrize(("name", "sign"), [("left", 1), ("right", -1)])
+def test_wing_hangs_down_and_strokes_backward(name: str, sign: int) -> None:
+    side = SCENE["vehicle"][name]
+    still, back, turned = wing(side, sign, 0, 0), wing(side, sign, 0.5, 0), wing(side, sign, 0, 0.5)
     assert np.ptp(still[:, 0]) == 0
     assert still[:, 2].max() == pytest.approx(0.0189913)
     assert np.abs(still[:, 1]).max() == pytest.approx(0.08395)
     assert back[:, 0].min() == pytest.approx(-0.07 * np.sin(0.5))
-    assert turned[:, 0].min() == pytest.approx(-0.0268 * np.sin(0.5))
+    assert turned[:, 0].min() == pytest.approx(-side["outline_m"][0][1] * np.sin(0.5))
 
 
-def test_target_and_trail_are_drawn_where_they_are() -> None:
-    near, far = draw(pose(position_m=[0, 0.1, 0])), draw(pose(position_m=[0, 0.1, 0]), trail=[[0, 0, -0.1], [0, 0.1, 0]])
-    assert (near[120, 106] == (224, 112, 44)).all()
-    assert (near != far).any()
-    without = pose()
-    del without["target_m"]
-    assert not (draw(without) == (224, 112, 44)).all(-1).any()
+@pytest.mark.parametrize(("stroke", "rotation"), [(-0.6, 0.5), (0.0, 0.5), (0.6, 0.5), (0.0, -0.8)])
+def test_wings_are_where_they_beat(stroke: float, rotation: float) -> None:
+    image = draw(pose(stroke_rad=[stroke, stroke], rotation_rad=[rotation, rotation]), SCENE)
+    blue = near(image, WING, 200)
+    assert len(wings(image)) > 500
+    for name, sign in (("left", 1), ("right", -1)):
+        outline = wing(SCENE["vehicle"][name], sign, stroke, rotation)
+        for corner in (outline[-1], outline[-3]):  # the tip before and behind
+            assert np.abs(blue - pixel(corner, [0, 0, 0])).sum(-1).min() < 5
 
 
-def test_film_is_embedded_and_saved(tmp_path: Any) -> None:
-    from PIL import Image
-
-    film = show(flight(), fps=10, size=(240, 90))
-    assert film._repr_html_().startswith('<img alt="flight" src="data:image/gif;base64,')
-    for kind in ("gif", "png"):
-        film.save(tmp_path / f"flight.{kind}")
-        with Image.open(tmp_path / f"flight.{kind}") as image:
-            assert (image.n_frames, image.size) == (11, (240, 90))
-    with pytest.raises(ValueError, match=r"accepted: \.gif"):
-        film.save(tmp_path / "flight.mp4")
+def test_robot_is_watched_and_turns_with_its_attitude() -> None:
+    image = draw(pose(position_m=[3, -2, 5], stroke_rad=[-1, -1]), SCENE).astype(int)
+    for height, there in ((-0.05, False), (-0.03, True), (0.0, True), (0.03, True), (0.05, False)):
+        x, y = pixel([3, -2, 5 + height], [3, -2, 5]).astype(int)
+        assert (abs(image[y, x] - [98, 107, 116]).max() < 30) == there, height
+    upright, upside_down = (wings(draw(pose(attitude=q), SCENE)).mean(0)[1] for q in ([1, 0, 0, 0], [0, 1, 0, 0]))
+    assert upright < 240 - 5
+    assert upside_down > 240 + 5
 
 
-def test_film_of_frames_and_without_wings() -> None:
-    whole = flight()
-    pandas = pytest.importorskip("pandas")
-    frames = show({name: pandas.DataFrame(stream) for name, stream in whole.items()}, fps=5, size=(240, 90))
-    assert all((np.asarray(a) == np.asarray(b)).all() for a, b in zip(frames.pictures, show(whole, 5, (240, 90)).pictures, strict=True))
-    assert len(show({"mocap": whole["mocap"]}, fps=5, size=(240, 90)).pictures) == 6
+@pytest.mark.parametrize("position", [[0, 0, 0], [0.05, -0.03, 0.04]])
+def test_goal_trail_and_ground_are_where_they_are(position: list[float]) -> None:
+    with_goal = pose(position_m=position, target_m=[0, 0.1, 0.05])
+    ring = near(draw(with_goal, SCENE), GOAL, 15)
+    assert len(ring) > 100
+    assert np.abs((ring.min(0) + ring.max(0)) / 2 - pixel([0, 0.1, 0.05], position)).max() < 4
+    assert len(near(draw(pose(position_m=position), SCENE), GOAL, 15)) == 0
+    start = np.add(position, [-0.05, 0.1, 0.1])
+    with_trail = draw(with_goal, SCENE, trail=[start, position])
+    changed = np.argwhere((with_trail != draw(with_goal, SCENE, trail=[start, start])).any(-1))[:, ::-1]
+    assert np.abs(changed - pixel(start, position)).sum(-1).min() < 5
+    ground = SCENE | {"ambient": {"ground_z_m": position[2] - 0.1, "ceiling_z_m": 1e3, "walls": []}}
+    x, y = pixel(np.add(position, [0.03, -0.13, -0.1]), position).astype(int)
+    assert np.abs(draw(with_goal, ground)[y - 2 : y + 3, x - 2 : x + 3].astype(int) - (235, 239, 243)).sum(-1).min() < 3
 
 
 def test_environment_renders() -> None:
@@ -98,6 +149,6 @@ def test_environment_renders() -> None:
     env.reset(seed=0)
     before = env.render()
     env.step(np.ones(4, np.float32))
-    assert before.shape == (240, 640, 3)
-    assert (env.render() != before).any()
+    assert (before.shape, before.dtype) == ((480, 640, 3), np.uint8)
+    assert not np.array_equal(wings(env.render()), wings(before))
     env.close()

@@ -11,6 +11,7 @@
 #include "io/installation.hpp"
 #include "sim/replay.hpp"
 #include "view/results.hpp"
+#include "view/shape.hpp"
 
 namespace flappy::view {
 namespace {
@@ -58,7 +59,7 @@ model::Vehicle vehicle_of(const fs::path& folder, const FlightLog& log, const fs
        {folder / log.header.vehicle, asked, fs::path(io::config_path("vehicles/" + log.header.vehicle))})
     if (!file.empty() && fs::is_regular_file(file, none)) return model::read_any_vehicle(file);
   throw io::InputError((folder / "flight.toml").string() + ": vehicle: there is no " + log.header.vehicle +
-                       " in the folder; accepted: --vehicle FILE");
+                       " in the folder; accepted: --vehicle FILE, in Python vehicle=FILE");
 }
 
 /// The strokes and rotations that the recorded voltages make, the torso held as it is: its own motion changes them little, and
@@ -88,30 +89,6 @@ flightlog::WingsStream derived_wings(const FlightLog& log, const model::Vehicle&
     stream.right_rotation_rad.push_back(state.rotation_rad[1]);
   }
   return stream;
-}
-
-Json json_of(const model::Side& s) {
-  return {{"shoulder_m", {s.shoulder_m.x, s.shoulder_m.y, s.shoulder_m.z}},
-          {"wing_length_m", s.planform.wing_length_m},
-          {"mean_chord_m", s.planform.mean_chord_m},
-          {"moments", {s.planform.r00, s.planform.r11, s.planform.r22}}};
-}
-
-/// Semi-axes of the ellipsoid of even density that has the torso's mass and moments of inertia: no file says more of the shape of
-/// a vehicle whose wings are not modelled.
-Json ellipsoid_of(const model::RigidBody& torso) {
-  const model::InertiaTensor& i = torso.inertia_kg_m2;
-  const auto semi_axis = [&](double one, double other, double own) {
-    return std::sqrt(std::max(0.0, 2.5 * (one + other - own) / torso.mass_kg));
-  };
-  return {semi_axis(i.yy, i.zz, i.xx), semi_axis(i.xx, i.zz, i.yy), semi_axis(i.xx, i.yy, i.zz)};
-}
-
-Json json_of(const model::Vehicle& v) {
-  if (v.beat_averaged) return {{"name", v.name}, {"mass_kg", v.torso.mass_kg}, {"body_m", ellipsoid_of(v.torso)}};
-  double mass_kg = v.torso.mass_kg;
-  for (const model::Side* s : {&v.left, &v.right}) mass_kg += s->leading_edge.mass_kg + s->wing.mass_kg;
-  return {{"name", v.name}, {"mass_kg", mass_kg}, {"left", json_of(v.left)}, {"right", json_of(v.right)}};
 }
 
 /// Specific force of the path that motion capture saw, up to the vehicle's bandwidth.
@@ -237,11 +214,6 @@ std::array<Column, 3> attitude_of(const flightlog::MocapStream& m) {
   return angles;
 }
 
-struct ShownFlight {
-  std::string name;
-  FlightLog log;
-};
-
 void add_on_paper(Section& section, const std::vector<ShownFlight>& flights) {
   Figure place{.id = "position",
                .title = "Position",
@@ -293,17 +265,26 @@ std::string name_among(const std::vector<fs::path>& folders, const fs::path& fol
   return (alike > 1 ? own.parent_path().filename() / own.filename() : own.filename()).string();
 }
 
+void check_count(std::size_t flights) {
+  if (flights > kMostFlights)
+    throw io::InputError(std::to_string(flights) + " flights are more than one page shows; accepted: up to " +
+                         std::to_string(kMostFlights));
+}
+
 }  // namespace
 
 Section flight_section(const std::vector<fs::path>& folders, const FlightOptions& options, Packing& packing) {
-  if (folders.size() > kMostFlights)
-    throw io::InputError(std::to_string(folders.size()) + " flights are more than one page shows; accepted: up to " +
-                         std::to_string(kMostFlights));
-  std::vector<ShownFlight> shown;
+  check_count(folders.size());
+  std::vector<ShownFlight> flights;
+  for (const fs::path& folder : folders)
+    flights.push_back({name_among(folders, folder), folder, flightlog::read_flight_log(folder)});
+  return flight_section(flights, options, packing);
+}
+
+Section flight_section(const std::vector<ShownFlight>& flights, const FlightOptions& options, Packing& packing) {
+  check_count(flights.size());
   Json list = Json::array();
-  for (const fs::path& folder : folders) {
-    shown.push_back({name_among(folders, folder), flightlog::read_flight_log(folder)});
-    const FlightLog& log = shown.back().log;
+  for (const auto& [name, folder, log] : flights) {
     const model::Vehicle vehicle = vehicle_of(folder, log, options.vehicle);
     const bool winged = !vehicle.beat_averaged, derived = winged && !log.wings && log.command.declared.empty();
     Json notes = Json::array();
@@ -317,11 +298,11 @@ Section flight_section(const std::vector<fs::path>& folders, const FlightOptions
                                 {"accel_z_m_s2", path.accel_z_m_s2, step::kForce_m_s2}},
                                packing, notes);
     }
-    list.push_back({{"name", shown.back().name},
+    list.push_back({{"name", name},
                     {"declared", log.header.vehicle},
                     {"flapping_Hz", log.header.flapping_Hz},
                     {"gravity_m_s2", log.header.gravity_m_s2},
-                    {"vehicle", json_of(vehicle)},
+                    {"vehicle", shape_of(vehicle)},
                     {"ambient", json_of(log.header.ambient)},
                     {"wings", !winged     ? "none"
                               : derived   ? "derived"
@@ -332,14 +313,16 @@ Section flight_section(const std::vector<fs::path>& folders, const FlightOptions
                     {"notes", notes}});
   }
   std::vector<std::string> sources;
-  for (const fs::path& folder : folders) sources.push_back(folder.string());
   std::string names;
-  for (const ShownFlight& f : shown) names += (names.empty() ? "" : ", ") + f.name;
-  Section section("flight", (shown.size() > 1 ? "Flights " : "Flight ") + names, io::joined(sources));
+  for (const ShownFlight& f : flights) {
+    sources.push_back(f.folder.string());
+    names += (names.empty() ? "" : ", ") + f.name;
+  }
+  Section section("flight", (flights.size() > 1 ? "Flights " : "Flight ") + names, io::joined(sources));
   Json block = {{"kind", "flights"}, {"goal_m", nullptr}, {"flights", list}};
   if (options.goal_m) block["goal_m"] = *options.goal_m;
   section.add(std::move(block));
-  add_on_paper(section, shown);
+  add_on_paper(section, flights);
   return section;
 }
 

@@ -3,9 +3,9 @@
 // The block "flights": {"goal_m": [x, y, z] | null, "flights": [{"name", "flapping_Hz", "gravity_m_s2", "vehicle", "ambient",
 // "wings": "recorded" | "derived" | "still" | "none", "latency_s": {stream: declared}, "streams": {stream: {column: packed}}, "notes": [...]}]}.
 // Columns are those of the log (flightlog/flight_log.hpp), rounded well below any sensor's noise; no stream has more than kMostSamples, so
-// that flights of any length open. Declared inputs are the stream "declared" in place of "command". A vehicle that is known by the beat has
-// no wings but "body_m", the semi-axes of an ellipsoid, and its flights a stream "path": the specific force of the path that motion capture
-// saw (flightlog/mean_motion.hpp), at its instants. truth.csv is not read.
+// that flights of any length open. Declared inputs are the stream "declared" in place of "command". "vehicle" is its shape (shape.hpp). Flights
+// of one that is known by the beat have a stream "path": the specific force of the path that motion capture saw (flightlog/mean_motion.hpp),
+// at its instants. truth.csv is not read.
 #pragma once
 
 #include <array>
@@ -13,6 +13,7 @@
 #include <optional>
 #include <vector>
 
+#include "flightlog/flight_log.hpp"
 #include "view/page.hpp"
 
 namespace flappy::view {
@@ -25,7 +26,16 @@ struct FlightOptions {
   std::optional<std::array<double, 3>> goal_m;  ///< in W
 };
 
-/// io::InputError of a log that cannot be read, a vehicle that is nowhere, more than kMostFlights.
+struct ShownFlight {
+  std::string name;
+  std::filesystem::path folder;  ///< where its vehicle is looked for first, and the source that is named
+  flightlog::FlightLog log;
+};
+
+/// io::InputError of a vehicle that is nowhere, more than kMostFlights.
+Section flight_section(const std::vector<ShownFlight>& flights, const FlightOptions& options, Packing& packing);
+
+/// The same of folders, by their names; io::InputError of a log that cannot be read, too.
 Section flight_section(const std::vector<std::filesystem::path>& folders, const FlightOptions& options,
                        Packing& packing);
 

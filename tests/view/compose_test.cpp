@@ -163,7 +163,7 @@ TEST(FlightSection, HasTheStreamsTheVehicleAndTheGoal) {
   EXPECT_EQ(block.at("goal_m").dump(), "[1.0,2.0,3.0]");
   const Json& f = block.at("flights")[0];
   EXPECT_EQ(f.at("vehicle").at("name"), "hummingbird_nominal");
-  EXPECT_EQ(f.at("vehicle").at("left").at("wing_length_m"), 0.07);
+  EXPECT_EQ(f.at("vehicle").at("left").at("outline_m").back()[0], 0.07);
   EXPECT_NEAR(f.at("vehicle").at("mass_kg").get<double>(), 0.0124481, 1e-7);  // torso, two leading edges, two wings
   EXPECT_EQ(f.at("latency_s").dump(), R"({"mocap":0.01,"imu":0.001})");
   EXPECT_EQ(f.at("streams").at("mocap").at("x_m").at("count"), log.mocap.x_m.size());
@@ -228,7 +228,7 @@ TEST(FlightSection, RefusesAFlightWithoutItsVehicle) {
   Packing packing;
   EXPECT_EQ(refusal([&] { flight_section({folder.path() / "flight"}, {}, packing); }),
             (folder.path() / "flight/flight.toml").string() +
-                ": vehicle: there is no bird.toml in the folder; accepted: --vehicle FILE");
+                ": vehicle: there is no bird.toml in the folder; accepted: --vehicle FILE, in Python vehicle=FILE");
   FlightOptions options;
   options.vehicle = FLAPPY_SOURCE_DIR "/configs/vehicles/hummingbird_nominal.toml";
   EXPECT_EQ(refusal([&] { flight_section({folder.path() / "flight"}, options, packing); }), "accepted");

@@ -47,21 +47,8 @@ test("what C++ packs is what JavaScript reads", async () => {
   near([...packing.unpackedColumn(bytes, {at: 3, count: 3, step: 0.01})], [-1, 1000, -1000]);
 });
 
-test("a wing has the moments of its file", () => {
-  const moments = [0.999407407407407, 0.450820740740741, 0.284203623407408];  // configs/vehicles/hummingbird_nominal.toml
-  const chord = geometry.chordOf(moments), count = 2000;
-  for (const order of [0, 1, 2]) {
-    let sum = 0;
-    for (let k = 0; k < count; k++) sum += ((k + 0.5) / count) ** order * chord((k + 0.5) / count) / count;
-    near(sum, moments[order], 1e-5);
-  }
-  near(chord(0.25), 1.1461, 1e-3);  // its wing tapers straight
-  const outline = geometry.wingOutline({shoulder_m: [0, 0, 0], wing_length_m: 0.07, mean_chord_m: 0.0212, moments});
-  near(outline[outline.length - 1], [0.07, 0]);
-});
-
 test("stroke and rotation move wings backward", () => {
-  const side = {shoulder_m: [0, 0.014, 0.019], wing_length_m: 0.07, mean_chord_m: 0.02, moments: [1, 0.5, 1 / 3]};
+  const side = {shoulder_m: [0, 0.014, 0.019], outline_m: [[0.07, 0]]};
   near(geometry.wingPoint(side, 1, 0, 0, 0.07, 0.02), [0, 0.084, -0.001]);
   near(geometry.wingPoint(side, 1, Math.PI / 2, 0, 0.07, 0), [-0.07, 0.014, 0.019]);
   near(geometry.wingPoint({...side, shoulder_m: [0, -0.014, 0.019]}, -1, Math.PI / 2, 0, 0.07, 0), [-0.07, -0.014, 0.019]);
@@ -129,7 +116,7 @@ test("a flight is what its log has", () => {
   const packer = new Packer(), count = 201, t = Array.from({length: count}, (_, i) => 10 + i / 200);
   const same = (value) => t.map(() => value);
   const columns = (names) => Object.fromEntries(Object.entries(names).map(([name, values]) => [name, packer.add(values, 1e-6)]));
-  const side = {shoulder_m: [0, 0, 0], wing_length_m: 0.07, mean_chord_m: 0.02, moments: [1, 0.5, 1 / 3]};
+  const side = {shoulder_m: [0, 0, 0], outline_m: [[0.07, 0]]};
   const json = {name: "f", declared: "v", flapping_Hz: 34, gravity_m_s2: 9.81, wings: "recorded", notes: [], latency_s: {mocap: 0.03, imu: 0},
     vehicle: {name: "v", mass_kg: 0.012, left: side, right: side}, ambient: {ground_z_m: 0, ceiling_z_m: 9, walls: []},
     streams: {

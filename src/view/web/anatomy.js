@@ -1,6 +1,6 @@
 // The robot with what is off: one arrow, arc or part for each channel, stronger the more its residual exceeds noise.
 import {drawn, element} from "./dom.js";
-import {wingOutline, wingPoint} from "./geometry.js";
+import {kHummingbird, wingPoint} from "./geometry.js";
 
 /**
  * @typedef {import("./geometry.js").Side} Side
@@ -50,6 +50,11 @@ function arcAbout(axis, radius_m, along_m) {
   });
 }
 
+/** @param {number} sign 1: left, -1: right @returns {Side} */
+function sideOf(sign) {
+  return /** @type {Side} */ (sign > 0 ? kHummingbird.left : kHummingbird.right);
+}
+
 /** @param {string} channel @returns {{points: number[][], label: number[]} | null} */
 function shapeOf(channel) {
   const [kind, which] = channel.split("_");
@@ -61,35 +66,31 @@ function shapeOf(channel) {
   }
   const sign = which === "left" ? 1 : -1;
   if (kind === "stroke") {
-    const arc = Array.from({length: 15}, (_, k) => wingPoint(kSide, sign, -0.5 + k / 14, 0, 0.08, 0));
-    return {points: arc, label: wingPoint(kSide, sign, -0.6, 0, 0.083, 0)};
+    const arc = Array.from({length: 15}, (_, k) => wingPoint(sideOf(sign), sign, -0.5 + k / 14, 0, 0.08, 0));
+    return {points: arc, label: wingPoint(sideOf(sign), sign, -0.6, 0, 0.083, 0)};
   }
   if (kind === "current") return {points: [[0, sign * 0.014, 0.018], [0, sign * 0.014, 0.006]], label: [0, sign * 0.03, -0.004]};
   if (kind === "battery") return {points: [[0, 0, -0.026], [0, 0, -0.036]], label: [0, 0.012, -0.046]};
   return null;
 }
 
-/** Of a robot as wide as the drawing wants it. @type {Side} */
-const kSide = {shoulder_m: [0, 0.014, 0.019], wing_length_m: 0.07, mean_chord_m: 0.0212, moments: [1, 0.4508, 0.2842]};
-
 /** @returns {SVGElement[]} */
 function wingElements() {
-  const outline = wingOutline(kSide);
   return [-1, 1].map((sign) => {
-    const side = {...kSide, shoulder_m: [0, sign * 0.014, 0.019]};
-    const at = (/** @type {number} */ s, /** @type {number} */ c) => wingPoint(side, sign, 0.15, 0.5, s, c);
-    const edge = [at(0, 0), ...outline.map(([s]) => at(s, 0)), ...[...outline].reverse().map(([s, c]) => at(s, c))];
+    const side = sideOf(sign), at = (/** @type {number} */ s, /** @type {number} */ c) => wingPoint(side, sign, 0.15, 0.5, s, c);
+    const edge = [at(0, 0), ...side.outline_m.map(([s]) => at(s, 0)), ...[...side.outline_m].reverse().map(([s, c]) => at(s, c))];
     return drawn("path", {d: `${pathOf(edge)} Z`, fill: "#dfe9f2", stroke: "#8fa8bd"});
   });
 }
 
 /** @returns {SVGElement} */
 function bodyElement() {
-  const height = [[-0.04, 0], [-0.03, 0.004], [-0.016, 0.009], [0, 0.0105], [0.012, 0.0085], [0.022, 0.0045], [0.026, 0.0062], [0.031, 0.0068],
-    [0.036, 0.0048], [0.0375, 0]];
-  const silhouette = [...height.map(([z, r]) => [projected([0, 0, z])[0] + kScale * r, projected([0, 0, z])[1]]),
-    ...[...height].reverse().map(([z, r]) => [projected([0, 0, z])[0] - kScale * r, projected([0, 0, z])[1]])];
-  return drawn("path", {d: `M${silhouette.map((p) => p.map((v) => v.toFixed(1)).join(" ")).join("L")}Z`, fill: "#e7ebef", stroke: "#8c959f"});
+  const edge = (/** @type {number} */ sign) => /** @type {number[][]} */ (kHummingbird.profile_m).map(([z, r]) => {
+    const [x, y] = projected([0, 0, z]);
+    return [x + sign * kScale * r, y];
+  });
+  const silhouette = [...edge(1), ...edge(-1).reverse()].map((p) => p.map((v) => v.toFixed(1)).join(" "));
+  return drawn("path", {d: `M${silhouette.join("L")}Z`, fill: "#e7ebef", stroke: "#8c959f"});
 }
 
 /** A body that says nothing of its shape: a circle about the tracked point, the same in the plane of its x and y. @returns {SVGElement[]} */

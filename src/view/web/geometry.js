@@ -1,38 +1,30 @@
 // The robot's shape and turns. World W: z up. Body B: x forward, y left, z up. Quaternions w, x, y, z, body to world.
 
 /**
- * @typedef {{shoulder_m: number[], wing_length_m: number, mean_chord_m: number, moments: number[]}} Side
- * @typedef {{name: string, mass_kg: number, left?: Side, right?: Side, body_m?: number[]}} Vehicle body_m: of one without modelled wings, the
- *   semi-axes of its ellipsoid
+ * @typedef {{shoulder_m: number[], outline_m: number[][]}} Side outline_m: pairs of span and chord, down the trailing edge from the root
+ * @typedef {{name: string, mass_kg: number, profile_m?: number[][], left?: Side, right?: Side, body_m?: number[]}} Vehicle profile_m: pairs of
+ *   height and radius; body_m: of one without modelled wings, the semi-axes of its ellipsoid (src/view/shape.hpp)
  */
 
 /**
- * Chord over its mean at a share of the span, the quadratic function that has the planform's moments of order 0, 1 and 2
- * (about the root, over span and mean chord): none other is known of a vehicle's file. Of a straight taper it is exact.
- * @param {number[]} moments
- * @returns {(share: number) => number}
+ * The shipped hummingbird's shape, as src/view/shape.cpp makes it: drawn where nobody says which vehicle it is.
+ * @type {Vehicle}
  */
-export function chordOf(moments) {
-  const [m0, m1, m2] = moments;
-  // inverse of the Hilbert matrix of order 3
-  const a = 9 * m0 - 36 * m1 + 30 * m2, b = -36 * m0 + 192 * m1 - 180 * m2, c = 30 * m0 - 180 * m1 + 180 * m2;
-  return (share) => Math.max(0, a + b * share + c * share * share);
-}
+export const kHummingbird = {"name": "hummingbird_nominal", "mass_kg": 0.0124481,
+  "profile_m": [[-0.04, 0], [-0.03, 0.004], [-0.016, 0.009], [0, 0.0105], [0.012, 0.0085], [0.022, 0.0045], [0.026, 0.0062], [0.031, 0.0068],
+    [0.036, 0.0048], [0.0375, 0]],
+  "left": {"shoulder_m": [0, 0.01395, 0.0189913], "outline_m": [
+    [0.0035, 0.026776], [0.007656, 0.026047], [0.011813, 0.025316], [0.015969, 0.024584], [0.020125, 0.023851], [0.024281, 0.023116],
+    [0.028437, 0.02238], [0.032594, 0.021643], [0.03675, 0.020904], [0.040906, 0.020164], [0.045063, 0.019423], [0.049219, 0.01868],
+    [0.053375, 0.017936], [0.057531, 0.017191], [0.061688, 0.016444], [0.065844, 0.015695], [0.07, 0]]},
+  "right": {"shoulder_m": [0, -0.01395, 0.0189913], "outline_m": [
+    [0.0035, 0.026776], [0.007656, 0.026047], [0.011813, 0.025316], [0.015969, 0.024584], [0.020125, 0.023851], [0.024281, 0.023116],
+    [0.028437, 0.02238], [0.032594, 0.021643], [0.03675, 0.020904], [0.040906, 0.020164], [0.045063, 0.019423], [0.049219, 0.01868],
+    [0.053375, 0.017936], [0.057531, 0.017191], [0.061688, 0.016444], [0.065844, 0.015695], [0.07, 0]]}};
 
-/**
- * Outline of a wing at stroke and rotation 0: pairs of span and chord in m, down the trailing edge from the root. Its tip is
- * rounded over the last part of the span.
- * @param {Side} side
- * @param {number} stations
- * @returns {number[][]}
- */
-export function wingOutline(side, stations = 16) {
-  const chord = chordOf(side.moments), kRoot = 0.05, kTip = 0.94;
-  return Array.from({length: stations + 1}, (_, k) => {
-    const share = kRoot + (1 - kRoot) * k / stations;
-    const beyond = Math.max(0, (share - kTip) / (1 - kTip));
-    return [share * side.wing_length_m, chord(share) * side.mean_chord_m * Math.sqrt(1 - beyond * beyond)];
-  });
+/** @param {Side} side @returns {number} span, m */
+export function spanOf(side) {
+  return side.outline_m[side.outline_m.length - 1][0];
 }
 
 /**

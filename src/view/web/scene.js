@@ -1,5 +1,5 @@
 // The flight in 3D, by three.js: robots, their trails, the place, arrows.
-import {rotated, wingOutline} from "./geometry.js";
+import {rotated, spanOf} from "./geometry.js";
 
 /**
  * @typedef {import("./geometry.js").Vehicle} Vehicle
@@ -14,9 +14,7 @@ const kMomentColour = "#0072b2";
 const kChase_m = 0.55;  // from which a robot is followed
 const kFar_m = 50;  // what lies farther away is not there
 const kVelocityArrow_s = 0.12, kForceArrow_m = 0.09;  // length at 1 m/s, and at the weight
-/** Height and radius of the body of a robot with wings of 70 mm; only its looks: no vehicle's file has an outline. */
-const kBody = [[-0.04, 0], [-0.03, 0.004], [-0.016, 0.009], [0, 0.0105], [0.012, 0.0085], [0.022, 0.0045], [0.026, 0.0062],
-  [0.031, 0.0068], [0.036, 0.0048], [0.0375, 0]];
+const kWing_m = 0.07;  // for which the sizes of a beak and a spar are given
 
 /**
  * How much larger a robot is than the one that distances and arrows are made for.
@@ -38,7 +36,7 @@ class Robot {
     /** @type {{sign: number, stroke: any, rotation: any}[]} */
     this.wings = [];
     if (vehicle.body_m) this.addEllipsoid(vehicle.body_m, colour);
-    else this.addFlapper(/** @type {Side} */ (vehicle.left), /** @type {Side} */ (vehicle.right), colour);
+    else this.addFlapper(vehicle, colour);
   }
 
   /**
@@ -57,13 +55,12 @@ class Robot {
   }
 
   /**
-   * @param {Side} left
-   * @param {Side} right
+   * @param {Vehicle} vehicle
    * @param {string} colour of its wings
    */
-  addFlapper(left, right, colour) {
-    const size = left.wing_length_m / 0.07;
-    const outline = kBody.map(([height, radius]) => new THREE.Vector2(radius * size, height * size));
+  addFlapper(vehicle, colour) {
+    const left = /** @type {Side} */ (vehicle.left), right = /** @type {Side} */ (vehicle.right), size = spanOf(left) / kWing_m;
+    const outline = /** @type {number[][]} */ (vehicle.profile_m).map(([height, radius]) => new THREE.Vector2(radius, height));
     const smooth = new THREE.SplineCurve(outline).getPoints(40);
     const body = new THREE.Mesh(new THREE.LatheBufferGeometry(smooth, 24), new THREE.MeshStandardMaterial({color: 0x8b98a5, roughness: 0.85}));
     body.rotation.x = Math.PI / 2;
@@ -81,7 +78,7 @@ class Robot {
    * @returns {{sign: number, stroke: any, rotation: any}}
    */
   addWing(side, sign, colour) {
-    const outline = wingOutline(side), corners = [];
+    const outline = side.outline_m, span_m = spanOf(side), corners = [];
     for (let k = 1; k < outline.length; k++) {
       const [s0, c0] = outline[k - 1], [s1, c1] = outline[k];
       corners.push(0, sign * s0, 0, 0, sign * s1, 0, 0, sign * s1, -c1, 0, sign * s0, 0, 0, sign * s1, -c1, 0, sign * s0, -c0);
@@ -93,10 +90,10 @@ class Robot {
       depthWrite: false}));
     const rim = new THREE.BufferGeometry();
     rim.setAttribute("position", new THREE.Float32BufferAttribute(
-      [...outline.map(([s, c]) => [0, sign * s, -c]).flat(), 0, sign * outline[outline.length - 1][0], 0], 3));
+      [...outline.map(([s, c]) => [0, sign * s, -c]).flat(), 0, sign * span_m, 0], 3));
     const edge = new THREE.Line(rim, new THREE.LineBasicMaterial({color: colour}));
-    const spar = new THREE.Mesh(new THREE.CylinderBufferGeometry(0.0009, 0.0012, side.wing_length_m, 8), new THREE.MeshBasicMaterial({color: 0x24292f}));
-    spar.position.y = sign * side.wing_length_m / 2;
+    const spar = new THREE.Mesh(new THREE.CylinderBufferGeometry(0.0009, 0.0012, span_m, 8), new THREE.MeshBasicMaterial({color: 0x24292f}));
+    spar.position.y = sign * span_m / 2;
     const rotation = new THREE.Group(), stroke = new THREE.Group();
     rotation.add(membrane, edge, spar);
     stroke.add(rotation);

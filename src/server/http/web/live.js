@@ -1,14 +1,11 @@
-// The watched flapper in 3D, where it was and is.
+// The watched flapper in 3D, where it was and is. Telemetry says nothing of the vehicle: it is drawn as the shipped one.
+import {kHummingbird} from "./geometry.js";
 import {Scene} from "./scene.js";
 
 /**
  * @typedef {{source: string, t_s: number, position_m: number[], q_WB: number[], v_WB_W_m_s: number[]}} State
  */
 
-/** Of configs/vehicles/hummingbird_nominal.toml: telemetry says nothing of the vehicle. */
-const kSide = {shoulder_m: [0, 0.01395, 0.0189913], wing_length_m: 0.07, mean_chord_m: 0.021212121212121,
-  moments: [0.999407407407407, 0.450820740740741, 0.284203623407408]};
-const kVehicle = {name: "hummingbird", mass_kg: 0.0124481, left: kSide, right: {...kSide, shoulder_m: [0, -0.01395, 0.0189913]}};
 const kPlace = {ground_z_m: -1e3, ceiling_z_m: 1e3, walls: []};
 const kColour = "#0072b2", kPoints = 400, kRoom_m = 0.4;
 
@@ -47,7 +44,7 @@ export class LiveView {
     this.frame.replaceChildren();
     this.scene?.renderer.dispose();
     try {
-      this.scene = new Scene(this.frame, [{vehicle: kVehicle, colour: kColour, path: corners}], kPlace, null);
+      this.scene = new Scene(this.frame, [{vehicle: kHummingbird, colour: kColour, path: corners}], kPlace, null);
     } catch {
       this.scene = null;  // no WebGL here: the numbers stay
     }
