@@ -152,7 +152,7 @@ MeanMotion mean_motion(const FlightLog& log, double bandwidth_Hz, const std::fil
       if (m.t_s(i) >= from_s && m.t_s(i) <= to_s) m.seen[i] = 0;
   };
   unseen(m.begin_s, m.begin_s + kEnds * period_s);
-  unseen(poses.back().t_s - kEnds * period_s, poses.back().t_s);
+  unseen(poses.back().t_s - kEnds * period_s, INFINITY);  // steps add up to a little more than its time
   for (std::size_t i = 1; i < poses.size(); ++i)
     if (poses[i].t_s - poses[i - 1].t_s > kFilled * period_s)
       unseen(poses[i - 1].t_s - kAround * period_s, poses[i].t_s + kAround * period_s);

@@ -104,6 +104,13 @@ TEST(MeanMotion, OfPosesThatAreAnothers) {
   expect_true(mean_motion(log, kBandwidth_Hz, "flight"), 0.3);
 }
 
+TEST(MeanMotion, LeavesOutItsEnds) {
+  for (int samples = 2990; samples < 3000; ++samples) {  // of some, steps add up to more than the last pose's time
+    const MeanMotion m = mean_motion(flight((samples + 0.5) / kRate_Hz), kBandwidth_Hz, "flight");
+    for (const std::size_t i : {std::size_t{0}, m.size() - 1}) EXPECT_EQ(m.seen[i], 0) << i << " of " << samples;
+  }
+}
+
 TEST(MeanMotion, LeavesOutWhatWasNotSeen) {
   FlightLog log = flight(20);
   for (flightlog::Column* c : {&log.mocap.t_s, &log.mocap.x_m, &log.mocap.y_m, &log.mocap.z_m, &log.mocap.qw,
