@@ -4,7 +4,7 @@ The robot's shape is the page's (src/view/shape.hpp), and so are the chase camer
 (src/view/web/scene.js). What is nearer is drawn later: there is no depth buffer.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -26,7 +26,9 @@ AZIMUTH_RAD, ELEVATION_RAD, DISTANCE_M = -2.3, 0.35, 0.55  # from which the robo
 FAR_M = 50  # what lies farther away is not there
 FLOOR_STEP_M = 0.1  # without a ground the grid is below the flight, and goes down with it in such steps
 VELOCITY_ARROW_S = 0.12
+HALF_SPAN_M = 0.084  # of the robot that distances and arrows are made for
 TRAIL_POINTS = 400
+BALL = tuple((float(-np.cos(a)), float(np.sin(a))) for a in np.linspace(0, np.pi, 13))  # height and radius
 SUN = np.array([-1, -2, 4]) / np.sqrt(21)
 
 SKY, FLOOR, GRID, GRID_IN_AIR = (246, 248, 250), (235, 239, 243), (196, 204, 212), (216, 222, 228)
@@ -76,14 +78,14 @@ def _body(profile: tuple[tuple[float, float], ...], sides: int = 16) -> tuple[Do
 class _Pen:
     """Draws things of the world as a camera sees them."""
 
-    def __init__(self, size: tuple[int, int], target: Doubles) -> None:
+    def __init__(self, size: tuple[int, int], target: Doubles, distance_m: float) -> None:
         self.wide, self.high = size[0] * FINE, size[1] * FINE
         self.image = Image.new("RGB", (self.wide, self.high), SKY)
         self.ink = ImageDraw.Draw(self.image, "RGBA")
         level = np.cos(ELEVATION_RAD)
         away = np.array([level * np.cos(AZIMUTH_RAD), level * np.sin(AZIMUTH_RAD), np.sin(ELEVATION_RAD)])
         right = np.array([-np.sin(AZIMUTH_RAD), np.cos(AZIMUTH_RAD), 0])
-        self.eye = target + DISTANCE_M * away
+        self.eye = target + distance_m * away
         self.view = np.stack([right, np.cross(away, right), -away])  # rows: right, up, ahead
         self.focal = self.high / 2 / np.tan(FIELD_RAD / 2)
 
@@ -178,29 +180,45 @@ def _draw_place(pen: _Pen, ambient: Mapping[str, Any], way: Doubles) -> tuple[fl
     return float(floor), names
 
 
+def _draw_body(pen: _Pen, shape: Mapping[str, Any], position: Doubles, turn: Doubles) -> None:
+    faces, normals = _body(BALL if "body_m" in shape else tuple(map(tuple, shape["profile_m"])))
+    colour = BODY
+    if "body_m" in shape:
+        faces, normals = faces * shape["body_m"], normals / shape["body_m"]
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        colour = np.array(WING)
+    faces, normals = faces @ turn.T + position, normals @ turn.T
+    towards = ((pen.eye - faces.mean(1)) * normals).sum(1) > 0
+    faces, normals = faces[towards], normals[towards]
+    # the page's two lights on three.js's standard material, which is half a metal; its gloss is left out
+    light = 0.625 * (0.892 + 0.108 * (0.5 + 0.5 * normals[:, 1])) + 0.275 * np.maximum(0, normals @ SUN)
+    lit = light[:, None] * colour
+    if "body_m" in shape:
+        lit = 0.4 * lit + 0.6 * np.array(SKY)
+    seen, colours = pen.seen(faces), lit.astype(int).tolist()
+    pixels = pen.at(seen).reshape(-1, 8).tolist()
+    for k in np.argsort(-seen[:, :, 2].mean(1)):
+        pen.ink.polygon(pixels[k], tuple(colours[k]))
+
+
 def _draw_robot(pen: _Pen, shape: Mapping[str, Any], pose: Mapping[str, Any]) -> None:
     position, turn = np.asarray(pose["position_m"], float), _rotation(pose["attitude"])
-    size = shape["left"]["outline_m"][-1][0] / 0.07
+    if "body_m" in shape:  # the ellipsoid of its inertia, with a nose
+        nose, long = shape["body_m"][0], 0.3 * max(shape["body_m"])
+        beak = np.array([[nose, 0, 0], [nose + long / 2, 0, 0], [nose + long, 0, 0]])
+        width = 0.3 * long
+    else:
+        size = shape["left"]["outline_m"][-1][0] / 0.07
+        beak = size * np.array([[0.005, 0, 0.03], [0.017, 0, 0.03], [0.029, 0, 0.03]])
+        width = 0.003 * size
+    beak = beak @ turn.T + position
 
-    def body() -> None:
-        faces, normals = _body(tuple(map(tuple, shape["profile_m"])))
-        faces, normals = faces @ turn.T + position, normals @ turn.T
-        towards = ((pen.eye - faces.mean(1)) * normals).sum(1) > 0
-        faces, normals = faces[towards], normals[towards]
-        # the page's two lights on three.js's standard material, which is half a metal; its gloss is left out
-        light = 0.625 * (0.892 + 0.108 * (0.5 + 0.5 * normals[:, 1])) + 0.275 * np.maximum(0, normals @ SUN)
-        colours = (light[:, None] * BODY).astype(int).tolist()
-        seen = pen.seen(faces)
-        pixels = pen.at(seen).reshape(-1, 8).tolist()
-        for k in np.argsort(-seen[:, :, 2].mean(1)):
-            pen.ink.polygon(pixels[k], tuple(colours[k]))
+    def draw_beak() -> None:
+        pen.line(beak[:2], DARK, width)
+        pen.line(beak[1:], DARK, width / 2)
 
-    def beak() -> None:
-        pen.line(size * np.array([[0.005, 0, 0.03], [0.017, 0, 0.03]]) @ turn.T + position, DARK, 0.003 * size)
-        pen.line(size * np.array([[0.017, 0, 0.03], [0.029, 0, 0.03]]) @ turn.T + position, DARK, 0.0014 * size)
-
-    parts = [(position, body), (position + turn @ [0.017 * size, 0, 0.03 * size], beak)]
-    for k, (name, sign) in enumerate((("left", 1), ("right", -1))):
+    parts: list[tuple[Doubles, Callable[[], None]]] = [(position, lambda: _draw_body(pen, shape, position, turn)), (beak[1], draw_beak)]
+    for k, (name, sign) in enumerate((("left", 1), ("right", -1)) if "left" in shape else ()):
         outline = wing(shape[name], sign, pose["stroke_rad"][k], pose["rotation_rad"][k]) @ turn.T + position
         root = turn @ shape[name]["shoulder_m"] + position
 
@@ -221,7 +239,7 @@ def draw(
 
     Args:
         pose: as of `env.unwrapped.pose(i)`: position_m (3,), attitude (4,), stroke_rad (2,), rotation_rad (2,), and, where known,
-            velocity_m_s (3,), target_m (3,), t_s.
+            velocity_m_s (3,), target_m (3,), t_s. Without modelled wings, position and attitude are enough.
         scene: as of `env.unwrapped.scene`: the vehicle's shape and what is around it.
         trail: positions so far, (n, 3) in m.
         size: width and height in pixels.
@@ -231,13 +249,14 @@ def draw(
     """
     position = np.asarray(pose["position_m"], float)
     path = np.zeros((0, 3)) if trail is None else np.asarray(trail, float).reshape(-1, 3)
-    pen = _Pen(size, position)
+    scale = max(scene["vehicle"].get("body_m", [HALF_SPAN_M])) / HALF_SPAN_M  # of things that are drawn beside the robot
+    pen = _Pen(size, position, DISTANCE_M * scale)
     way = np.vstack([path, position, *([pose["target_m"]] if "target_m" in pose else [])])
     floor, names = _draw_place(pen, scene["ambient"], way)
     round_ = np.linspace(0, 2 * np.pi, 33)[:-1]
     circle = 0.03 * np.stack([np.cos(round_), np.sin(round_), 0 * round_], 1)
     opacity = 0.35 / (1 + 4 * max(0.0, position[2] - floor))
-    pen.area(np.add(circle, (position[0], position[1], floor)), (*SHADOW, round(255 * opacity)))
+    pen.area(np.add(scale * circle, (position[0], position[1], floor)), (*SHADOW, round(255 * opacity)))
     if len(path) > 1:
         extent = max(0.25, float(np.ptp(way, 0).max()))
         pen.line(path[np.unique(np.linspace(0, len(path) - 1, TRAIL_POINTS).astype(int))], TRAIL, 2 * min(0.003, 0.0005 + 0.0006 * extent))
@@ -248,7 +267,7 @@ def draw(
         names.append((np.add(goal, (0, 0, 0.06)), "goal", GOAL_TEXT))
     _draw_robot(pen, scene["vehicle"], pose)
     if "velocity_m_s" in pose:
-        pen.arrow(position, VELOCITY_ARROW_S * np.asarray(pose["velocity_m_s"], float), VELOCITY)
+        pen.arrow(position, scale * VELOCITY_ARROW_S * np.asarray(pose["velocity_m_s"], float), VELOCITY)
 
     image = pen.image.reduce(FINE)
     ink = ImageDraw.Draw(image)

@@ -143,6 +143,16 @@ def test_goal_trail_and_ground_are_where_they_are(position: list[float]) -> None
     assert np.abs(draw(with_goal, ground)[y - 2 : y + 3, x - 2 : x + 3].astype(int) - (235, 239, 243)).sum(-1).min() < 3
 
 
+def test_robot_without_wings_is_its_ellipsoid() -> None:
+    scene = SCENE | {"vehicle": {"name": "ball", "mass_kg": 0.03, "body_m": [0.04, 0.02, 0.02]}}
+    image = draw({"position_m": [0, 0, 0], "attitude": [1, 0, 0, 0]}, scene).astype(int)
+    blue = image[..., 2] - image[..., 0]
+    scale = 0.04 / 0.084  # the camera is as much nearer
+    for point, there in (([0, 0, 0], True), ([-0.035, 0, 0], True), ([0, 0, 0.018], True), ([0, 0, 0.03], False), ([0, 0.05, 0], False)):
+        x, y = pixel(np.divide(point, scale), [0, 0, 0]).astype(int)
+        assert (blue[y, x] > 20) == there, point
+
+
 def test_environment_renders() -> None:
     gymnasium = pytest.importorskip("gymnasium")
     env = gymnasium.make("flappy:flappy/Hover-v0", render_mode="rgb_array")
