@@ -383,7 +383,7 @@ class Story {
       if (rows.size() == kRivals || (r.probability < kLeastShown && rows.size() >= 3)) break;
       std::vector<std::string> pro, con;
       if (refit != nullptr && r.log_evidence > refit->log_evidence + kRuledOut_nats)
-        pro.push_back("parameters alone are ruled out");
+        pro.push_back("rules out parameters alone");
       else if (refit != nullptr && &r != refit && r.log_evidence > refit->log_evidence)
         pro.push_back(format("%.0f nats more than parameters alone", r.log_evidence - refit->log_evidence));
       if (r.closure && *r.closure > 0)

@@ -56,7 +56,7 @@ class Belief {
     for (const std::string& c : channels_) {
       const Json& e = error(last, c);
       falls.push_back(
-          format("%s from %.2f to %.2f %s (90 %%: %.2f to %.2f; %.2f where all flights of a kind are held "
+          format("%s from %.3g to %.3g %s (90 %%: %.3g to %.3g; %.3g where all flights of a kind are held "
                  "out)",
                  channel_words(c).c_str(), error(0, c).at("rms").get<double>(), e.at("rms").get<double>(), unit_of(c),
                  e.at("low").get<double>(), e.at("high").get<double>(), e.at("by_type").get<double>()));

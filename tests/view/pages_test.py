@@ -4,11 +4,14 @@
 pages_test.py BIN SOURCE WORK [--update]: programs, the project, a folder to use; --update takes what is seen as right from now on.
 """
 
+import importlib
 import json
 import math
+import random
 import shutil
 import subprocess
 import sys
+import types
 from pathlib import Path
 
 from PIL import Image, ImageChops, ImageStat
@@ -93,6 +96,61 @@ def report(name: str, *paths: object) -> Path:
 def fly(name: str, config: str, *options: object) -> Path:
     program("flappy-fly", SOURCE / "configs" / "fly" / config, "--log", WORK / name, *options)
     return WORK / name
+
+
+BY_THE_BEAT = """schema = 1
+vehicle = "flapper_nimble.toml"
+flapping_Hz = 14.7
+gravity_m_s2 = 9.81
+
+[ambient]
+air_density_kg_m3 = 1.18
+ground_z_m = -0.5
+ceiling_z_m = 1000.0
+walls = []
+
+[mocap]
+rate_hz = 100.0
+latency_s = 0.0
+position_noise_m = 2e-4
+attitude_noise_rad = 2e-3
+
+[command]
+inputs = ["left_flap", "right_flap", "pitch_servo", "yaw_servo"]
+"""
+
+
+def fly_by_the_beat(name: str, seed: int) -> Path:
+    """Half a minute of a robot that is known by the beat, whose wings' drag and whose stroke plane push as its file does not know."""
+    noise, step_s, mass_kg = random.Random(seed), 1e-3, 0.103
+    phase = [noise.uniform(0, 2 * math.pi) for _ in range(6)]
+    position, velocity, mocap, command = [0.0, 0.0, 2.0], [0.0, 0.0, 0.0], ["t_s,x_m,y_m,z_m,qw,qx,qy,qz"], ["t_s,left_flap,right_flap,pitch_servo,yaw_servo"]
+    for i in range(30000):
+        t = i * step_s
+        roll = 0.25 * math.sin(1.1 * t + phase[0]) + 0.1 * math.sin(2.7 * t + phase[1])
+        pitch = 0.3 * math.sin(0.9 * t + phase[2]) + 0.1 * math.sin(3.1 * t + phase[3])
+        yaw = 0.5 * math.sin(0.3 * t + phase[4])
+        (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in (roll, pitch, yaw))
+        w, x, y, z = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+        turn = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
+        servo, steer = 0.5 + 0.05 * math.sin(1.7 * t + phase[5]) + 0.03 * math.sin(4.1 * t), 0.5 + 0.01 * math.sin(0.7 * t)
+        lift = 9.81 + 3 * (2 + 0.5 * math.sin(0.5 * t) - position[2]) - 3 * velocity[2]
+        flap = lift * mass_kg / (0.0344 * 50)  # thrust of the file: 0.0344 N/Hz, 25 Hz at an input of 1
+        v, beats = [sum(turn[k][c] * velocity[k] for k in range(3)) for c in range(3)], 25 * flap / 14.7
+        force = [-3 * beats * v[0] + 20 * (servo - 0.5), -2 * beats * v[1], lift - beats * v[2]]
+        if i % 10 == 0:
+            seen = [p + 2e-4 * noise.gauss(0, 1) for p in position]
+            mocap.append(",".join(f"{value:.6f}" for value in (t, *seen, w, x, y, z)))
+            command.append(",".join(f"{value:.6f}" for value in (t, flap, flap, servo, steer)))
+        for k in range(3):
+            velocity[k] += step_s * (sum(turn[k][c] * force[c] for c in range(3)) - (9.81 if k == 2 else 0))
+            position[k] += step_s * velocity[k]
+    folder = WORK / "by_the_beat" / name
+    folder.mkdir(parents=True)
+    for file, lines in (("flight.toml", [BY_THE_BEAT]), ("mocap.csv", mocap), ("command.csv", command)):
+        (folder / file).write_text("\n".join(lines) + "\n")
+    return folder
 
 
 def check_page(browser: Browser, name: str, least_colours: int = 8) -> None:
@@ -190,6 +248,48 @@ def check_flight(browser: Browser) -> None:
     browser.run("players[0].look('chase'); players[0].timeline.show(players[0].duration_s); players[0].seek(0.2)")
 
 
+def check_laboratory(browser: Browser) -> None:
+    """What a laboratory asks is answered, in pictures with points."""
+    asked = browser.run("return [...document.querySelectorAll('.question')].map((e) => e.textContent)")
+    assert "Would a laboratory believe it?" in asked, asked
+    shown = browser.run("return [...document.querySelectorAll('figure[data-figure]')].map((e) => e.dataset.figure)")
+    for figure in ("ladder_force", "ladder_kinds_force", "controls", "agreement_1"):
+        assert figure in shown, f"no {figure} in {shown}"
+    words = browser.run("return document.querySelector('article').textContent")
+    assert "stroke plane actuation and flapping counter force" in words
+    assert "Shifted in time no effect explains as much" in words
+
+
+def check_declared(browser: Browser) -> None:
+    """Declared inputs are plots of their own, and the robot without wings is where its flight is."""
+    panels = browser.run("return [...document.querySelectorAll('[data-panel]')].map((e) => e.dataset.panel)")
+    assert panels == ["position", "attitude", "path", "declared_0"], panels
+    keys = browser.run("return document.querySelector('[data-panel=declared_0]').textContent")
+    assert all(name in keys for name in ("left flap", "right flap", "pitch servo", "yaw servo")), keys
+    browser.run("players[0].seek(12.345)")
+    expected, at = browser.run("const p = players[0]; return [p.flights[0].positionAt(12.345), p.scene.robots[0].group.position.toArray()]")
+    assert all(abs(a - b) < 1e-6 for a, b in zip(at, expected, strict=True)), "the robot is elsewhere than its flight"
+    assert browser.run("return players[0].scene.robots[0].wings.length") == 0
+    assert "ellipsoid of its mass and inertia" in browser.run("return document.querySelector('.player').textContent")
+
+
+def check_notebook(browser: Browser, page: Path) -> None:
+    """The page lives in the frame that flappy.show gives a notebook, and can reach nothing of it."""
+    sys.modules["flappy"], sys.modules["flappy._core"] = types.ModuleType("flappy"), types.ModuleType("flappy._core")
+    sys.modules["flappy"].__path__ = [str(SOURCE / "python" / "flappy")]
+    shown = importlib.import_module("flappy.flights").Page(page.read_text(encoding="utf-8"))
+    notebook = WORK / "notebook.html"
+    notebook.write_text(f"<!DOCTYPE html><meta charset='utf-8'><title>notebook</title>{shown._repr_html_()}", encoding="utf-8")
+    browser.driver.get(notebook.as_uri())
+    browser.driver.switch_to.frame(0)
+    browser.ready()
+    browser.settle()
+    assert all(n > 8 for n in browser.run(BLANK)), "the frame is blank"
+    assert browser.run("try { return parent.document.title } catch { return null }") is None, "the page reaches its notebook"
+    browser.driver.switch_to.default_content()
+    assert browser.complaints() == []
+
+
 def check_cases(browser: Browser) -> None:
     button = browser.driver.find_element("css selector", ".cases button.open")
     button.send_keys("\n")
@@ -229,6 +329,8 @@ def main() -> None:
         browser.run("players[0].seek(0.3)")
         check_screen(browser, "flights")
 
+        check_notebook(browser, WORK / "flights.html")
+
         page = report("sixty", sixty)
         weight, first_ms = page.stat().st_size / 1e6, min(browser.open(page) for _ in range(3))
         print(f"60 s of flight: {weight:.2f} MB, first frame after {first_ms:.0f} ms")
@@ -250,6 +352,21 @@ def main() -> None:
             check_page(browser, name)
             check_numbers(browser, json.loads((path / "diagnosis.json" if path.is_dir() else path).read_text()), least)
             check_screen(browser, name)
+
+        beats = [fly_by_the_beat(f"flight_{seed}", seed) for seed in (1, 2, 3)]
+        found = WORK / "by_the_beat" / "diagnosis"
+        program("flappy-gap", "diagnose", "--vehicle", SOURCE / "configs/vehicles/flapper_nimble.toml", "--flights", *beats, "--out", found)
+        browser.open(report("by_the_beat", found))
+        check_page(browser, "by_the_beat")
+        check_numbers(browser, json.loads((found / "diagnosis.json").read_text()), 60)
+        check_laboratory(browser)
+        check_screen(browser, "by_the_beat")
+        browser.run("[...document.querySelectorAll('.question')].find((e) => e.textContent.includes('laboratory')).scrollIntoView()")
+        check_screen(browser, "laboratory")
+        browser.open(report("declared", beats[0]))
+        check_page(browser, "flight of declared inputs")
+        check_declared(browser)
+        check_screen(browser, "declared")
 
         browser.open(report("benchmark", DATA / "score.csv"))
         check_page(browser, "benchmark")

@@ -99,7 +99,10 @@ test("a figure is drawn with the numbers that it has", () => {
   assert.equal(datasets[2].fill, "-1");
   assert.equal(options.scales.x.title.text, "x (s)");
   assert.deepEqual(chart.figureRows(figure).rows[0], ["line", "1", "0", "–", "–"]);
+  const keys = options.plugins.legend.labels.generateLabels({data: {datasets}, isDatasetVisible: () => true});
+  assert.deepEqual(keys.map((key) => [key.text, key.datasetIndex, key.lineDash.length, key.lineWidth]), [["line", 0, 2, 3], ["band", 2, 0, 9]]);
   const bars = {...figure, categories: ["a", "b"], series: [{name: "", draw: "bars", colour: "#000000", dashed: false, x: [1, 2], y: [0, 1]}]};
+  assert.ok(chart.chartConfig({...bars, series: [{...bars.series[0], draw: "points"}]}).data.datasets[0].clip >= 4, "half a point at the end of an axis");
   const scale = chart.chartConfig(bars).options.scales.y;
   assert.deepEqual(scale.ticks.callback(1), ["b"]);
   assert.deepEqual([scale.min, scale.max, scale.reverse], [-0.5, 1.5, true]);

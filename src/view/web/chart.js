@@ -61,7 +61,8 @@ export function chartConfig(figure) {
     const line = s.draw === "line";
     const points = s.x.map((x, i) => ({x, y: (s.y ?? [])[i]}));
     datasets.push({...common, data: points.filter((p) => line || p.x !== null), showLine: line, spanGaps: false, borderWidth: 2,
-      borderDash: s.dashed ? [6, 4] : [], pointRadius: line || s.draw === "bars" ? 0 : 4, pointHoverRadius: 4, pointHitRadius: 12});
+      borderDash: s.dashed ? [6, 4] : [], pointRadius: line || s.draw === "bars" ? 0 : 4, pointHoverRadius: 4, pointHitRadius: 12,
+      clip: line ? 0 : 6});  // a point at the end of an axis is a whole one
   }
   const y = scaleOf(figure.y);
   if (figure.categories.length > 0) {
@@ -81,13 +82,24 @@ export function chartConfig(figure) {
       plugins: {
         legend: {
           display: figure.series.some((s) => s.name !== ""), align: "start",
-          labels: {color: kInk, font: {family: kFont, size: 13}, boxWidth: 22, boxHeight: 3,
-            filter: (/** @type {any} */ item) => item.text !== ""},
+          labels: {color: kInk, font: {family: kFont, size: 13}, usePointStyle: true, pointStyleWidth: 24, generateLabels: legendKeys},
         },
         tooltip: {callbacks: {label: (/** @type {any} */ at) => `${at.dataset.label} (${shortNumber(at.parsed.x)}, ${shortNumber(at.parsed.y)})`}},
       },
     },
   };
+}
+
+/**
+ * The keys of a legend: a line for each name, dashed as its series is, broad as a band is.
+ * @param {any} chart
+ * @returns {Record<string, any>[]}
+ */
+function legendKeys(chart) {
+  return chart.data.datasets.map((/** @type {any} */ dataset, /** @type {number} */ k) => ({
+    text: dataset.label, datasetIndex: k, hidden: !chart.isDatasetVisible(k), fontColor: kInk, pointStyle: "line",
+    strokeStyle: dataset.backgroundColor, lineWidth: dataset.own.draw === "band" ? 9 : 3, lineDash: dataset.own.dashed ? [6, 3] : [],
+  })).filter((/** @type {any} */ key) => key.text !== "");
 }
 
 /** Bars from the axis, and the reach of intervals. */
