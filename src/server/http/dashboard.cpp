@@ -186,6 +186,7 @@ void Dashboard::Parts::route() {
   for (const char* script : {"/page.js", "/live.js", "/scene.js", "/geometry.js", "/three.min.js"})
     page(script, script + 1, "text/javascript; charset=utf-8");
   page("/page.css", "page.css", "text/css; charset=utf-8");
+  page("/icon.svg", "icon.svg", "image/svg+xml");
 
   listener.Get("/api/jobs", [this](const Request&, Response& response) {
     Json list = Json::array();

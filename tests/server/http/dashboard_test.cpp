@@ -104,8 +104,8 @@ TEST_F(Page, ShowsWhatThereIs) {
 }
 
 TEST_F(Page, IsStrictWithContent) {
-  for (const char* path :
-       {"/", "/page.js", "/page.css", "/live.js", "/scene.js", "/geometry.js", "/three.min.js", "/api/jobs", "/none"}) {
+  for (const char* path : {"/", "/page.js", "/page.css", "/icon.svg", "/live.js", "/scene.js", "/geometry.js",
+                           "/three.min.js", "/api/jobs", "/none"}) {
     const auto result = get(path);
     ASSERT_TRUE(result) << path;
     EXPECT_EQ(result->status, std::string(path) == "/none" ? 404 : 200) << path;

@@ -116,6 +116,7 @@ function showWatched(state) {
 }
 
 const live = new LiveView(at("view"));
+window.live = live;  // for tests and for curious people
 let busy = false;
 let again = false;
 
