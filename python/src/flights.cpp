@@ -271,7 +271,7 @@ std::string flights_page(const nb::list& flights, const std::optional<std::files
   const nb::gil_scoped_release free;
   view::Packing packing;
   const view::Section section =
-      view::flight_section(shown, {vehicle ? found(*vehicle) : std::filesystem::path(), goal_m}, packing);
+      view::flight_section(std::move(shown), {vehicle ? found(*vehicle) : std::filesystem::path(), goal_m}, packing);
   return view::page_text(section.title(), {section}, packing);
 }
 

@@ -8,6 +8,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/flight_log.hpp"
 #include "flightlog/mean_motion.hpp"
+#include "flightlog/readings.hpp"
 #include "io/installation.hpp"
 #include "sim/replay.hpp"
 #include "view/results.hpp"
@@ -110,6 +111,36 @@ double step_of(const Column& values) {
   double most = 0;
   for (const double x : values) most = std::max(most, std::abs(x));
   return most > 0 ? 1e-5 * std::pow(10, std::ceil(std::log10(most))) : 1;
+}
+
+/// Takes the poses out of a log whose markers were taken for others; where they were, as stretches from pose to pose.
+Json take_swapped(FlightLog& log, Packing& packing, Json& notes) {
+  flightlog::MocapStream& m = log.mocap;
+  std::vector<char> swapped = flightlog::swapped_poses(log);
+  const std::size_t n = swapped.size();
+  const std::array<Column*, 8> columns = {&m.t_s, &m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz};
+  for (std::size_t i = 1; i < n; ++i)  // what repeats such a pose is none either
+    if (swapped[i - 1] &&
+        std::ranges::all_of(columns, [&](const Column* c) { return c == &m.t_s || (*c)[i] == (*c)[i - 1]; }))
+      swapped[i] = 1;
+  const auto count = static_cast<std::size_t>(std::ranges::count(swapped, 1));
+  if (count == 0 || count + 2 > n) return nullptr;
+  Column begin_s, end_s;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!swapped[i]) continue;
+    if (i == 0 || !swapped[i - 1]) begin_s.push_back(m.t_s[i]), end_s.push_back(0);
+    end_s.back() = m.t_s[i];
+  }
+  for (Column* c : columns) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < n; ++i)
+      if (!swapped[i]) (*c)[kept++] = (*c)[i];
+    c->resize(kept);
+  }
+  notes.push_back(
+      std::to_string(count) + " of " + std::to_string(n) +
+      " poses are left out, whose markers were taken for others: grey in the plots of position and attitude");
+  return {{"begin_s", packing.add(begin_s, step::kTime_s)}, {"end_s", packing.add(end_s, step::kTime_s)}};
 }
 
 Json json_of(const flightlog::LogAmbient& a) {
@@ -278,19 +309,20 @@ Section flight_section(const std::vector<fs::path>& folders, const FlightOptions
   std::vector<ShownFlight> flights;
   for (const fs::path& folder : folders)
     flights.push_back({name_among(folders, folder), folder, flightlog::read_flight_log(folder)});
-  return flight_section(flights, options, packing);
+  return flight_section(std::move(flights), options, packing);
 }
 
-Section flight_section(const std::vector<ShownFlight>& flights, const FlightOptions& options, Packing& packing) {
+Section flight_section(std::vector<ShownFlight> flights, const FlightOptions& options, Packing& packing) {
   check_count(flights.size());
   Json list = Json::array();
-  for (const auto& [name, folder, log] : flights) {
+  for (auto& [name, folder, log] : flights) {
     const model::Vehicle vehicle = vehicle_of(folder, log, options.vehicle);
     const bool winged = !vehicle.beat_averaged, derived = winged && !log.wings && log.command.declared.empty();
     Json notes = Json::array();
+    const flightlog::ImuStream path = winged ? flightlog::ImuStream() : force_of_path(log, vehicle, folder);
+    const Json swapped = take_swapped(log, packing, notes);
     Json streams = streams_of(log, derived ? derived_wings(log, vehicle) : log.wings, packing, notes);
     if (!winged) {
-      const flightlog::ImuStream path = force_of_path(log, vehicle, folder);
       streams["path"] = packed("path",
                                {{"t_s", path.t_s, step::kTime_s},
                                 {"accel_x_m_s2", path.accel_x_m_s2, step::kForce_m_s2},
@@ -310,6 +342,7 @@ Section flight_section(const std::vector<ShownFlight>& flights, const FlightOpti
                                           : "still"},
                     {"latency_s", latency_of(log.header)},
                     {"streams", streams},
+                    {"swapped", swapped},
                     {"notes", notes}});
   }
   std::vector<std::string> sources;

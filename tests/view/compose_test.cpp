@@ -173,6 +173,29 @@ TEST(FlightSection, HasTheStreamsTheVehicleAndTheGoal) {
   EXPECT_TRUE(f.at("notes").empty());
 }
 
+TEST(FlightSection, LeavesOutPosesWhoseMarkersWereTakenForOthers) {
+  flightlog::FlightLog log = hover();
+  flightlog::MocapStream& m = log.mocap;
+  for (const std::size_t i : {60, 61, 62, 120}) m.x_m[i] += 0.5;
+  for (flightlog::Column* c : {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz}) (*c)[63] = (*c)[62];  // lost
+  Packing packing;
+  const Section section = flight_section({{"flight", "", log}}, {}, packing);
+  const Json f = section.json().at("blocks")[0].at("flights")[0];
+  EXPECT_EQ(f.at("streams").at("mocap").at("x_m").at("count"), 195);
+  EXPECT_EQ(f.at("swapped").at("begin_s").at("count"), 2);
+  EXPECT_EQ(f.at("notes")[0],
+            "5 of 200 poses are left out, whose markers were taken for others: grey in the plots of position and "
+            "attitude");
+  for (const Series& s : section.figures()[0].series)
+    for (const double x : s.y) EXPECT_LT(std::abs(x), 0.51) << s.name;  // on paper neither
+  EXPECT_TRUE(flight_section({{"flight", "", hover()}}, {}, packing)
+                  .json()
+                  .at("blocks")[0]
+                  .at("flights")[0]
+                  .at("swapped")
+                  .is_null());
+}
+
 /// Six seconds of hover, of a robot that declares its inputs and has neither IMU nor beat.
 flightlog::FlightLog of_inputs() {
   flightlog::FlightLog log;

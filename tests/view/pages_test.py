@@ -273,6 +273,38 @@ def check_declared(browser: Browser) -> None:
     assert "ellipsoid of its mass and inertia" in browser.run("return document.querySelector('.player').textContent")
 
 
+def swap_markers(flight: Path, first: int, last: int) -> None:
+    """Poses that leap away and back."""
+    lines = (flight / "mocap.csv").read_text().splitlines()
+    for row in range(first + 1, last + 2):
+        cells = lines[row].split(",")
+        lines[row] = ",".join([cells[0], str(float(cells[1]) + 1), *cells[2:]])
+    (flight / "mocap.csv").write_text("\n".join(lines) + "\n")
+
+
+def check_swapped(browser: Browser) -> None:
+    """Poses whose markers were taken for others are a mark, and no jump of the robot: rows 1000 to 1004 of 100 Hz."""
+    path = browser.run("return [9.98, 10.0, 10.02, 10.04, 10.06].map((t) => players[0].flights[0].positionAt(t)[0])")
+    assert max(path) - min(path) < 0.2, f"the robot jumps: {path}"
+    assert "5 of 3000 poses are left out" in browser.run("return document.querySelector('.player').textContent")
+    browser.run("players[0].timeline.show(1)")
+    browser.run("players[0].seek(10.2)")
+    grey = """
+    const inside = {};
+    for (const plot of players[0].timeline.plots) for (const t of [10.02, 10.06]) {
+      const {x} = plot.chart.scales, {top, bottom} = plot.chart.chartArea, ratio = plot.chart.currentDevicePixelRatio;
+      const copy = document.createElement("canvas"), pen = copy.getContext("2d", {willReadFrequently: true});
+      [copy.width, copy.height] = [plot.canvas.width, plot.canvas.height];
+      pen.drawImage(plot.canvas, 0, 0);
+      const shades = pen.getImageData(Math.round(x.getPixelForValue(t) * ratio), top * ratio, 1, (bottom - top) * ratio).data;
+      let marked = 0;
+      for (let k = 0; k < shades.length; k += 4) marked += shades[k] === 0xaf && shades[k + 3] === 255;
+      (inside[plot.element.dataset.panel] ??= []).push(marked > 0.8 * (bottom - top) * ratio);
+    }
+    return inside;"""
+    assert browser.run(grey) == {"position": [True, False], "attitude": [True, False], "path": [False, False], "declared_0": [False, False]}, browser.run(grey)
+
+
 def check_notebook(browser: Browser, page: Path) -> None:
     """The page lives in the frame that flappy.show gives a notebook, and can reach nothing of it."""
     sys.modules["flappy"], sys.modules["flappy._core"] = types.ModuleType("flappy"), types.ModuleType("flappy._core")
@@ -367,6 +399,10 @@ def main() -> None:
         check_page(browser, "flight of declared inputs")
         check_declared(browser)
         check_screen(browser, "declared")
+        swap_markers(beats[0], 1000, 1004)
+        browser.open(report("swapped", beats[0]))
+        check_page(browser, "flight of swapped markers")
+        check_swapped(browser)
 
         browser.open(report("benchmark", DATA / "score.csv"))
         check_page(browser, "benchmark")

@@ -122,7 +122,7 @@ test("a flight is what its log has", () => {
   const side = {shoulder_m: [0, 0, 0], outline_m: [[0.07, 0]]};
   const json = {name: "f", declared: "v", flapping_Hz: 34, gravity_m_s2: 9.81, wings: "recorded", notes: [], latency_s: {mocap: 0.03, imu: 0},
     vehicle: {name: "v", mass_kg: 0.012, left: side, right: side}, ambient: {ground_z_m: 0, ceiling_z_m: 9, walls: []},
-    streams: {
+    swapped: columns({begin_s: [10.25], end_s: [10.3]}), streams: {
       mocap: columns({t_s: t, x_m: t.map((s) => 0.5 * (s - 10)), y_m: same(0), z_m: same(1), qw: same(Math.SQRT1_2), qx: same(0), qy: same(0), qz: same(Math.SQRT1_2)}),
       imu: columns({t_s: t, gyro_x_rad_s: same(0), gyro_y_rad_s: same(0), gyro_z_rad_s: same(0), accel_x_m_s2: same(1), accel_y_m_s2: same(0), accel_z_m_s2: same(9.81)}),
       command: columns({t_s: t, left_voltage_V: same(9), right_voltage_V: same(8)}),
@@ -130,6 +130,8 @@ test("a flight is what its log has", () => {
   const flight = new Flight(json, Uint8Array.from(packer.bytes));
   near(flight.duration_s, 1, 1e-6);
   near(flight.positionAt(0.5), [0.25, 0, 1], 1e-5);
+  near(flight.swapped.flat(), [0.25, 0.3], 1e-9);
+  assert.deepEqual(flight.panels().filter((panel) => panel.left_out).map((panel) => panel.id), ["position", "attitude"]);
   near(flight.velocityAt(0.5), [0.5, 0, 0], 1e-3);
   near(flight.forceAt(0.5), [0, 0.012, 0.012 * 9.81], 1e-5);  // forward of B is y of W
   near(flight.wingsAt(0.5), [0.1, 0.2, 0.3, 0.4], 1e-5);

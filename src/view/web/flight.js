@@ -8,9 +8,10 @@ import {meanBetween, placeOf, runningSums, unwrapped, valueAt} from "./series.js
  * @typedef {import("./geometry.js").Vehicle} Vehicle
  * @typedef {{ground_z_m: number, ceiling_z_m: number, walls: number[][]}} Ambient
  * @typedef {{name: string, declared: string, flapping_Hz: number, gravity_m_s2: number, vehicle: Vehicle, ambient: Ambient,
- *   wings: string, latency_s: Record<string, number>, streams: Record<string, Record<string, Packed>>, notes: string[]}} FlightJson
+ *   wings: string, latency_s: Record<string, number>, streams: Record<string, Record<string, Packed>>,
+ *   swapped: {begin_s: Packed, end_s: Packed} | null, notes: string[]}} FlightJson
  * @typedef {{name: string, colour: string, times: Float64Array, values: Float64Array}} Line
- * @typedef {{id: string, title: string, unit: string, shown: boolean, lines: Line[]}} Panel
+ * @typedef {{id: string, title: string, unit: string, shown: boolean, lines: Line[], left_out?: number[][]}} Panel left_out: from when to when
  */
 
 const kDegrees = 180 / Math.PI;
@@ -39,6 +40,10 @@ export class Flight {
       const shift = begin + (json.latency_s[stream] ?? 0);
       columns.t_s = columns.t_s.map((t) => t - shift);
     }
+    const arrival = begin + (json.latency_s.mocap ?? 0);
+    const [from, to] = json.swapped ? [json.swapped.begin_s, json.swapped.end_s].map((packed) => unpackedColumn(bytes, packed)) : [[], []];
+    /** Stretches of time without poses, since their markers were taken for others. */
+    this.swapped = Array.from(from, (t, k) => [t - arrival, to[k] - arrival]);
     const m = this.streams.mocap;
     this.duration_s = m.t_s[m.t_s.length - 1];
     /** Of the path where there is such, for it has no beat to take the mean of. */
@@ -99,6 +104,7 @@ export class Flight {
       return {id, title, unit, shown, lines: there.map(([name, values], k) => ({name, colour: colours[k], times, values}))};
     };
     const degrees = (/** @type {Float64Array} */ list) => list.map((angle) => angle * kDegrees);
+    /** @type {Panel[]} */
     const list = [
       panel("position", "Position", "m", true, m.t_s, [["x", m.x_m], ["y", m.y_m], ["z", m.z_m]]),
       panel("attitude", "Attitude", "deg", true, m.t_s,
@@ -132,6 +138,7 @@ export class Flight {
       list.push(panel("battery", "Battery", "V", false, s.power.t_s, [["battery", s.power.battery_V]]));
       list.push(panel("currents", "Currents", "A", false, s.power.t_s, [["left", s.power.left_current_A], ["right", s.power.right_current_A]]));
     }
+    list.slice(0, 2).forEach((each) => { each.left_out = this.swapped; });
     return list.filter((each) => each.lines.length > 0);
   }
 }

@@ -21,6 +21,7 @@ class Plot {
   constructor(panel, beside, seek, zoom) {
     this.lines = panel.lines.map((line) => ({line, dashed: false}));
     if (beside) this.lines.push(...beside.lines.map((line) => ({line, dashed: true})));
+    this.left_out = panel.left_out ?? [];
     this.values = this.lines.map(() => element("span", {class: "value"}));
     const names = this.lines.map(({line, dashed}, k) => {
       const swatch = element("span", {class: dashed ? "swatch dashed" : "swatch", style: `--colour: ${line.colour}`});
@@ -59,7 +60,7 @@ class Plot {
   drawn() {
     const font = {family: kFont, size: 11};
     return new Chart(this.canvas, {
-      type: "scatter", data: {datasets: []},
+      type: "scatter", data: {datasets: []}, plugins: [{id: "leftOut", beforeDatasetsDraw: (/** @type {any} */ chart) => this.shade(chart)}],
       options: {
         animation: false, responsive: true, maintainAspectRatio: false, parsing: false, normalized: true, events: [],
         datasets: {scatter: {showLine: true, pointRadius: 0}},
@@ -72,6 +73,22 @@ class Plot {
         },
       },
     });
+  }
+
+  /**
+   * Grey where there is nothing to be seen.
+   * @param {any} chart
+   */
+  shade(chart) {
+    const {ctx, scales: {x}, chartArea: {left, right, top, bottom}} = chart;
+    ctx.save();
+    ctx.fillStyle = "#afb8c1";
+    for (const [from, to] of this.left_out) {
+      if (to < x.min || from > x.max) continue;
+      const begin = Math.max(left, x.getPixelForValue(from) - 1), end = Math.min(right, x.getPixelForValue(to) + 1);
+      ctx.fillRect(begin, top, end - begin, bottom - top);
+    }
+    ctx.restore();
   }
 
   /** @param {number} t_s */
