@@ -8,6 +8,8 @@
 #include <numeric>
 
 #include "flightlog/import/clock.hpp"
+#include "flightlog/import/sources.hpp"
+#include "io/log.hpp"
 #include "io/statistics.hpp"
 
 namespace flappy::flightlog {
@@ -449,6 +451,20 @@ std::string report_text(const ImportReport& report) {
   return text;
 }
 
+Imported import_recording(const std::vector<std::filesystem::path>& files, const Mapping& mapping,
+                          const std::filesystem::path& out) {
+  Channels channels(mapping.wanted());
+  std::vector<std::string> warnings;
+  for (const std::filesystem::path& file : files) read_source(file, channels, warnings);
+  Imported imported = assemble(channels, mapping);
+  for (const std::string& warning : imported.report.warnings)
+    warnings.push_back(mapping.file.string() + ": " + warning);
+  for (const std::string& warning : warnings) io::log(io::LogLevel::warning, warning);
+  imported.report.warnings = std::move(warnings);
+  write_flight_log(out, imported.log);
+  return imported;
+}
+
 nlohmann::ordered_json json_of(const ImportReport& report) {
   using Json = nlohmann::ordered_json;
   Json streams = Json::array(), clocks = Json::array();
@@ -471,7 +487,7 @@ nlohmann::ordered_json json_of(const ImportReport& report) {
                       {"measured", c.measured},
                       {"stamps", c.stamps},
                       {"span_s", c.span_s}});
-  return {{"start_ns", report.start_ns}, {"streams", streams}, {"clocks", clocks}};
+  return {{"start_ns", report.start_ns}, {"streams", streams}, {"clocks", clocks}, {"warnings", report.warnings}};
 }
 
 }  // namespace flappy::flightlog

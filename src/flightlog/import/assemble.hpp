@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -37,7 +38,7 @@ struct ImportReport {
   std::int64_t start_ns = 0;  ///< the log's 0 s by the receiver's clock
   std::vector<StreamReport> streams;
   std::vector<ClockReport> clocks;
-  std::vector<std::string> warnings;  ///< of power, wings and attitude that are not recorded
+  std::vector<std::string> warnings;  ///< of what was left out, and of power, wings and attitude that are not recorded
 };
 
 struct Imported {
@@ -48,6 +49,10 @@ struct Imported {
 /// InputError, at the mapping's own line, for a channel or a field that is not there and for times that cannot be had. The log
 /// is one that write_flight_log() looks at once more.
 Imported assemble(const Channels& channels, const Mapping& mapping);
+
+/// Reads the files of one recording (sources.hpp), notes its warnings and writes its flight log; InputError before anything is written.
+Imported import_recording(const std::vector<std::filesystem::path>& files, const Mapping& mapping,
+                          const std::filesystem::path& out);
 
 /// What --json holds.
 nlohmann::ordered_json json_of(const ImportReport& report);

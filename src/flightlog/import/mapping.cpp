@@ -199,6 +199,7 @@ Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::s
   for (const StreamKeys& keys : kStreams) accepted.push_back(keys.name);
   root.accept(accepted);
   Mapping m;
+  m.file = path;
   FlightHeader& h = m.header;
   h.vehicle = root.string("vehicle");
   h.vehicle_sha256 = root.string_or("vehicle_sha256", "");

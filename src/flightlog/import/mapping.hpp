@@ -107,6 +107,7 @@ struct StreamMapping {
 inline const std::string kReceiver = "receiver";
 
 struct Mapping {
+  std::filesystem::path file;
   FlightHeader header;  ///< rates that are measured are 0
   bool from_first = true;
   std::map<std::string, double> offsets_s;  ///< of clocks, where given

@@ -7,11 +7,9 @@
 #include <optional>
 #include <set>
 
-#include "flightlog/import/sources.hpp"
 #include "flightlog/ros/mcap.hpp"
 #include "flightlog/ros/messages.hpp"
 #include "flightlog/ros/type_hash.hpp"
-#include "io/log.hpp"
 #include "io/progress.hpp"
 #include "server/dds/participant.hpp"
 
@@ -138,18 +136,11 @@ class Recording {
 Recorded record(const io::DdsConfig& dds, const Mapping& mapping, const RecordOptions& options) {
   if (options.out.has_parent_path()) io::make_folder(options.out.parent_path());
   Recorded recorded = Recording(dds, mapping, options).run();
-  Channels channels(mapping.wanted());
-  std::vector<std::string> warnings;
-  read_source(recorded.mcap, channels, warnings);
   try {
-    const Imported imported = assemble(channels, mapping);
-    recorded.report = imported.report;
-    write_flight_log(options.out, imported.log);
+    recorded.report = import_recording({recorded.mcap}, mapping, options.out).report;
   } catch (const io::InputError& error) {
     throw io::InputError(std::string(error.what()) + "; the messages are in " + recorded.mcap.string());
   }
-  for (const auto* list : {&warnings, &recorded.report.warnings})
-    for (const std::string& warning : *list) io::log(io::LogLevel::warning, warning);
   return recorded;
 }
 
