@@ -121,7 +121,7 @@ class _Pen:
             return
         wide = max(FINE, round(wide_m * self.focal / seen[ahead, 2].mean())) if wide_m > 0 else FINE
         if ahead.all():
-            self.ink.line(self.at(seen).ravel().tolist(), colour, wide, "curve" if wide > FINE else None)
+            self.ink.line(self.at(seen).ravel().tolist(), colour, wide, "curve" if wide > 4 * FINE else None)
             return
         for a, b in pairwise(seen):
             if max(a[2], b[2]) <= NEAR_M:
@@ -265,9 +265,13 @@ def draw(
         pen.line(np.vstack([circle, circle[:2]]) + goal, GOAL, 0.0032)
         pen.dot(goal, 0.004, GOAL)
         names.append((np.add(goal, (0, 0, 0.06)), "goal", GOAL_TEXT))
+    along = scale * VELOCITY_ARROW_S * np.asarray(pose.get("velocity_m_s", np.zeros(3)), float)
+    behind = pen.view[2] @ along > 0
+    if behind:
+        pen.arrow(position, along, VELOCITY)
     _draw_robot(pen, scene["vehicle"], pose)
-    if "velocity_m_s" in pose:
-        pen.arrow(position, scale * VELOCITY_ARROW_S * np.asarray(pose["velocity_m_s"], float), VELOCITY)
+    if not behind:
+        pen.arrow(position, along, VELOCITY)
 
     image = pen.image.reduce(FINE)
     ink = ImageDraw.Draw(image)

@@ -409,6 +409,12 @@ def main() -> None:
         check_cases(browser)
         check_screen(browser, "benchmark")
 
+        browser.open(report("reported", SOURCE / "docs" / "blind_reported.csv"))
+        check_page(browser, "reported benchmark")
+        rows = len((SOURCE / "docs" / "blind_reported.csv").read_text().splitlines()) - 1
+        told = browser.run("return document.querySelector('.cases').textContent")
+        assert f"{rows} of {rows} cases" in told, told[:200]
+
         browser.open(report("run", WORK / "runs"))
         check_page(browser, "run")
         check_numbers(browser, {run.name: json.loads((run / "summary.json").read_text()) for run in (WORK / "runs").glob("seed_*")}, 10)
