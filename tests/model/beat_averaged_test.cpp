@@ -107,11 +107,11 @@ TEST_F(Refusal, SaysWhatAndWhere) {
   EXPECT_EQ(edited("input = \"left_flap\"", "input = \"left_flop\"").rfind("actuator.left_Hz.input: ", 0), 0U);
   EXPECT_EQ(edited("role = \"flapping\"", "role = \"flap\"").rfind("actuator.left_Hz.role: ", 0), 0U);
   EXPECT_EQ(edited("thrust_N_Hz * (left_Hz", "thrust_N_Hz * (left_hz")
-                .rfind("wrench.wings.force_z_N: nothing is called \"left_hz\"", 0),
+                .rfind("wrench.both.moment_y_Nm: nothing is called \"left_hz\"", 0),
             0U);
   EXPECT_EQ(edited("bandwidth_Hz = 3.0", "bandwidth_Hz = 10.0").rfind("beat.bandwidth_Hz: ", 0), 0U);
   EXPECT_EQ(edited("[actuator.left_Hz]", "[actuator.v_x]").rfind("actuator.v_x: something else has this name", 0), 0U);
-  EXPECT_EQ(edited("[wrench.wings]", "[effects.wing_damage]\n[wrench.wings]")
+  EXPECT_EQ(edited("[wrench.both]", "[effects.wing_damage]\n[wrench.both]")
                 .rfind("effects.wing_damage: unknown effect; accepted: com_offset,", 0),
             0U);
   EXPECT_EQ(edited("\"beat_averaged\"", "\"beat\"").rfind("model: ", 0), 0U);
