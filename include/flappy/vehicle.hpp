@@ -99,6 +99,7 @@ struct Posterior {
 /// A robot whose wings are not modelled: what acts on it as means over beats, from its inputs and its motion
 /// (src/model/beat_averaged.hpp). Its torso is all of it; sides and driver say nothing.
 struct BeatAveraged {
+  bool predicted = false;        ///< force and moment stand in a file of each flight; then there are no wrenches
   double nominal_Hz = 0;         ///< beats, about
   double bandwidth_Hz = 0;       ///< up to which force and motion are compared, well below the beat
   bool compares_moments = true;  ///< with flights; forces always
@@ -124,6 +125,7 @@ struct BeatAveraged {
   struct Coefficient {  ///< a named number of the expressions, and how well it is known, 0: exactly
     std::string name;
     double value = 0, sd = 0;
+    double predicted_at = 0;  ///< what a simulator took for it
   };
   std::vector<Coefficient> coefficients;
   std::vector<Wrench> wrenches;

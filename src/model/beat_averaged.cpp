@@ -12,8 +12,6 @@ namespace flappy::model {
 namespace {
 
 constexpr const char* kMotionNames[kMotionVariables] = {"v_x", "v_y", "v_z", "speed", "w_x", "w_y", "w_z", "battery"};
-constexpr const char* kTermKeys[] = {"force_x_N",   "force_y_N",   "force_z_N",
-                                     "moment_x_Nm", "moment_y_Nm", "moment_z_Nm"};
 constexpr const char* kMixKeys[] = {"amplitude", "difference", "bias", "split_cycle"};
 constexpr const char* kRoles[] = {"flapping", "stroke_plane", "other"};
 constexpr const char* kAccepted =
@@ -185,6 +183,10 @@ MeanWrench::MeanWrench(const BeatAveraged& vehicle) {
   has_moments_ = std::ranges::any_of(products_, [](const Product& p) { return p.component >= 3; });
 }
 
+MeanWrench::MeanWrench(std::vector<Product> products)
+    : products_(std::move(products)),
+      has_moments_(std::ranges::any_of(products_, [](const Product& p) { return p.component >= 3; })) {}
+
 MeanLoad MeanWrench::at(std::span<const double> variables) const {
   MeanLoad load;
   for (const Product& p : products_) {
@@ -195,28 +197,30 @@ MeanLoad MeanWrench::at(std::span<const double> variables) const {
   return load;
 }
 
-BeatAveraged read_beat_averaged(const io::Table& root) {
+BeatAveraged read_beat_averaged(const io::Table& root, bool predicted) {
   BeatAveraged v;
+  v.predicted = predicted;
   const io::Table beat = root.table("beat");
   v.nominal_Hz = beat.number("nominal_Hz", {1e-3, 1e4});
   v.bandwidth_Hz = beat.number("bandwidth_Hz", {1e-3, v.nominal_Hz / 2});
   v.compares_moments = beat.boolean_or("compares_moments", true);
   const io::Range any{-kLargest, kLargest};
-  const io::Table inputs = root.table("input");
-  for (const std::string& name : inputs.keys()) {
-    const io::Table t = inputs.table(name);
+  const auto each = [&](const char* key, const auto& read) {
+    if (predicted && !root.has(key)) return;
+    const io::Table all = root.table(key);
+    for (const std::string& name : all.keys()) read(all, name, all.table(name));
+  };
+  each("input", [&](const io::Table&, const std::string& name, const io::Table& t) {
     const double low = t.number("low", any);
     BeatAveraged::Input input{name, low, t.number("high", {low, kLargest})};
     input.neutral = t.number_or("neutral", std::clamp(0.0, low, input.high), {low, input.high});
     for (std::size_t k = 0; k < input.mix.size(); ++k) input.mix[k] = t.number_or(kMixKeys[k], 0, any);
     v.inputs.push_back(std::move(input));
-  }
+  });
   std::vector<std::string> columns;
   for (const BeatAveraged::Input& i : v.inputs) columns.push_back(i.name);
-  const io::Table actuators = root.table("actuator");
-  for (const std::string& name : actuators.keys()) {
+  each("actuator", [&](const io::Table& actuators, const std::string& name, const io::Table& t) {
     check_name(actuators, name, v);
-    const io::Table t = actuators.table(name);
     BeatAveraged::Actuator a{name, t.choice("input", columns)};
     const std::string role = t.choice("role", {std::begin(kRoles), std::end(kRoles)});
     a.role = static_cast<BeatAveraged::Role>(std::ranges::find(kRoles, role) - std::begin(kRoles));
@@ -224,34 +228,35 @@ BeatAveraged read_beat_averaged(const io::Table& root) {
     a.offset = t.number_or("offset", 0, any);
     a.lag_s = t.number_or("lag_s", 0, {0, kLongestLag_s});
     v.actuators.push_back(std::move(a));
-  }
-  if (v.actuators.empty() || v.actuators.size() > kMostActuators)
+  });
+  if ((v.actuators.empty() && !predicted) || v.actuators.size() > kMostActuators)
     root.fail("actuator", v.actuators.empty() ? "there is none" : "there are too many",
               "1 to " + std::to_string(kMostActuators) + " tables [actuator.NAME]");
   if (const auto coefficients = root.optional_table("coefficients"))
     for (const std::string& name : coefficients->keys()) {
       check_name(*coefficients, name, v);
       const bool known = coefficients->has(name + ".value");
-      v.coefficients.push_back({name, coefficients->number(known ? name + ".value" : name, any),
-                                known ? coefficients->number(name + ".sd", {0, kLargest}) : 0});
+      BeatAveraged::Coefficient c{name, coefficients->number(known ? name + ".value" : name, any)};
+      if (known) c.sd = coefficients->number(name + ".sd", {0, kLargest});
+      if (predicted) c.predicted_at = known ? coefficients->number_or(name + ".predicted_at", c.value, any) : c.value;
+      v.coefficients.push_back(std::move(c));
     }
-  const io::Table wrenches = root.table("wrench");
-  for (const std::string& name : wrenches.keys()) {
-    const io::Table t = wrenches.table(name);
+  if (predicted) return v;
+  each("wrench", [&](const io::Table& wrenches, const std::string& name, const io::Table& t) {
     BeatAveraged::Wrench w{name, {}, {}};
     const io::Range near{-kFarthest_m, kFarthest_m};
     if (t.has("at_m")) w.at_m = {t.number("at_m.x", near), t.number("at_m.y", near), t.number("at_m.z", near)};
     bool any_term = false;
     for (std::size_t k = 0; k < w.terms.size(); ++k) {
-      w.terms[k] = t.string_or(kTermKeys[k], "");
+      w.terms[k] = t.string_or(kLoadNames[k], "");
       if (w.terms[k].empty()) continue;
       any_term = true;
-      if (const auto fault = expression_fault(w.terms[k], v)) t.fail(kTermKeys[k], fault->what, fault->accepted);
+      if (const auto fault = expression_fault(w.terms[k], v)) t.fail(kLoadNames[k], fault->what, fault->accepted);
     }
     if (!any_term)
-      wrenches.fail(name, "has no force and no moment", io::joined({std::begin(kTermKeys), std::end(kTermKeys)}));
+      wrenches.fail(name, "has no force and no moment", io::joined({kLoadNames.begin(), kLoadNames.end()}));
     v.wrenches.push_back(std::move(w));
-  }
+  });
   return v;
 }
 
@@ -276,6 +281,7 @@ std::string beat_averaged_text(const BeatAveraged& v) {
   for (const BeatAveraged::Coefficient& c : v.coefficients) {
     number("coefficients." + c.name + ".value", c.value);
     number("coefficients." + c.name + ".sd", c.sd);
+    if (v.predicted && c.predicted_at != c.value) number("coefficients." + c.name + ".predicted_at", c.predicted_at);
   }
   for (const BeatAveraged::Wrench& w : v.wrenches) {
     if (w.at_m.x != 0 || w.at_m.y != 0 || w.at_m.z != 0) {
@@ -284,7 +290,7 @@ std::string beat_averaged_text(const BeatAveraged& v) {
       number("wrench." + w.name + ".at_m.z", w.at_m.z);
     }
     for (std::size_t k = 0; k < w.terms.size(); ++k)
-      if (!w.terms[k].empty()) line("wrench." + w.name + "." + kTermKeys[k], io::toml_string(w.terms[k]));
+      if (!w.terms[k].empty()) line("wrench." + w.name + "." + kLoadNames[k], io::toml_string(w.terms[k]));
   }
   return text;
 }

@@ -17,6 +17,13 @@
 //   v_x v_y v_z   velocity of the torso's origin in the air, in B, m/s      speed   its length
 //   w_x w_y w_z   body rates in B, rad/s                                    battery  voltage over the nominal one, 1 where it is not known
 // so every force is a sum of products.
+//
+// Where somebody's own simulator says what acts on it, model = "predicted" takes the place of all [wrench]: force and moment of a flight, and
+// their derivatives by the coefficients, stand in its folder (gap/replay/predicted_loads.hpp). Then
+//
+//   [coefficients]                           # drag_N_s_m = { value = 0.02, sd = 0.01, predicted_at = 0.02 }: of predicted_at, value unless it
+//                                            #   is there, are the forces; a diagnosis that corrects value leaves it
+//   [input], [actuator]                      # may be left out: they say how fast wings flap and how their plane tilts, for effects that ask
 #pragma once
 
 #include <array>
@@ -46,16 +53,16 @@ class MeanWrench {
  public:
   /// std::invalid_argument for a vehicle whose expressions are none; read_vehicle() refuses those by line and column.
   explicit MeanWrench(const BeatAveraged& vehicle);
-
-  /// `variables`: the actuators in their order, then the motion variables.
-  MeanLoad at(std::span<const double> variables) const;
-  bool has_moments() const { return has_moments_; }
-
   struct Product {
     std::size_t component;  ///< of force, then moment
     double factor;
     std::vector<std::size_t> variables;
   };
+  explicit MeanWrench(std::vector<Product> products);
+
+  /// `variables`: the actuators in their order, then the motion variables.
+  MeanLoad at(std::span<const double> variables) const;
+  bool has_moments() const { return has_moments_; }
   /// In the order of the file: vehicles of the same expressions have the same but for factors.
   const std::vector<Product>& products() const { return products_; }
 
@@ -70,8 +77,12 @@ struct ExpressionFault {
 };
 std::optional<ExpressionFault> expression_fault(std::string_view text, const BeatAveraged& vehicle);
 
-/// Reads the tables beat, input, actuator, coefficients and wrench of a vehicle's file.
-BeatAveraged read_beat_averaged(const io::Table& root);
+/// force_x_N to moment_z_Nm: what the components of a load are called in files.
+inline constexpr std::array<const char*, 6> kLoadNames = {"force_x_N",   "force_y_N",   "force_z_N",
+                                                          "moment_x_Nm", "moment_y_Nm", "moment_z_Nm"};
+
+/// Reads the tables beat, input, actuator, coefficients and, unless it is `predicted`, wrench of a vehicle's file.
+BeatAveraged read_beat_averaged(const io::Table& root, bool predicted);
 /// Reads back the same.
 std::string beat_averaged_text(const BeatAveraged& vehicle);
 

@@ -22,13 +22,16 @@ void read_effects(const io::Table& table, Vehicle& vehicle) {
   for (const std::string& id : table.keys()) {
     const EffectEntry* effect = find_effect(vehicle, id);
     if (effect == nullptr) table.fail(id, "unknown effect", known_effects(id, vehicle));
+    if (effect->mean.drive != nullptr && vehicle.beat_averaged->predicted)
+      table.fail(id, "acts between inputs and wings, which predicted forces have in them",
+                 "effects that act on the vehicle itself");
     const io::Table entry = table.table(id);
     for (const EffectParameter& p : effect->parameters)
       vehicle.effects[id][p.name] = entry.number_or(p.name, p.typical, {p.low, p.high});
   }
 }
 
-const std::string kMultibody = "multibody", kBeatAveraged = "beat_averaged";
+const std::string kMultibody = "multibody", kBeatAveraged = "beat_averaged", kPredicted = "predicted";
 
 }  // namespace
 
@@ -37,10 +40,11 @@ Vehicle read_any_vehicle(const std::filesystem::path& path, const std::vector<st
   root.schema(1);
   Vehicle vehicle;
   std::vector<std::string> keys = {"schema", "name", "model", "effects", "posterior"};
-  if (root.string_or("model", kMultibody) != kMultibody &&
-      root.choice("model", {kMultibody, kBeatAveraged}) == kBeatAveraged) {
-    vehicle.beat_averaged = read_beat_averaged(root);
-    for (const char* key : {"beat", "input", "actuator", "coefficients", "wrench"}) keys.push_back(key);
+  const std::string model = root.choice_or("model", kMultibody, {kMultibody, kBeatAveraged, kPredicted});
+  if (model != kMultibody) {
+    vehicle.beat_averaged = read_beat_averaged(root, model == kPredicted);
+    for (const char* key : {"beat", "input", "actuator", "coefficients"}) keys.emplace_back(key);
+    if (model == kBeatAveraged) keys.emplace_back("wrench");
   }
   for (const Parameter& p : parameters(vehicle)) keys.push_back(p.path.substr(0, p.path.find('.')));
   root.accept(keys);
@@ -53,6 +57,15 @@ Vehicle read_any_vehicle(const std::filesystem::path& path, const std::vector<st
   root.finish();
   if (const std::optional<PhysicalFault> fault = physical_fault(vehicle))
     root.fail(fault->path, fault->what, fault->accepted);
+  return vehicle;
+}
+
+Vehicle read_flyable_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  Vehicle vehicle = read_any_vehicle(path, overrides);
+  if (vehicle.beat_averaged && vehicle.beat_averaged->predicted)
+    io::Config::load(path).root().fail("model",
+                                       "a vehicle whose forces stand in files of recorded flights cannot be flown",
+                                       "\"multibody\" or \"beat_averaged\"; flappy-gap diagnose takes all three");
   return vehicle;
 }
 
@@ -76,7 +89,8 @@ Vehicle read_vehicle_for_steps(const std::filesystem::path& path, double step_s)
 std::string vehicle_text(const Vehicle& vehicle) {
   std::string text = "schema = 1\nname = " + io::toml_string(vehicle.name) + "\n";
   if (vehicle.beat_averaged)
-    text += "model = " + io::toml_string(kBeatAveraged) + "\n" + beat_averaged_text(*vehicle.beat_averaged);
+    text += "model = " + io::toml_string(vehicle.beat_averaged->predicted ? kPredicted : kBeatAveraged) + "\n" +
+            beat_averaged_text(*vehicle.beat_averaged);
   Vehicle copy = vehicle;
   for (const Parameter& p : parameters(copy))
     if ((!p.optional || *p.value != 0) && !p.path.starts_with("coefficients."))

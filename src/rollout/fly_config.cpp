@@ -145,7 +145,7 @@ class Reader {
 
   void read_files() {
     const std::filesystem::path vehicle = root_.file("vehicle");
-    c_.vehicle = for_file("vehicle", [&] { return model::read_any_vehicle(vehicle, to_["vehicle"]); });
+    c_.vehicle = for_file("vehicle", [&] { return model::read_flyable_vehicle(vehicle, to_["vehicle"]); });
     const io::Config vehicle_config = file("vehicle");
     if (c_.vehicle.beat_averaged && c_.vehicle.beat_averaged->inputs.size() > model::kMostInputs)
       vehicle_config.root().fail("input", "there are too many to be flown",

@@ -126,6 +126,66 @@ TEST_F(Refusal, NothingFliesIt) {
   EXPECT_NE(what.find("model: a robot that is known by the beat cannot be flown"), std::string::npos) << what;
 }
 
+// ---- forces of a simulator
+
+const char* const kPredicted = R"(schema = 1
+name = "own"
+model = "predicted"
+air.density_kg_m3 = 1.2
+beat = { nominal_Hz = 15.0, bandwidth_Hz = 3.0 }
+torso.mass_kg = 0.1
+torso.com_m = { x = 0.0, y = 0.0, z = 0.0 }
+torso.inertia_kg_m2 = { xx = 1e-4, yy = 1e-4, zz = 1e-4, xy = 0.0, yz = 0.0, xz = 0.0 }
+extent = { below_m = 0.1, above_m = 0.1, around_m = 0.1 }
+coefficients.drag_N_s_m = { value = 0.02, sd = 0.01 }
+coefficients.lift_N = { value = 1.0, sd = 0.1, predicted_at = 0.9 }
+)";
+
+std::filesystem::path predicted(const std::string& more = "") {
+  const std::filesystem::path file = testing::TempDir() + "/own.toml";
+  std::ofstream(file) << kPredicted << more;
+  return file;
+}
+
+TEST(Predicted, NeedsNoInputsAndNoExpressions) {
+  const Vehicle v = read_any_vehicle(predicted());
+  ASSERT_TRUE(v.beat_averaged && v.beat_averaged->predicted);
+  EXPECT_TRUE(v.beat_averaged->inputs.empty() && v.beat_averaged->actuators.empty());
+  EXPECT_EQ(v.beat_averaged->coefficients[0].predicted_at, 0.02);
+  EXPECT_EQ(v.beat_averaged->coefficients[1].predicted_at, 0.9);
+  const std::string file = testing::TempDir() + "/own_again.toml";
+  std::ofstream(file) << vehicle_text(v);
+  EXPECT_EQ(vehicle_text(read_any_vehicle(file)), vehicle_text(v));
+  EXPECT_EQ(read_any_vehicle(file).beat_averaged->coefficients[1].predicted_at, 0.9);
+}
+
+TEST(Predicted, MaySayHowFastWingsFlap) {
+  const Vehicle v =
+      read_any_vehicle(predicted("input.flap = { low = 0.0, high = 1.0 }\n"
+                                 "actuator.flap_Hz = { input = \"flap\", role = \"flapping\", gain = 25.0 }\n"));
+  EXPECT_EQ(v.beat_averaged->inputs.size(), 1U);
+  EXPECT_EQ(v.beat_averaged->actuators.size(), 1U);
+}
+
+TEST(Predicted, IsRefusedWhereForcesHaveAnotherSourceOrNothingCanFlyThem) {
+  const auto refused = [](const std::function<void()>& read) {
+    const std::string what = test::refusal(read);
+    return what == "accepted" ? what : what.substr(what.find(": ") + 2);
+  };
+  const auto with = [&](const std::string& more) { return refused([&] { read_any_vehicle(predicted(more)); }); };
+  EXPECT_EQ(with("").rfind("accepted", 0), 0U);
+  EXPECT_EQ(with("wrench.wings.force_z_N = \"lift_N\"\n").rfind("wrench: unknown key", 0), 0U);
+  EXPECT_EQ(
+      with("effects.command_delay.delay_s = 0.1\n"),
+      "effects.command_delay: acts between inputs and wings, which predicted forces have in them; accepted: effects "
+      "that act on the vehicle itself");
+  EXPECT_EQ(with("effects.thrust_axis_tilt.x_rad = 0.1\n"), "accepted");
+  EXPECT_EQ(
+      refused([] { read_flyable_vehicle(predicted()); }),
+      "model: a vehicle whose forces stand in files of recorded flights cannot be flown; accepted: \"multibody\" or "
+      "\"beat_averaged\"; flappy-gap diagnose takes all three");
+}
+
 // ---- effects
 
 MeanState<double> state() {

@@ -31,7 +31,7 @@ Job read_job(const std::filesystem::path& path, const std::vector<std::string>& 
   root.schema(1);
   root.accept({"schema", "vehicle", "precision", "count", "seed", "duration_s", "input", "randomisation", "step_s",
                "threads", "world"});
-  const model::Vehicle vehicle = model::read_any_vehicle(root.file("vehicle"));
+  const model::Vehicle vehicle = model::read_flyable_vehicle(root.file("vehicle"));
   // a robot that is known by the beat mixes any numbers
   const model::Driver d = vehicle.beat_averaged ? model::Driver{0, 0, 1e6, 1e6, 1e6, 1e6} : vehicle.driver;
   Job job{vehicle,

@@ -74,7 +74,12 @@ MeanPrediction::MeanPrediction(const std::filesystem::path& folder, flightlog::F
       nominal_(nominal),
       motion_(flightlog::mean_motion(log_, nominal.beat_averaged->bandwidth_Hz, folder)) {
   const model::BeatAveraged& b = *nominal_.beat_averaged;
-  const bool moments = model::MeanWrench(b).has_moments();
+  if (b.predicted) {
+    predicted_ =
+        read_predicted_loads(folder / "predicted.csv", b, motion_, std::max(motion_.begin_s, log_.command.t_s.front()),
+                             std::min(motion_.t_s(motion_.size() - 1), log_.command.t_s.back()));
+  }
+  const bool moments = wrench_of(b).has_moments();
   for (int channel = 0; channel <= kForceZ; ++channel)
     shown_[static_cast<std::size_t>(channel)] =
         (channel >= kForceX || moments) &&
@@ -94,6 +99,7 @@ MeanPrediction::MeanPrediction(const std::filesystem::path& folder, flightlog::F
                              io::shortest_digits(i.low) + " to " + io::shortest_digits(i.high));
     inputs_.push_back(on_grid(log_.command.t_s, column, 0, motion_));
   }
+  for (PredictedColumn& c : predicted_) inputs_.push_back(std::move(c.values));
   battery_.assign(motion_.size(), 1);
   if (log_.power) {
     battery_ = on_grid(log_.power->t_s, log_.power->battery_V, log_.header.power->latency_s, motion_);
@@ -126,6 +132,20 @@ Rows MeanPrediction::rows_of(const flightlog::MeanMotion& motion) const {
       rows[row(j, kTorqueX + k)] = motion.turning_rad_s2[rows_[j]][k];
     }
   return rows;
+}
+
+model::MeanWrench MeanPrediction::wrench_of(const model::BeatAveraged& vehicle) const {
+  if (!vehicle.predicted) return model::MeanWrench(vehicle);
+  std::vector<model::MeanWrench::Product> products;
+  for (const PredictedColumn& c : predicted_) {
+    double factor = 1;
+    if (c.coefficient) {
+      const model::BeatAveraged::Coefficient& known = vehicle.coefficients[*c.coefficient];
+      factor = known.value - known.predicted_at;
+    }
+    products.push_back({c.component, factor, {vehicle.actuators.size() + model::kMotionVariables + products.size()}});
+  }
+  return model::MeanWrench(std::move(products));
 }
 
 const MeanPrediction::Driven& MeanPrediction::driven(std::size_t input, double delay_s, double lag_s) const {
@@ -172,15 +192,19 @@ Rows MeanPrediction::predict(const Candidate& candidate) const {
   model::MeanDrive<double> drive;
   for (const Acting& a : acting) {
     if (a.entry->change != nullptr) a.entry->change(a.values.data(), v);
-    if (a.entry->mean.drive != nullptr) a.entry->mean.drive(a.values.data(), drive);
+    if (a.entry->mean.drive != nullptr && !b.predicted) a.entry->mean.drive(a.values.data(), drive);
   }
-  const model::MeanWrench wrench(b);
+  const model::MeanWrench wrench = wrench_of(b);
   std::vector<const Driven*> driven_by;
   for (const model::BeatAveraged::Actuator& a : b.actuators) {
     const auto input = std::ranges::find(b.inputs, a.input, &model::BeatAveraged::Input::name) - b.inputs.begin();
     driven_by.push_back(
         &driven(static_cast<std::size_t>(input), drive.delay_s - candidate.lag_s, a.lag_s + drive.lag_s));
   }
+  // inputs were late, and so is what was predicted of them
+  std::vector<const Driven*> loads;
+  for (std::size_t k = 0; k < predicted_.size(); ++k)
+    loads.push_back(&driven(b.inputs.size() + k, -candidate.lag_s, 0));
   const Vec com{v.torso.com_m.x, v.torso.com_m.y, v.torso.com_m.z};
   const model::InertiaTensor& i = v.torso.inertia_kg_m2;
   Eigen::Matrix3d inertia;
@@ -189,7 +213,7 @@ Rows MeanPrediction::predict(const Candidate& candidate) const {
   const flightlog::LogAmbient& ambient = log_.header.ambient;
 
   Rows rows(rows_.size() * kRowsPerBeat, 0);
-  std::vector<double> variables(b.actuators.size() + model::kMotionVariables);
+  std::vector<double> variables(b.actuators.size() + model::kMotionVariables + loads.size());
   for (std::size_t j = 0; j < rows_.size(); ++j) {
     const std::size_t at = rows_[j];
     if (!motion_.seen[at]) continue;
@@ -228,6 +252,7 @@ Rows MeanPrediction::predict(const Candidate& candidate) const {
     motion[model::kSpeed] = std::sqrt(model::dot(air, air));
     motion[model::kWx] = s.rate_rad_s.x, motion[model::kWy] = s.rate_rad_s.y, motion[model::kWz] = s.rate_rad_s.z;
     motion[model::kBatteryShare] = battery_rows_[j];
+    for (std::size_t k = 0; k < loads.size(); ++k) motion[model::kMotionVariables + k] = loads[k]->input[j];
     const model::MeanLoad own = wrench.at(variables);
     s.thrust_N = own.force_N[2];
     model::MeanLoads<double> load{{own.force_N[0], own.force_N[1], own.force_N[2]},

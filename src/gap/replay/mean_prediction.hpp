@@ -4,6 +4,9 @@
 // each seen through the filter that the motion went through (flightlog/mean_motion.hpp). Nothing is integrated, so nothing drifts. Rows are as
 // far apart as what is below the bandwidth allows: with more, neighbours would say the same.
 //
+// What acts on a vehicle says its file, or, of model = "predicted", the flight's predicted.csv (gap/replay/predicted_loads.hpp), whose columns
+// go through the same filter; effects act on both alike, but for those between inputs and wings, which predicted forces have in them.
+//
 // Channels of force are there always, those of torque where the vehicle has moments. The smallest height from which on rows count is the
 // vehicle's extent.below_m over the ground.
 #pragma once
@@ -14,6 +17,7 @@
 
 #include "flightlog/mean_motion.hpp"
 #include "gap/replay/predicted_flight.hpp"
+#include "gap/replay/predicted_loads.hpp"
 #include "model/beat_averaged.hpp"
 
 namespace flappy::gap {
@@ -44,11 +48,13 @@ class MeanPrediction final : public Predictor {
   std::vector<RegimeQuantity> inputs() const override;
 
  private:
-  /// An input as an actuator sees it, by the rows: late, behind a lag, low-passed.
+  /// An input as an actuator sees it, or a column of predicted.csv, by the rows: late, behind a lag, low-passed.
   struct Driven {
     std::vector<double> input, rate, times_battery, rate_times_battery;
   };
   const Driven& driven(std::size_t input, double delay_s, double lag_s) const;
+  /// Of actuators, motion, and columns of predicted.csv.
+  model::MeanWrench wrench_of(const model::BeatAveraged& vehicle) const;
   Rows rows_of(const flightlog::MeanMotion& motion) const;
   Rows predict(const Candidate& candidate) const;
   template <class Value>
@@ -61,7 +67,8 @@ class MeanPrediction final : public Predictor {
   flightlog::MeanMotion motion_;
   std::size_t stride_;
   std::vector<std::size_t> rows_;            ///< of the grid
-  std::vector<std::vector<double>> inputs_;  ///< on the grid, [input]
+  std::vector<PredictedColumn> predicted_;   ///< without values, which are among inputs_
+  std::vector<std::vector<double>> inputs_;  ///< on the grid: the vehicle's, then columns of predicted.csv
   std::vector<double> battery_;              ///< over the nominal voltage, on the grid; 1 where it is not known
   std::vector<double> battery_rows_;         ///< low-passed
   Rows measured_;

@@ -9,6 +9,7 @@
 #include "gap/diagnose/verdict.hpp"
 #include "gap/replay/mean_prediction.hpp"
 #include "io/config.hpp"
+#include "io/csv.hpp"
 #include "refusal.hpp"
 #include "rollout/simulated_flight.hpp"
 #include "vehicles.hpp"
@@ -76,11 +77,40 @@ flightlog::FlightLog fly(const Robot& r, std::uint64_t seed) {
 
 model::Vehicle nimble() { return model::read_any_vehicle(test::source_path("configs/vehicles/flapper_nimble.toml")); }
 
-Diagnosis diagnose_robot(const Robot& r, std::vector<std::string> withheld = {}) {
-  const model::Vehicle vehicle = nimble();
+/// The same by its simulator: forces of a thrust that is believed a tenth too small.
+model::Vehicle by_simulator() {
+  model::Vehicle v = nimble();
+  model::BeatAveraged& b = *v.beat_averaged;
+  b.predicted = true;
+  b.wrenches.clear();
+  std::erase_if(b.coefficients, [](const model::BeatAveraged::Coefficient& c) { return !c.name.ends_with("_N"); });
+  b.coefficients.push_back({"thrust_N_Hz", 0.0344, 0.02, 0.031});
+  return v;
+}
+
+void simulate(const flightlog::FlightLog& log, const std::filesystem::path& folder) {
+  std::vector<std::vector<double>> columns(6);
+  for (std::size_t i = 0; i < log.command.t_s.size(); ++i) {
+    const double both_Hz = 25 * (log.command.declared[0][i] + log.command.declared[1][i]);
+    const double row[] = {log.command.t_s[i], 0.031 * both_Hz, both_Hz, 1, 1, 1};
+    for (std::size_t k = 0; k < columns.size(); ++k) columns[k].push_back(row[k]);
+  }
+  std::filesystem::create_directories(folder);
+  io::write_atomically(folder / "predicted.csv",
+                       io::csv_text({"t_s", "force_z_N", "d_thrust_N_Hz_force_z_N", "d_lift_N_force_z_N",
+                                     "d_forward_N_force_x_N", "d_left_N_force_y_N"},
+                                    columns));
+}
+
+Diagnosis diagnose_robot(const Robot& r, std::vector<std::string> withheld = {},
+                         const model::Vehicle& vehicle = nimble()) {
   std::vector<PredictedFlight> flights;
-  for (std::uint64_t seed = 1; seed <= 2; ++seed)
-    flights.emplace_back(std::make_shared<MeanPrediction>("flight_" + std::to_string(seed), fly(r, seed), vehicle));
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const std::filesystem::path folder = testing::TempDir() + "/flight_" + std::to_string(seed);
+    const flightlog::FlightLog log = fly(r, seed);
+    if (vehicle.beat_averaged->predicted) simulate(log, folder);
+    flights.emplace_back(std::make_shared<MeanPrediction>(folder, log, vehicle));
+  }
   const std::string configs = test::source_path("configs/gap/beat_averaged/");
   return diagnose(flights, sim::read_randomisation(vehicle, io::Config::load(configs + "priors.toml").root()),
                   {.finalists = 20,
@@ -109,8 +139,14 @@ bool holds(const Diagnosis& d, const std::string& name, double truth) {
   return false;
 }
 
+const Robot kLacking{.drag_x = 3, .drag_y = 2, .heave = 1, .dihedral = 20};
+const Diagnosis& lacking() {
+  static const Diagnosis d = diagnose_robot(kLacking);
+  return d;
+}
+
 TEST(MeanDiagnosis, NamesWhatTheFileLacksWithItsSize) {
-  const Diagnosis d = diagnose_robot({.drag_x = 3, .drag_y = 2, .heave = 1, .dihedral = 20});
+  const Diagnosis& d = lacking();
   ASSERT_EQ(d.conclusion.kind, Conclusion::Kind::effect);
   std::vector<std::string> named = d.conclusion.effects;
   std::ranges::sort(named);
@@ -134,6 +170,25 @@ TEST(MeanDiagnosis, NamesWhatTheFileLacksWithItsSize) {
     EXPECT_LT(c.best_of_shifted, c.gain / 2) << c.effect;  // its motion repeats
   }
   for (const Validation::Agreement& a : d.validation->agreements) EXPECT_GT(a.p_value, 1e-3) << a.name;
+}
+
+TEST(MeanDiagnosis, SaysTheSameOfForcesThatItsSimulatorPredicted) {
+  const Diagnosis &by_equations = lacking(), d = diagnose_robot(kLacking, {}, by_simulator());
+  EXPECT_EQ(d.conclusion.kind, by_equations.conclusion.kind);
+  EXPECT_EQ(d.conclusion.effects, by_equations.conclusion.effects);
+  EXPECT_NEAR(d.conclusion.probability, by_equations.conclusion.probability, 1e-3);
+  const auto sizes = [](const Diagnosis& of) {
+    const Eigen::VectorXd mean = of.hypotheses[of.conclusion.hypothesis].fit.mean();
+    return Eigen::VectorXd(mean.tail(5));  // of both effects
+  };
+  EXPECT_LT((sizes(d) - sizes(by_equations)).cwiseAbs().maxCoeff(), 1e-3);
+  for (std::size_t f = 0; f < d.nominal.size(); ++f)
+    for (std::size_t i = 0; i < d.nominal[f].size(); i += kRowsPerBeat)
+      for (std::size_t k = i + kForceX * kCoefficients; k <= i + kForceZ * kCoefficients; k += kCoefficients)
+        ASSERT_NEAR(d.nominal[f][k], by_equations.nominal[f][k], 1e-9) << f << " " << k;
+  // what is between inputs and wings is in the forces already
+  for (const char* id : {"command_delay", "driver_bandwidth", "battery_thrust"})
+    EXPECT_TRUE(std::ranges::count(d.untestable, id)) << id;
 }
 
 TEST(MeanDiagnosis, NamesNothingWhereNothingIsMissing) {
