@@ -63,9 +63,10 @@ Vehicle read_any_vehicle(const std::filesystem::path& path, const std::vector<st
 Vehicle read_flyable_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
   Vehicle vehicle = read_any_vehicle(path, overrides);
   if (vehicle.beat_averaged && vehicle.beat_averaged->predicted)
-    io::Config::load(path).root().fail("model",
-                                       "a vehicle whose forces stand in files of recorded flights cannot be flown",
-                                       "\"multibody\" or \"beat_averaged\"; flappy-gap diagnose takes all three");
+    io::Config::load(path, overrides)
+        .root()
+        .fail("model", "a vehicle whose forces stand in files of recorded flights cannot be flown",
+              "\"multibody\" or \"beat_averaged\"; flappy-gap diagnose takes all three");
   return vehicle;
 }
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 
 #include "io/sha256.hpp"
 #include "rollout/fly.hpp"
@@ -122,6 +123,17 @@ TEST(FlyConfig, RefusesInOneLine) {
             source_path("configs/fly/none_such.json") + ": cannot be read: No such file or directory");
   EXPECT_EQ(refusal({"fligth.seed=1"}).substr(0, 60), "--set fligth.seed=1: fligth: unknown key; accepted: actor, c");
   EXPECT_EQ(message([&] { rollout::read_fly_config(pid); }).find(": flight"), std::string::npos);
+}
+
+TEST(FlyConfig, RefusesAVehicleWhoseForcesStandInFiles) {
+  std::string text = io::read_text(source_path("configs/vehicles/flapper_nimble.toml"));
+  text.replace(text.find("beat_averaged"), 13, "predicted").erase(text.find("[wrench."));
+  const std::string file = testing::TempDir() + "/predicted.toml";
+  std::ofstream(file) << text;
+  EXPECT_EQ(refusal({"vehicle=" + file}),
+            file +
+                ":6:9: model: a vehicle whose forces stand in files of recorded flights cannot be flown; accepted: "
+                "\"multibody\" or \"beat_averaged\"; flappy-gap diagnose takes all three");
 }
 
 TEST(FlyConfig, TellsOfAMisspeltTableOfATaskBeforeAMissingOne) {
