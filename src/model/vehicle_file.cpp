@@ -73,8 +73,9 @@ Vehicle read_flyable_vehicle(const std::filesystem::path& path, const std::vecto
 Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
   Vehicle vehicle = read_any_vehicle(path, overrides);
   if (vehicle.beat_averaged)
-    io::Config::load(path).root().fail("model", "a robot that is known by the beat cannot be flown",
-                                       "a vehicle of wings and motors; flappy-gap diagnose takes both");
+    io::Config::load(path).root().fail(
+        "model", "a robot that is known by the beat has no wings",
+        "a vehicle of wings and motors; flappy-fly, flappy-train and flappy-gap diagnose take both");
   return vehicle;
 }
 

@@ -123,7 +123,7 @@ TEST_F(Refusal, SaysWhatAndWhere) {
 TEST_F(Refusal, NothingFliesIt) {
   const std::string what =
       test::refusal([] { read_vehicle(test::source_path("configs/vehicles/flapper_nimble.toml")); });
-  EXPECT_NE(what.find("model: a robot that is known by the beat cannot be flown"), std::string::npos) << what;
+  EXPECT_NE(what.find("model: a robot that is known by the beat has no wings"), std::string::npos) << what;
 }
 
 // ---- forces of a simulator
