@@ -81,7 +81,7 @@ class Reader {
   }
 
   Sum power() {
-    const Sum base = atom();
+    Sum base = atom();
     if (!take('^')) return base;
     next();
     int n = 0;

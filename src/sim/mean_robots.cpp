@@ -11,7 +11,6 @@ namespace flappy::sim {
 namespace {
 
 using model::BeatAveraged;
-using model::Vec3;
 
 MeanProgram program_of(const model::Vehicle& v, const model::MeanWrench& wrench) {
   const BeatAveraged& b = *v.beat_averaged;
@@ -155,14 +154,15 @@ void Batch<T>::Storage::put_mean(std::size_t i, const std::vector<T>& rows, cons
   for (std::size_t k = 0; k < memory.size(); ++k) to[k * kLanes<T>] = memory[k];
 }
 
-#define FLAPPY_MEAN(T)                                                                               \
-  template void Batch<T>::Storage::put_mean(std::size_t, const model::Vehicle&);                     \
-  template void Batch<T>::Storage::keep_inputs(std::size_t);                                         \
-  template std::vector<double> Batch<T>::Storage::inputs_of(std::size_t);                            \
-  template std::pair<std::vector<T>, std::vector<T>> Batch<T>::Storage::get_mean(std::size_t) const; \
-  template void Batch<T>::Storage::put_mean(std::size_t, const std::vector<T>&, const std::vector<T>&)
-FLAPPY_MEAN(float);
-FLAPPY_MEAN(double);
-#undef FLAPPY_MEAN
+template void Batch<float>::Storage::put_mean(std::size_t, const model::Vehicle&);
+template void Batch<float>::Storage::keep_inputs(std::size_t);
+template std::vector<double> Batch<float>::Storage::inputs_of(std::size_t);
+template std::pair<std::vector<float>, std::vector<float>> Batch<float>::Storage::get_mean(std::size_t) const;
+template void Batch<float>::Storage::put_mean(std::size_t, const std::vector<float>&, const std::vector<float>&);
+template void Batch<double>::Storage::put_mean(std::size_t, const model::Vehicle&);
+template void Batch<double>::Storage::keep_inputs(std::size_t);
+template std::vector<double> Batch<double>::Storage::inputs_of(std::size_t);
+template std::pair<std::vector<double>, std::vector<double>> Batch<double>::Storage::get_mean(std::size_t) const;
+template void Batch<double>::Storage::put_mean(std::size_t, const std::vector<double>&, const std::vector<double>&);
 
 }  // namespace flappy::sim

@@ -141,7 +141,7 @@ struct Batch<T>::Storage {
 
   void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v);
   /// std::invalid_argument where it shares not the batch's inputs, actuators and expressions.
-  void put_mean(std::size_t i, const model::Vehicle& v);
+  void put_mean(std::size_t i, const model::Vehicle& as_filed);
   void keep_inputs(std::size_t slots);
   /// Inputs of a robot that is known by the beat, as its controller has set them.
   std::vector<double> inputs_of(std::size_t i);

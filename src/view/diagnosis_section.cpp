@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <set>
@@ -376,7 +377,7 @@ class Story {
   /// What speaks for and against each.
   void add_rivals() {
     const Rival* refit = named("parameters alone");
-    double best = -INFINITY;
+    double best = -std::numeric_limits<double>::infinity();
     for (const Rival& r : rivals_) best = std::max(best, r.log_evidence);
     Json rows = Json::array();
     for (const Rival& r : rivals_) {

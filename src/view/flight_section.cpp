@@ -315,7 +315,10 @@ Section flight_section(const std::vector<fs::path>& folders, const FlightOptions
 Section flight_section(std::vector<ShownFlight> flights, const FlightOptions& options, Packing& packing) {
   check_count(flights.size());
   Json list = Json::array();
-  for (auto& [name, folder, log] : flights) {
+  for (ShownFlight& shown : flights) {
+    const std::string& name = shown.name;
+    const fs::path& folder = shown.folder;
+    FlightLog& log = shown.log;
     const model::Vehicle vehicle = vehicle_of(folder, log, options.vehicle);
     const bool winged = !vehicle.beat_averaged, derived = winged && !log.wings && log.command.declared.empty();
     Json notes = Json::array();

@@ -148,8 +148,9 @@ void control(const std::vector<PredictedFlight>& flights, const Fitted& all, con
         std::vector<std::vector<double>> moved = x;
         for (std::vector<double>& v : moved)
           if (v.size() > 2 * kLeastShift)
-            std::ranges::rotate(
-                v, v.begin() + static_cast<std::ptrdiff_t>(kLeastShift + random() % (v.size() - 2 * kLeastShift)));
+            std::rotate(v.begin(),
+                        v.begin() + static_cast<std::ptrdiff_t>(kLeastShift + random() % (v.size() - 2 * kLeastShift)),
+                        v.end());
         shifted = std::max(shifted, 1 - left_beside(y, moved) / before);
       }
       best.channel = channel_name(channel), best.gain = gain, best.best_of_shifted = shifted;
@@ -196,7 +197,7 @@ std::vector<Residuals> held_out(const RobotFit& robot, const std::vector<Predict
   for (const Fitted& fit : fits)
     for (std::size_t k = 0; k < folds; ++k) {
       std::vector<char> others(flights.size(), 1);
-      for (std::size_t f = 0; folds > 1 && f < flights.size(); ++f) others[f] = fold[f] != static_cast<int>(k);
+      for (std::size_t f = 0; folds > 1 && f < flights.size(); ++f) others[f] = fold[f] != static_cast<int>(k) ? 1 : 0;
       candidates.push_back(fit.hypothesis.candidate(coordinates_by(robot, fit, others)));
     }
   std::vector<Residuals> rows = residuals(flights, candidates, threads);
