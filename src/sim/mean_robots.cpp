@@ -137,9 +137,10 @@ template <class T>
 std::pair<std::vector<T>, std::vector<T>> Batch<T>::Storage::get_mean(std::size_t i) const {
   std::pair<std::vector<T>, std::vector<T>> all;
   if (!mean) return all;
-  const T *row = mean->row_of(i), *memory = mean->memory_of(i);
+  const T* row = mean->row_of(i);
   for (std::size_t k = 0; k < mean->program.rows(); ++k) all.first.push_back(row[k * kLanes<T>]);
-  for (std::size_t k = 0; k < mean->memory_rows(); ++k) all.second.push_back(memory[k * kLanes<T>]);
+  const auto push = [&](const T& number) { all.second.push_back(number); };
+  mean->for_memory_by_age(i, steps, push);
   return all;
 }
 
@@ -150,8 +151,10 @@ void Batch<T>::Storage::put_mean(std::size_t i, const std::vector<T>& rows, cons
     keep_inputs((memory.size() - 1 - mean->program.actuators.size()) / mean->program.inputs);
   T* row = mean->row_of(i);
   for (std::size_t k = 0; k < rows.size(); ++k) row[k * kLanes<T>] = rows[k];
-  T* to = mean->memory_of(i);
-  for (std::size_t k = 0; k < memory.size(); ++k) to[k * kLanes<T>] = memory[k];
+  std::size_t k = 0;
+  mean->for_memory_by_age(i, steps, [&](T& number) {
+    if (k < memory.size()) number = memory[k++];
+  });
 }
 
 template void Batch<float>::Storage::put_mean(std::size_t, const model::Vehicle&);

@@ -49,6 +49,16 @@ struct Mean {
   /// Of one robot, a number each.
   T* row_of(std::size_t i) { return &rows[i / kLanes<T> * program.rows() * kLanes<T> + i % kLanes<T>]; }
   T* memory_of(std::size_t i) { return &memory[i / kLanes<T> * memory_rows() * kLanes<T> + i % kLanes<T>]; }
+  /// Calls `use(number)` for all of it, past inputs from the newest on; `steps`: of the batch so far. Where they stand depends on that number.
+  void for_memory_by_age(std::size_t i, std::int64_t steps, const auto& use) {
+    T* const own = memory_of(i);
+    const std::size_t before = 1 + program.actuators.size();
+    for (std::size_t k = 0; k < before; ++k) use(own[k * kLanes<T>]);
+    for (std::size_t age = 0; age < slots; ++age) {
+      const std::size_t slot = (static_cast<std::size_t>(steps) % slots + slots - 1 - age) % slots;
+      for (std::size_t k = 0; k < program.inputs; ++k) use(own[(before + slot * program.inputs + k) * kLanes<T>]);
+    }
+  }
   MeanRows<T> block(std::size_t b) {
     const MeanProgram& p = program;
     return {row_of(b * kLanes<T>),

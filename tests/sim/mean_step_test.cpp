@@ -7,7 +7,7 @@
 
 #include "flappy/batch.hpp"
 #include "flappy/vehicle_file.hpp"
-#include "sim/randomise.hpp"
+#include "sim/storage.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::sim {
@@ -220,6 +220,30 @@ TEST(MeanStep, InputsAreLateAndLag) {
   const std::vector<double> slow = thrust_of(v);
   for (const int i : {50, 80, 150})  // half-way in its step
     EXPECT_NEAR(slow[static_cast<std::size_t>(i)], whole * (1 - std::exp(-(i - 50 + 0.5) * 1e-3 / 0.05)), 1e-6) << i;
+}
+
+// What a late robot remembers is its own past, not a place in the batch's: put into a batch that has flown for another time, it flies on alike.
+TEST(MeanStep, SnapshotsRememberInputsByTheirAge) {
+  Vehicle v = flapper();
+  v.effects["command_delay"] = {{"delay_s", 0.0305}};
+  Batch<double> from(1, v, options(1e-3)), to(1, v, options(1e-3));
+  const auto fly = [](Batch<double>& batch, int first, int last) {
+    for (int i = first; i < last; ++i) {
+      batch.set_input(0, {0.5 + 0.01 * (i % 17), 0.001 * (i % 5), 0, 0});
+      batch.step(1);
+    }
+  };
+  fly(from, 0, 640);  // more than are remembered
+  fly(to, 0, 37);
+  const auto [rows, memory] = storage_of(from).get_mean(0);
+  storage_of(to).put_mean(0, rows, memory);
+  storage_of(to).blocks[0] = storage_of(from).blocks[0];
+  fly(from, 640, 700);
+  fly(to, 640, 700);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(to.state(0).position_m[i], from.state(0).position_m[i]) << i;
+    EXPECT_EQ(to.state(0).body_rate_rad_s[i], from.state(0).body_rate_rad_s[i]) << i;
+  }
 }
 
 TEST(MeanStep, ControllersOutputsAreMixedWithinRange) {
