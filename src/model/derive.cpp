@@ -141,6 +141,8 @@ Sides<SideFigures<double>> effect_figures(const Vehicle& vehicle) {
   return {side_figures(v.left, v.air_density_kg_m3), side_figures(v.right, v.air_density_kg_m3)};
 }
 
+double beats_Hz(const Vehicle& v) { return v.beat_averaged ? v.beat_averaged->nominal_Hz : v.driver.flapping_Hz; }
+
 double total_mass_kg(const Vehicle& vehicle) {
   const Vehicle v = built(vehicle);
   return v.torso.mass_kg + wing_mass(v.left) + wing_mass(v.right);
@@ -162,7 +164,7 @@ Parameters<double> derive(const Vehicle& vehicle, double step_s) {
   p.below_m = v.extent.below_m;
   p.above_m = v.extent.above_m;
   p.around_m = v.extent.around_m;
-  p.beat_steps = 2 / ((v.beat_averaged ? v.beat_averaged->nominal_Hz : v.driver.flapping_Hz) * step_s);
+  p.beat_steps = 2 / (beats_Hz(v) * step_s);
   return p;
 }
 

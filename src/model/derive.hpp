@@ -15,6 +15,9 @@ Vehicle built(Vehicle vehicle);
 /// What effects need to know besides.
 Sides<SideFigures<double>> effect_figures(const Vehicle& vehicle);
 
+/// Beats a second at which it flies, about.
+double beats_Hz(const Vehicle& vehicle);
+
 /// Mass of the whole vehicle, kg.
 double total_mass_kg(const Vehicle& vehicle);
 

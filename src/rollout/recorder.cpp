@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "model/derive.hpp"
 #include "model/math.hpp"
 #include "model/wing_beat.hpp"
 #include "sim/lanes.hpp"
@@ -129,7 +130,7 @@ struct Recorder<T>::Storage {
     flightlog::FlightHeader& h = log.header;
     h.vehicle = config.vehicle_file_name;
     h.vehicle_sha256 = config.vehicle_sha256;
-    h.flapping_Hz = vehicle.driver.flapping_Hz;
+    h.flapping_Hz = model::beats_Hz(vehicle);
     h.gravity_m_s2 = o.batch.world.gravity_m_s2;
     h.ambient = {config.vehicle.air_density_kg_m3, o.batch.world.ground_z_m, o.batch.world.ceiling_z_m, {}};
     for (const sim::Wall& w : o.batch.world.walls) h.ambient.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
@@ -139,7 +140,6 @@ struct Recorder<T>::Storage {
     h.power = config.log.power;
     h.wings = config.log.wings;
     if (vehicle.beat_averaged) {
-      h.flapping_Hz = vehicle.beat_averaged->nominal_Hz;
       for (const model::BeatAveraged::Input& input : vehicle.beat_averaged->inputs) h.inputs.push_back(input.name);
       log.command.declared.resize(h.inputs.size());
     } else if (!o.task.sets_voltages()) {

@@ -119,9 +119,7 @@ void Batch<T>::Storage::put_effect_rows(std::size_t i, const model::Vehicle& v) 
   lane_effects[i] = 0;
   for (std::size_t e = 0; e < model::effects().size(); ++e) {
     const model::EffectEntry& entry = model::effects()[e];
-    const auto own = v.effects.find(entry.info.id);
-    std::vector<double> values = entry.values(own != v.effects.end() ? own->second : std::map<std::string, double>{});
-    if (own == v.effects.end()) std::fill_n(values.begin(), entry.info.sizes, 0.0);
+    const std::vector<double> values = entry.values_of(v);
     if (entry.change == nullptr && entry.acts(values)) lane_effects[i] |= std::uint64_t{1} << e;
     for (std::size_t k = 0; k < values.size(); ++k) put_row(entry.first_row + static_cast<int>(k), values[k]);
   }

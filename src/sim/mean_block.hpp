@@ -42,12 +42,6 @@ struct MeanBody {
   T late_steps;  // of inputs
 };
 
-/// An effect's parameters as a mean over beats: its own, where a robot of another size or kind needs others.
-template <class Effect>
-constexpr int mean_parameters_of() {
-  if constexpr (requires { Effect::kMeanParameters; }) return static_cast<int>(Effect::kMeanParameters.size());
-  else return static_cast<int>(Effect::kParameters.size());
-}
 inline constexpr int kMeanEffects = std::tuple_size_v<model::MeanEffects>;
 template <int I>
 using MeanEffectAt = std::tuple_element_t<static_cast<std::size_t>(I), model::MeanEffects>;
@@ -56,7 +50,7 @@ using MeanEffectAt = std::tuple_element_t<static_cast<std::size_t>(I), model::Me
 template <int I>
 constexpr int mean_rows_before() {
   if constexpr (I == 0) return 0;
-  else return mean_rows_before<I - 1>() + mean_parameters_of<MeanEffectAt<I - 1>>();
+  else return mean_rows_before<I - 1>() + static_cast<int>(model::mean_parameters<MeanEffectAt<I - 1>>().size());
 }
 
 }  // namespace FLAPPY_ISA

@@ -65,9 +65,7 @@ void Batch<T>::Storage::put_mean(std::size_t i, const model::Vehicle& as_filed) 
   std::vector<double> of_effects;
   std::uint64_t bit = 1;
   for (const model::EffectEntry& e : model::catalogue_of(v)) {
-    const auto own = v.effects.find(e.info.id);
-    std::vector<double> values = e.values(own != v.effects.end() ? own->second : std::map<std::string, double>{});
-    if (own == v.effects.end()) std::fill_n(values.begin(), e.info.sizes, 0.0);
+    const std::vector<double> values = e.values_of(v);
     if (e.acts(values)) {
       mean->effects |= bit;
       if (e.mean.drive != nullptr) e.mean.drive(values.data(), drive);

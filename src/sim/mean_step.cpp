@@ -187,7 +187,7 @@ class MeanLanes {
   FLAPPY_INLINE void for_effects(const auto& use) const {
     if constexpr (I < kMeanEffects) {
       if (mean_.effects >> I & 1) {
-        constexpr int kCount = mean_parameters_of<MeanEffectAt<I>>();
+        constexpr int kCount = static_cast<int>(mean_parameters<MeanEffectAt<I>>().size());
         L q[kCount];
         for (int k = 0; k < kCount; ++k)
           q[k] = L::load(rows(mean_.effect_row + static_cast<std::size_t>(mean_rows_before<I>() + k))[0] + first_);

@@ -194,7 +194,8 @@ def main():
     corrected = (OUT / "flapper" / "vehicle_corrected.toml").read_text()
     (OUT / "known.toml").write_text(corrected.split("posterior.names")[0])
     c, _, _ = diagnose("shifted_inputs", OUT / "known.toml", shifted_inputs(flapper))
-    print(f"  inputs of half a flight later, the corrected vehicle: {c['verdict']['kind']} {', '.join(c['verdict']['effects'])} at {c['verdict']['probability']:.3f}")
+    print(f"  inputs of half a flight later, the corrected vehicle: {c['verdict']['kind']} {', '.join(c['verdict']['effects'])} at {c['verdict']['probability']:.3f}; "
+          f"rms held out " + ", ".join(f"{e['rms']:.3f}" for e in c["validation"]["ladder"][-1]["held_out"].values()))
     print("an effect of the Flapper withheld")
     everyone = tuple(range(len(flapper)))
     sets = [everyone] + [s for s in itertools.combinations(everyone, len(flapper) - 1)]

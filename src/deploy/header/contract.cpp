@@ -6,6 +6,7 @@
 
 #include "deploy/header/c_text.hpp"
 #include "io/files.hpp"
+#include "model/derive.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -39,19 +40,15 @@ void list(std::ostringstream& text, const char* title, const std::vector<Signal>
 bool holds_trim(const FlyConfig& config) { return config.fleet.task.constants.holds_trim > 0; }
 bool sets_voltages(const FlyConfig& config) { return config.fleet.task.sets_voltages(); }
 
-double beats_Hz(const FlyConfig& config) {
-  const auto& robot = config.vehicle.beat_averaged;
-  return robot ? robot->nominal_Hz : config.vehicle.driver.flapping_Hz;
-}
-
 std::string meaning_of_action(const FlyConfig& config) {
   if (sets_voltages(config)) return "It is the voltage of the left and of the right motor.\n";
   std::string inputs;  // as the vehicle mixes them
   if (const auto& robot = config.vehicle.beat_averaged) {
+    const auto actions = config.fleet.task.action();
     for (const model::BeatAveraged::Input& i : robot->inputs) {
       inputs += i.name + " = " + io::shortest_digits(i.neutral);
       for (std::size_t k = 0; k < i.mix.size(); ++k)
-        if (i.mix[k] != 0) inputs += " + " + io::shortest_digits(i.mix[k]) + " " + config.fleet.task.action()[k].name;
+        if (i.mix[k] != 0) inputs += " + " + io::shortest_digits(i.mix[k]) + " " + actions[k].name;
       inputs += ", within " + io::shortest_digits(i.low) + " to " + io::shortest_digits(i.high) + "\n";
     }
     inputs = "The robot's inputs are\n" + inputs;
@@ -124,7 +121,7 @@ std::string contract_macros(const std::string& prefix, const FlyConfig& config, 
   define("DIRTY", run.dirty ? "1" : "0");
   define("CONTROL_US", std::to_string(p.control_us) + "U");
   define("PERIOD_US", std::to_string(p.policy_us) + "U");
-  define("FLAPPING_HZ", c_number(static_cast<float>(beats_Hz(config))));
+  define("FLAPPING_HZ", c_number(static_cast<float>(model::beats_Hz(config.vehicle))));
   define("HOLDS_TRIM", holds_trim(config) ? "1" : "0");
   return text.str();
 }

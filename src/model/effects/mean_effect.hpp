@@ -47,6 +47,13 @@ struct MeanLoads {
 
 }  // namespace FLAPPY_ISA
 
+/// An effect's parameters as a mean over beats: its own, where a robot of another size or kind needs others.
+template <class Effect>
+constexpr const auto& mean_parameters() {
+  if constexpr (requires { Effect::kMeanParameters; }) return Effect::kMeanParameters;
+  else return Effect::kParameters;
+}
+
 /// An effect's stages with its parameters; null where it has none.
 struct MeanStages {
   void (*drive)(const double*, MeanDrive<double>&) = nullptr;

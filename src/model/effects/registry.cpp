@@ -27,13 +27,6 @@ EffectEntry entry() {
   return e;
 }
 
-/// Its parameters as a mean over beats: its own, where a robot of another size or kind needs others.
-template <class Effect>
-constexpr const auto& mean_parameters() {
-  if constexpr (requires { Effect::kMeanParameters; }) return Effect::kMeanParameters;
-  else return Effect::kParameters;
-}
-
 /// A stage that reads its parameters as an array.
 template <auto stage, std::size_t count, class... Further>
 void staged(const double* parameters, Further... further) {
@@ -82,6 +75,14 @@ std::vector<double> EffectEntry::values(const std::map<std::string, double>& giv
     list.push_back(own != given.end() ? own->second : p.typical);
   }
   return list;
+}
+
+std::vector<double> EffectEntry::values_of(const Vehicle& vehicle) const {
+  const auto own = vehicle.effects.find(info.id);
+  if (own != vehicle.effects.end()) return values(own->second);
+  std::vector<double> typical = values({});
+  std::fill_n(typical.begin(), info.sizes, 0.0);
+  return typical;
 }
 
 bool EffectEntry::acts(const std::vector<double>& values) const {

@@ -102,6 +102,8 @@ struct EffectEntry {
 
   /// Its parameters: those given, typical ones for the others.
   std::vector<double> values(const std::map<std::string, double>& given) const;
+  /// Those of a vehicle; its sizes are 0 where the vehicle has no such effect.
+  std::vector<double> values_of(const Vehicle& vehicle) const;
   /// Whether it does anything with these parameters.
   bool acts(const std::vector<double>& values) const;
 };
