@@ -53,7 +53,6 @@ std::string next_line(const Report& r, const std::string& out) {
   switch (c.kind) {
     case Conclusion::Kind::effect:
     case Conclusion::Kind::parameters:
-      if (r.validation) return "next: ask new flights with what was found, --vehicle " + vehicle;
       return "next: train or fly on what was found, as with flappy-train CONFIG --set vehicle=" + vehicle;
     case Conclusion::Kind::group:
       return "next: fly so that these differ, and diagnose old and new flights together";
