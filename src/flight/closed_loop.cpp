@@ -263,16 +263,20 @@ FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPla
   FlightBlock<T>& f = s.flight;
   const auto truth = load_rows<Truth<L<T>>>(f.truth, first);
   auto episode = load_rows<Episode<L<T>>>(f.episode, first);
-  T time[kWidth<T>];
-  for (int i = 0; i < kWidth<T>; ++i) time[i] = static_cast<T>(++f.tick[first + i]) * plan.task.tick_s;
+  T time[kWidth<T>], touching[kWidth<T>];
+  for (int i = 0; i < kWidth<T>; ++i) {
+    time[i] = static_cast<T>(++f.tick[first + i]) * plan.task.tick_s;
+    touching[i] = (s.body.status[first + i] & sim::kTouching) != 0 ? T(1) : T(0);
+  }
   const auto ref = setpoint(f, plan, first);
   const auto score = score_of(truth, ref);
-  const L<T> now = L<T>::load(time);
+  const L<T> now = L<T>::load(time), touches = L<T>::load(touching);
   const auto estimate = load_rows<Estimate<L<T>>>(f.estimate, first);
   const bool by_estimate = plan.task.hand_back.on_estimate > 0;
-  const auto done = by_estimate ? arrived(plan.task.hand_back, score_of(estimate, ref), estimate.body_rate_rad_s, now)
-                                : arrived(plan.task.hand_back, score, truth.body_rate_rad_s, now);
-  note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode);
+  const auto done = by_estimate
+                        ? arrived(plan.task.hand_back, score_of(estimate, ref), estimate.body_rate_rad_s, now, touches)
+                        : arrived(plan.task.hand_back, score, truth.body_rate_rad_s, now, touches);
+  note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode, touches);
   episode.reward = reward_of(plan.task.reward, score, truth, now, L<T>(plan.task.tick_s), done, episode);
   episode.action_reward += episode.reward;
   episode.handed_back = where(done, L<T>(1), episode.handed_back);
@@ -286,7 +290,7 @@ FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPla
   for (int i = 0; i < kWidth<T>; ++i) {
     const std::uint32_t status = s.body.status[first + i];
     if (status & sim::kFrozen) f.ended[first + i] |= kNotFinite;
-    if (plan.task.contact_ends > 0 && (status & ~(std::uint32_t{sim::kFrozen} | sim::kDirect)))
+    if (plan.task.contact_ends > 0 && (status & ~(std::uint32_t{sim::kFrozen} | sim::kTouching | sim::kDirect)))
       f.ended[first + i] |= kContact;
   }
   L<T> row[kMaxObservation];

@@ -73,7 +73,7 @@ class Part {
     Outcome& o = outcomes_[i];
     o.captured_s = whole(fleet_.captured_s(i));
     o.lost_s = whole(fleet_.lost_s(i));
-    o.status = fleet_.batch().status(i);
+    o.status = fleet_.events(i);
     o.ended = fleet_.ended(i);
   }
 

@@ -116,7 +116,7 @@ struct Recorder<T>::Storage {
   double held_V[2] = {0, 0};
   struct {
     sim::Block<T> block;
-    std::vector<T> effect_states;
+    std::vector<T> effect_states, contact_memory;
   } metered;  // where power.csv is asked for
   double step_hz;
 
@@ -163,6 +163,8 @@ struct Recorder<T>::Storage {
     const T* states = body.effects_of(block).states;
     metered.block = body.blocks[block];
     metered.effect_states.assign(states, states + body.state_size());
+    const T* const bristles = body.effects_of(block).contact.memory;
+    metered.contact_memory.assign(bristles, bristles + body.contact_memory_size());
   }
 
   double time_s(std::int64_t step) const { return static_cast<double>(step) / step_hz; }
@@ -245,6 +247,7 @@ struct Recorder<T>::Storage {
     for (std::size_t side = 0; side < 2; ++side) voltages_V[side * kLanes + lane] = static_cast<T>(held_V[side]);
     sim::BlockEffects<T> in_force = body.effects_of(flapper / kLanes);
     in_force.states = metered.effect_states.data();
+    in_force.contact.memory = metered.contact_memory.data();
     in_force.voltages_V = voltages_V;
     in_force.meter = meter;
     in_force.motors = nullptr;  // the step was metered when it was flown
