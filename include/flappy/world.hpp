@@ -14,8 +14,8 @@ struct Wall {
 /// A solid that stands in the room, in a frame of its own.
 struct Shape {
   enum class Kind { sphere, box, cylinder } kind = Kind::sphere;
-  double centre_m[3] = {0, 0, 0};                    ///< in W
-  double rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< from its frame to W, by rows
+  double centre_m[3] = {0, 0, 0};     ///< in W
+  double attitude[4] = {1, 0, 0, 0};  ///< w, x, y, z, from its frame to W
   /// Radius of a sphere; half the edges of a box; radius, radius and half the length of a cylinder, whose axis is its z.
   double half_m[3] = {0, 0, 0};
 };

@@ -118,6 +118,11 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   auto drive = load_rows<sim::Drive<L<T>>>(s.body.drive, first);
   if (plan.sets_voltages) drive.voltages = commanded(s, episode, first);
   else drive.input = add_action(episode, base);
+  if (plan.task.hand_back.rests > 0) {
+    const auto rests = episode.handed_back > zero;
+    drive.input = {where(rests, zero, drive.input.amplitude_V), where(rests, zero, drive.input.difference_V),
+                   where(rests, zero, drive.input.bias_V), where(rests, zero, drive.input.split_cycle)};
+  }
   std::uint32_t any_status = 0;
   for (int i = 0; i < kWidth<T>; ++i) any_status |= s.body.status[first + i];
   if (__builtin_expect(plan.sets_voltages || (any_status & sim::kDirect) != 0, 0))

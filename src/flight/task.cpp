@@ -221,7 +221,7 @@ Reward<double> read_reward(const io::Table& table) {
 double cosine_limit(double angle_rad) { return angle_rad > std::numbers::pi ? -2 : model::sin_cos_wide(angle_rad).cos; }
 
 void read_hand_back(const io::Table& table, HandBack<double>& h) {
-  h = {0, 0, -kFar, kFar, kFar, kFar, -2, -2, kFar, kFar, 0};
+  h = {0, 0, -kFar, kFar, kFar, kFar, -2, -2, kFar, kFar, 0, 0};
   const auto t = table.optional_table("hand_back");
   if (!t) return;
   const auto bound = [&](const char* name, double otherwise) { return t->number_or(name, otherwise, {-kFar, kFar}); };
@@ -236,7 +236,8 @@ void read_hand_back(const io::Table& table, HandBack<double>& h) {
        cosine_limit(bound("tilt_rad", 4)),
        bound("body_rate_rad_s", kFar),
        bound("at_s", kFar),
-       t->boolean_or("touching", false) ? 1.0 : 0.0};
+       t->boolean_or("touching", false) ? 1.0 : 0.0,
+       t->choice_or("to", "controller", {"controller", "rest"}) == "rest" ? 1.0 : 0.0};
 }
 
 void read_success(const io::Table& table, Success<double>& s) {

@@ -82,13 +82,14 @@ struct Limits {
   T arrived_by_s, arrived_x_m;  // after it, x < arrived_x_m does
 };
 
-/// When a policy is done for good and the controller flies alone: all at once, or at a time.
+/// When a policy is done for good and the controller flies alone, or the robot rests: all at once, or at a time.
 template <class T>
 struct HandBack {
   T enabled, on_estimate;  // 0 or 1; judged on the true state otherwise
   T x_m, distance_m, speed_x_m_s, speed_m_s, heading_cos, tilt_cos, body_rate_rad_s;
   T at_s;
   T touching;  // 0 or 1: whether a point of contact must touch something, besides
+  T rests;     // 0 or 1: the inputs are 0 from then on, and nobody flies
 };
 
 /// What makes a flight a success, on the true state at each control tick: it captures the goal, all at once, and later keeps it.

@@ -21,8 +21,10 @@ struct Touched {
 /// Of a point in W to a shape.
 template <class T>
 FLAPPY_INLINE Gap<T> gap_to(const Shape& shape, const Vec3<T>& p) {
-  const double* r = shape.rotation;
-  const Matrix3<T> R{{T(r[0]), T(r[1]), T(r[2])}, {T(r[3]), T(r[4]), T(r[5])}, {T(r[6]), T(r[7]), T(r[8])}};
+  const double* a = shape.attitude;
+  const auto m = rotation_matrix(Quaternion<double>{a[0], a[1], a[2], a[3]});
+  const auto row = [](const Vec3<double>& r) { return Vec3<T>{T(r.x), T(r.y), T(r.z)}; };
+  const Matrix3<T> R{row(m.row_x), row(m.row_y), row(m.row_z)};
   const Vec3<T> centre{T(shape.centre_m[0]), T(shape.centre_m[1]), T(shape.centre_m[2])};
   const Vec3<T> size{T(shape.half_m[0]), T(shape.half_m[1]), T(shape.half_m[2])};
   const Vec3<T> from_centre = p - centre;

@@ -144,7 +144,7 @@ TEST(FlyConfig, ReadsShapesAndLetsVehiclesWithPointsTouch) {
   EXPECT_EQ(shapes[1].half_m[2], 0.05);
   EXPECT_EQ(shapes[2].centre_m[1], 1);
   EXPECT_EQ(shapes[2].half_m[2], 1);
-  EXPECT_EQ(shapes[2].rotation[5], 1) << "its z is y of the world";
+  EXPECT_NEAR(shapes[2].attitude[1], -std::sqrt(0.5), 1e-15) << "its z is y of the world";
   EXPECT_EQ(c.fleet.task.constants.contact_ends, 0) << "it has points of contact, and its task does not say";
   EXPECT_EQ(read({"task.end.contact=true"}).fleet.task.constants.contact_ends, 1);
   const std::string nominal = "vehicle=" + source_path("configs/vehicles/hummingbird_nominal.toml");
