@@ -40,7 +40,9 @@ const std::vector<std::string> kBodies = {"torso", "left.leading_edge", "left.wi
 void read_contact(const io::Table& table, Vehicle& vehicle) {
   for (const std::string& name : table.keys()) {
     if (!io::is_bare(name)) table.fail(name, "is no name of a point", "letters, digits, underscores and dashes");
-    const std::string on = table.table(name).choice("on", kBodies);
+    const io::Table point = table.table(name);
+    point.accept({"on", "position_m", "stiffness_N_m", "damping_s_m", "friction", "grasp_m_s"});
+    const std::string on = point.choice("on", kBodies);
     vehicle.contact.push_back(
         {name, static_cast<ContactPoint::Body>(std::ranges::find(kBodies, on) - kBodies.begin()), {}});
   }
