@@ -87,6 +87,18 @@ struct Extent {
   double around_m = 0;  ///< to the farthest point sideways
 };
 
+/// A point of a vehicle that the world presses on where they meet (src/model/contact.hpp).
+struct ContactPoint {
+  enum class Body { torso, left_leading_edge, left_wing, right_leading_edge, right_wing };
+  std::string name;
+  Body on = Body::torso;
+  Triple position_m;         ///< in the frame of its body
+  double stiffness_N_m = 0;  ///< of the point, normal to the surface
+  double damping_s_m = 0;    ///< what restitution loses per speed of a slow impact
+  double friction = 0;
+  double grasp_m_s = 0;  ///< it holds on to a pole (a cylinder) that it meets more slowly, until a reset; 0: never
+};
+
 /// What measurements left uncertain of a vehicle: a normal distribution of parameters. Several may move together, one
 /// cause behind them.
 struct Posterior {
@@ -138,6 +150,7 @@ struct Vehicle {
   Driver driver;
   Extent extent;
   double air_density_kg_m3 = 0;
+  std::vector<ContactPoint> contact;  ///< none: surfaces are events, not forces
   /// Effects beyond the base model: identifier -> parameter -> value (src/model/effects).
   std::map<std::string, std::map<std::string, double>> effects;
   std::optional<Posterior> posterior;         ///< of the file it was read from; a vehicle drawn at random has none

@@ -1,4 +1,14 @@
-// Vehicle files: TOML with `schema = 1`, one number for every entry of parameters(), `[effects.<id>]` tables, and, where
+// Vehicle files: TOML with `schema = 1`, one number for every entry of parameters(), `[effects.<id>]` tables, points of contact as
+//
+//   [contact.left_foot]
+//   on = "torso"                                             # or left.leading_edge, left.wing, right.leading_edge, right.wing
+//   position_m = { x = 0.0, y = 0.02, z = -0.03 }            # in the frame of its body
+//   stiffness_N_m = 150.0
+//   damping_s_m = 0.5
+//   friction = 0.6
+//   grasp_m_s = 0.3                                          # optional: it holds on to a pole that it meets more slowly
+//
+// and, where
 // something is known of how far these figures can be trusted,
 //
 //   [posterior]

@@ -118,6 +118,11 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   auto drive = load_rows<sim::Drive<L<T>>>(s.body.drive, first);
   if (plan.sets_voltages) drive.voltages = commanded(s, episode, first);
   else drive.input = add_action(episode, base);
+  if (plan.task.hand_back.rests > 0) {
+    const auto rests = episode.handed_back > zero;
+    drive.input = {where(rests, zero, drive.input.amplitude_V), where(rests, zero, drive.input.difference_V),
+                   where(rests, zero, drive.input.bias_V), where(rests, zero, drive.input.split_cycle)};
+  }
   std::uint32_t any_status = 0;
   for (int i = 0; i < kWidth<T>; ++i) any_status |= s.body.status[first + i];
   if (__builtin_expect(plan.sets_voltages || (any_status & sim::kDirect) != 0, 0))
@@ -263,16 +268,20 @@ FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPla
   FlightBlock<T>& f = s.flight;
   const auto truth = load_rows<Truth<L<T>>>(f.truth, first);
   auto episode = load_rows<Episode<L<T>>>(f.episode, first);
-  T time[kWidth<T>];
-  for (int i = 0; i < kWidth<T>; ++i) time[i] = static_cast<T>(++f.tick[first + i]) * plan.task.tick_s;
+  T time[kWidth<T>], touching[kWidth<T>];
+  for (int i = 0; i < kWidth<T>; ++i) {
+    time[i] = static_cast<T>(++f.tick[first + i]) * plan.task.tick_s;
+    touching[i] = (s.body.status[first + i] & sim::kTouching) != 0 ? T(1) : T(0);
+  }
   const auto ref = setpoint(f, plan, first);
   const auto score = score_of(truth, ref);
-  const L<T> now = L<T>::load(time);
+  const L<T> now = L<T>::load(time), touches = L<T>::load(touching);
   const auto estimate = load_rows<Estimate<L<T>>>(f.estimate, first);
   const bool by_estimate = plan.task.hand_back.on_estimate > 0;
-  const auto done = by_estimate ? arrived(plan.task.hand_back, score_of(estimate, ref), estimate.body_rate_rad_s, now)
-                                : arrived(plan.task.hand_back, score, truth.body_rate_rad_s, now);
-  note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode);
+  const auto done = by_estimate
+                        ? arrived(plan.task.hand_back, score_of(estimate, ref), estimate.body_rate_rad_s, now, touches)
+                        : arrived(plan.task.hand_back, score, truth.body_rate_rad_s, now, touches);
+  note_success(plan.task.success, score, truth.body_rate_rad_s, now, episode, touches);
   episode.reward = reward_of(plan.task.reward, score, truth, now, L<T>(plan.task.tick_s), done, episode);
   episode.action_reward += episode.reward;
   episode.handed_back = where(done, L<T>(1), episode.handed_back);
@@ -286,7 +295,7 @@ FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPla
   for (int i = 0; i < kWidth<T>; ++i) {
     const std::uint32_t status = s.body.status[first + i];
     if (status & sim::kFrozen) f.ended[first + i] |= kNotFinite;
-    if (plan.task.contact_ends > 0 && (status & ~(std::uint32_t{sim::kFrozen} | sim::kDirect)))
+    if (plan.task.contact_ends > 0 && (status & ~(std::uint32_t{sim::kFrozen} | sim::kTouching | sim::kDirect)))
       f.ended[first + i] |= kContact;
   }
   L<T> row[kMaxObservation];

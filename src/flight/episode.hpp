@@ -130,24 +130,24 @@ FLAPPY_INLINE auto shorter(const Vec3<T>& v, const Element<T>& limit) {
   return dot(v, v) < T(limit) * T(limit);
 }
 
-/// Lanes where the policy's work is done.
+/// Lanes where the policy's work is done. `touches`: 0 or 1, whether a point of contact touches something.
 template <class T>
-FLAPPY_INLINE auto arrived(const HandBack<Element<T>>& k, const Score<T>& s, const Vec3<T>& body_rate,
-                           const T& time_s) {
+FLAPPY_INLINE auto arrived(const HandBack<Element<T>>& k, const Score<T>& s, const Vec3<T>& body_rate, const T& time_s,
+                           const T& touches = T(1)) {
   const auto there = (s.position_m.x > T(k.x_m)) & shorter(s.position_m, k.distance_m) &
                      (abs(s.velocity_m_s.x) < T(k.speed_x_m_s)) & shorter(s.velocity_m_s, k.speed_m_s) &
                      (s.heading_cos > T(k.heading_cos)) & (s.upright > T(k.tilt_cos)) &
-                     shorter(body_rate, k.body_rate_rad_s);
+                     shorter(body_rate, k.body_rate_rad_s) & (touches >= T(k.touching));
   return (T(k.enabled) > T(0)) & (there | (time_s >= T(k.at_s)));
 }
 
 /// Notes when the goal was first captured, and when it was first not kept.
 template <class T>
 FLAPPY_INLINE void note_success(const Success<Element<T>>& k, const Score<T>& s, const Vec3<T>& body_rate,
-                                const T& time_s, Episode<T>& e) {
+                                const T& time_s, Episode<T>& e, const T& touches = T(1)) {
   const auto captures = shorter(s.position_m, k.distance_m) & shorter(s.velocity_m_s, k.speed_m_s) &
                         shorter(body_rate, k.body_rate_rad_s) & (s.upright > T(k.tilt_cos)) &
-                        (s.heading_cos > T(k.heading_cos));
+                        (s.heading_cos > T(k.heading_cos)) & (touches >= T(k.touching));
   const auto first = (e.captured_s == T(0)) & (time_s < T(k.by_s));
   e.captured_s = where(captures & first, time_s, e.captured_s);
   const auto keeps = shorter(s.position_m, k.keep_distance_m) & (s.upright > T(k.keep_tilt_cos)) &

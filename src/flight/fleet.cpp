@@ -331,6 +331,11 @@ std::uint32_t Fleet<T>::ended(std::size_t i) const {
   return f.ended[lane];
 }
 template <class T>
+std::uint32_t Fleet<T>::events(std::size_t i) const {
+  const bool may_touch = !sim::storage_of(storage_->batch).points.empty() && storage_->plan.task.contact_ends <= 0;
+  return storage_->batch.status(i) & (may_touch ? sim::kFrozen : ~std::uint32_t{sim::kTouching});
+}
+template <class T>
 std::uint32_t Fleet<T>::tick(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
   return f.tick[lane];
@@ -456,6 +461,10 @@ std::vector<std::span<std::byte>> Fleet<T>::memory() {
     all.push_back(std::as_writable_bytes(std::span(body.block_effects)));
     all.push_back(std::as_writable_bytes(std::span(body.effect_rows)));
     all.push_back(std::as_writable_bytes(std::span(body.effect_states)));
+  }
+  if (!body.points.empty()) {
+    all.push_back(std::as_writable_bytes(std::span(body.contact_rows)));
+    all.push_back(std::as_writable_bytes(std::span(body.contact_memory)));
   }
   if (body.mean) {
     all.push_back(std::as_writable_bytes(std::span(body.mean->rows)));

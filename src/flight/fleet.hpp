@@ -59,7 +59,8 @@ struct Snapshot {
   std::uint64_t effects = 0;    ///< in force
   std::vector<T> effect_rows, effect_states;
   std::vector<T> motors;  ///< conductance and back-EMF's current of left and right, where energy is metered
-  std::pair<std::vector<T>, std::vector<T>> mean;  ///< rows and memory of a robot that is known by the beat
+  std::pair<std::vector<T>, std::vector<T>> mean;     ///< rows and memory of a robot that is known by the beat
+  std::pair<std::vector<T>, std::vector<T>> contact;  ///< the same of points of contact
   std::uint32_t phase, phase_per_update;
   Target target;  ///< where it was meant to be
 };
@@ -122,7 +123,10 @@ class Fleet {
   sim::Input input(std::size_t i) const;
   double reward(std::size_t i) const;
   std::uint32_t ended(std::size_t i) const;  ///< bits of Ended, since the start
-  std::uint32_t tick(std::size_t i) const;   ///< control periods since the start
+  /// Bits of sim::Status that are events, since the start: of a vehicle with points of contact whose task does not end by it, touching
+  /// is none.
+  std::uint32_t events(std::size_t i) const;
+  std::uint32_t tick(std::size_t i) const;  ///< control periods since the start
   bool handed_back(std::size_t i) const;
   double captured_s(std::size_t i) const;  ///< when the goal was first captured; 0: not yet
   double lost_s(std::size_t i) const;      ///< when it was first not kept, as the task asks; 0: never

@@ -269,10 +269,11 @@ Snapshot<T> Fleet<T>::Storage::snapshot(std::size_t i, const Target& target) {
   auto& body = sim::storage_of(batch);
   const auto [block, lane] = body.at(i);
   const FlightBlock<T>& f = at(i).block;
-  Snapshot<T> s{{}, {}, 0, {}, {}, {}, {}, block.phase[lane], block.phase_per_update[lane], target};
+  Snapshot<T> s{{}, {}, 0, {}, {}, {}, {}, {}, block.phase[lane], block.phase_per_update[lane], target};
   s.effects = body.get_effects(i, s.effect_rows, s.effect_states);
   s.motors = body.get_motors(i);
   s.mean = body.get_mean(i);
+  s.contact = body.get_contact(i);
   for (int r = 0; r < kBodyRows; ++r) s.body.push_back(rows_of<T>(block)[r][lane]);
   for (int r = 0; r < kFlightRows<T>; ++r) s.flight.push_back(rows_of<T>(f)[r][lane]);
   return s;
@@ -313,6 +314,14 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   x.attitude = rotated_q(x.attitude);
   x.com_velocity_m_s = rotated_z(x.com_velocity_m_s);
   put(x, block.state, lane);
+  auto contact = s.contact;  // its anchors go along
+  for (std::size_t k = 0; k + 3 < contact.second.size(); k += 4) {
+    T* const anchor = &contact.second[k];
+    if (!(anchor[3] > 0)) continue;
+    const Vec3<double> moved = at_m + rotated_z(Vec3<double>{anchor[0], anchor[1], anchor[2]} - from);
+    anchor[0] = static_cast<T>(moved.x), anchor[1] = static_cast<T>(moved.y), anchor[2] = static_cast<T>(moved.z);
+  }
+  sim::storage_of(batch).put_contact(i, contact.first, contact.second);
 
   const auto imu = get<Imu<double>>(f.imu, lane);
   const auto learnt = get<Estimator<double>>(f.estimator, lane);

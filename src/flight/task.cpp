@@ -221,7 +221,7 @@ Reward<double> read_reward(const io::Table& table) {
 double cosine_limit(double angle_rad) { return angle_rad > std::numbers::pi ? -2 : model::sin_cos_wide(angle_rad).cos; }
 
 void read_hand_back(const io::Table& table, HandBack<double>& h) {
-  h = {0, 0, -kFar, kFar, kFar, kFar, -2, -2, kFar, kFar};
+  h = {0, 0, -kFar, kFar, kFar, kFar, -2, -2, kFar, kFar, 0, 0};
   const auto t = table.optional_table("hand_back");
   if (!t) return;
   const auto bound = [&](const char* name, double otherwise) { return t->number_or(name, otherwise, {-kFar, kFar}); };
@@ -235,7 +235,9 @@ void read_hand_back(const io::Table& table, HandBack<double>& h) {
        cosine_limit(bound("heading_rad", 4)),
        cosine_limit(bound("tilt_rad", 4)),
        bound("body_rate_rad_s", kFar),
-       bound("at_s", kFar)};
+       bound("at_s", kFar),
+       t->boolean_or("touching", false) ? 1.0 : 0.0,
+       t->choice_or("to", "controller", {"controller", "rest"}) == "rest" ? 1.0 : 0.0};
 }
 
 void read_success(const io::Table& table, Success<double>& s) {
@@ -252,7 +254,8 @@ void read_success(const io::Table& table, Success<double>& s) {
        t->number("keep.until_s", io::non_negative()),
        t->number("keep.distance_m", io::positive()),
        angle("keep.tilt_rad"),
-       angle("keep.heading_rad")};
+       angle("keep.heading_rad"),
+       t->boolean_or("capture.touching", false) ? 1.0 : 0.0};
 }
 
 /// What an action is, and what -1 and 1 of it are.
@@ -391,7 +394,8 @@ Task read_task(const io::Table& table, double tick_s) {
   const auto limit = [&](const char* name, double otherwise) {
     return table.number_or(std::string("end.") + name, otherwise, {-kFar, kFar});
   };
-  k.contact_ends = table.boolean_or("end.contact", true) ? 1 : 0;
+  task.says_contact = table.has("end.contact");
+  k.contact_ends = !task.says_contact || table.boolean("end.contact") ? 1 : 0;
   k.limits = {table.number("end.time_s", {tick_s, 1e6}),
               limit("x_low_m", -kFar),
               limit("x_high_m", kFar),

@@ -82,12 +82,14 @@ struct Limits {
   T arrived_by_s, arrived_x_m;  // after it, x < arrived_x_m does
 };
 
-/// When a policy is done for good and the controller flies alone: all at once, or at a time.
+/// When a policy is done for good and the controller flies alone, or the robot rests: all at once, or at a time.
 template <class T>
 struct HandBack {
   T enabled, on_estimate;  // 0 or 1; judged on the true state otherwise
   T x_m, distance_m, speed_x_m_s, speed_m_s, heading_cos, tilt_cos, body_rate_rad_s;
   T at_s;
+  T touching;  // 0 or 1: whether a point of contact must touch something, besides
+  T rests;     // 0 or 1: the inputs are 0 from then on, and nobody flies
 };
 
 /// What makes a flight a success, on the true state at each control tick: it captures the goal, all at once, and later keeps it.
@@ -95,6 +97,7 @@ template <class T>
 struct Success {
   T by_s, distance_m, speed_m_s, body_rate_rad_s, tilt_cos, heading_cos;          // capture
   T keep_from_s, keep_until_s, keep_distance_m, keep_tilt_cos, keep_heading_cos;  // and after
+  T touching;  // 0 or 1: whether a point of contact must touch something at the capture
 };
 
 template <class T>
@@ -105,7 +108,7 @@ struct TaskConstants {
   Limits<T> limits;
   HandBack<T> hand_back;
   Success<T> success;
-  T contact_ends;  // 0 or 1
+  T contact_ends;  // 0 or 1: that the vehicle touches something
   T holds_trim;    // 0 or 1: until it is handed back to, the controller adds no more than the trim it has learnt
   T tick_s;
 };
@@ -135,6 +138,7 @@ struct Task {
   std::string input_unit =
       "V";  ///< of a wing beat's first three inputs; "1" where a vehicle that is known by the beat mixes them
   TaskConstants<double> constants{};
+  bool says_contact = false;  ///< whether contact ends it; otherwise it does unless the vehicle has points of contact
 
   /// Names of the parts observed, with their signals as they are now.
   std::vector<std::pair<std::string, std::vector<Signal>>> observed_parts() const;

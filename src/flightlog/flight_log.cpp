@@ -168,6 +168,14 @@ std::string header_text(const FlightHeader& h) {
   for (const LogWall& w : h.ambient.walls)
     walls += (walls.empty() ? "" : ", ") + array(std::array{w.x_m, w.y_m, w.normal_x, w.normal_y});
   line("walls", "[" + walls + "]");
+  const auto solids = [&](const char* key, const auto& rows) {
+    std::string list;
+    for (const auto& row : rows) list += (list.empty() ? "" : ", ") + array(row);
+    if (!list.empty()) line(key, "[" + list + "]");
+  };
+  solids("spheres", h.ambient.spheres);
+  solids("boxes", h.ambient.boxes);
+  solids("cylinders", h.ambient.cylinders);
 
   if (!h.inputs.empty()) {
     std::string list;
@@ -445,6 +453,16 @@ LogAmbient read_ambient(const io::Table& ambient) {
     normalise(length, {&wall.normal_x, &wall.normal_y});
     a.walls.push_back(wall);
   }
+  const auto read = [&]<std::size_t n>(const char* key, std::vector<std::array<double, n>>& to) {
+    if (!ambient.has(key)) return;
+    for (const auto& row : ambient.rows(key, n, place)) {
+      to.emplace_back();
+      std::ranges::copy(row, to.back().begin());
+    }
+  };
+  read("spheres", a.spheres);
+  read("boxes", a.boxes);
+  read("cylinders", a.cylinders);
   return a;
 }
 

@@ -42,6 +42,10 @@ struct LogWall {
 struct LogAmbient {
   double air_density_kg_m3 = 1.18, ground_z_m = -1e3, ceiling_z_m = 1e3;
   std::vector<LogWall> walls;
+  // solids in the room, optional: centre and radius; centre, edges and attitude (w, x, y, z); ends of the axis and radius
+  std::vector<std::array<double, 4>> spheres;
+  std::vector<std::array<double, 10>> boxes;
+  std::vector<std::array<double, 7>> cylinders;
   bool operator==(const LogAmbient&) const = default;
 };
 

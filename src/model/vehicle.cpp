@@ -70,6 +70,14 @@ class Lister {
       add(path + "." + name, *value, 1e-6, 10);
     add(path + ".rotational_damping_coefficient", w.rotational_damping_coefficient, 0, 100);
   }
+  void add(ContactPoint& p) {
+    const std::string path = "contact." + p.name;
+    add(path + ".position_m", p.position_m);
+    add(path + ".stiffness_N_m", p.stiffness_N_m, 1e-3, 1e6);
+    add(path + ".damping_s_m", p.damping_s_m, 0, 100);
+    add(path + ".friction", p.friction, 0, 10);
+    list_.push_back({path + ".grasp_m_s", &p.grasp_m_s, 0, 10, true});
+  }
   void add(BeatAveraged& b) {
     constexpr double kAny = 1e6;
     for (BeatAveraged::Actuator& a : b.actuators) {
@@ -137,6 +145,7 @@ std::vector<Parameter> parameters(Vehicle& v) {
   l.add("torso", v.torso);
   l.add("left", v.left);
   l.add("right", v.right);
+  for (ContactPoint& p : v.contact) l.add(p);
   add_effects();
   return list;
 }

@@ -1,10 +1,12 @@
 #include "flappy/vehicle_file.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "io/config.hpp"
 #include "io/toml_writer.hpp"
 #include "model/beat_averaged.hpp"
+#include "model/contact.hpp"
 #include "model/effects/registry.hpp"
 #include "model/posterior.hpp"
 
@@ -31,6 +33,24 @@ void read_effects(const io::Table& table, Vehicle& vehicle) {
   }
 }
 
+const std::vector<std::string> kBodies = {"torso", "left.leading_edge", "left.wing", "right.leading_edge",
+                                          "right.wing"};
+
+/// Names of the points and the bodies that they are on; their figures are parameters.
+void read_contact(const io::Table& table, Vehicle& vehicle) {
+  for (const std::string& name : table.keys()) {
+    if (!io::is_bare(name)) table.fail(name, "is no name of a point", "letters, digits, underscores and dashes");
+    const io::Table point = table.table(name);
+    point.accept({"on", "position_m", "stiffness_N_m", "damping_s_m", "friction", "grasp_m_s"});
+    const std::string on = point.choice("on", kBodies);
+    vehicle.contact.push_back(
+        {name, static_cast<ContactPoint::Body>(std::ranges::find(kBodies, on) - kBodies.begin()), {}});
+  }
+  if (vehicle.contact.empty() || vehicle.contact.size() > kMostContactPoints)
+    table.fail("", vehicle.contact.empty() ? "has no point" : "has too many points",
+               "1 to " + std::to_string(kMostContactPoints) + " tables [contact.NAME]");
+}
+
 const std::string kMultibody = "multibody", kBeatAveraged = "beat_averaged", kPredicted = "predicted";
 
 }  // namespace
@@ -39,12 +59,18 @@ Vehicle read_any_vehicle(const std::filesystem::path& path, const std::vector<st
   const io::Table root = io::Config::load(path, overrides).root();
   root.schema(1);
   Vehicle vehicle;
-  std::vector<std::string> keys = {"schema", "name", "model", "effects", "posterior"};
+  std::vector<std::string> keys = {"schema", "name", "model", "effects", "posterior", "contact"};
   const std::string model = root.choice_or("model", kMultibody, {kMultibody, kBeatAveraged, kPredicted});
   if (model != kMultibody) {
     vehicle.beat_averaged = read_beat_averaged(root, model == kPredicted);
     for (const char* key : {"beat", "input", "actuator", "coefficients"}) keys.emplace_back(key);
     if (model == kBeatAveraged) keys.emplace_back("wrench");
+  }
+  if (const auto table = root.optional_table("contact")) {
+    if (vehicle.beat_averaged)
+      root.fail("contact", "is given, but a robot that is known by the beat has no points that touch",
+                "a vehicle of wings and motors");
+    read_contact(*table, vehicle);
   }
   for (const Parameter& p : parameters(vehicle)) keys.push_back(p.path.substr(0, p.path.find('.')));
   root.accept(keys);
@@ -93,6 +119,8 @@ std::string vehicle_text(const Vehicle& vehicle) {
   if (vehicle.beat_averaged)
     text += "model = " + io::toml_string(vehicle.beat_averaged->predicted ? kPredicted : kBeatAveraged) + "\n" +
             beat_averaged_text(*vehicle.beat_averaged);
+  for (const ContactPoint& p : vehicle.contact)
+    text += "contact." + p.name + ".on = " + io::toml_string(kBodies[static_cast<std::size_t>(p.on)]) + "\n";
   Vehicle copy = vehicle;
   for (const Parameter& p : parameters(copy))
     if ((!p.optional || *p.value != 0) && !p.path.starts_with("coefficients."))

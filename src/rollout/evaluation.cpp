@@ -18,10 +18,11 @@ using flight::Task;
 
 constexpr double kNever_s = 1e9;
 
-/// The controller alone is not handed back to, nor does the flight end by the rules that a policy's does.
+/// The controller alone is not handed back to, unless to rest, nor does the flight end by the rules that a policy's does.
 void leave_alone(Task& task) {
   auto& k = task.constants;
-  k.holds_trim = k.hand_back.enabled = 0;
+  k.holds_trim = 0;
+  if (k.hand_back.rests == 0) k.hand_back.enabled = 0;
   k.limits.faced_by_s = k.limits.arrived_by_s = kNever_s;
 }
 
@@ -73,7 +74,7 @@ class Part {
     Outcome& o = outcomes_[i];
     o.captured_s = whole(fleet_.captured_s(i));
     o.lost_s = whole(fleet_.lost_s(i));
-    o.status = fleet_.batch().status(i);
+    o.status = fleet_.events(i);
     o.ended = fleet_.ended(i);
   }
 

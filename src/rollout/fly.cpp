@@ -102,7 +102,7 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
       const flight::Target target = fleet.target(0);  // of all, as they started together
       const bool settled = flights.t_s() >= config.settle_s - 1e-9;
       flights.each([&](std::size_t i) {
-        if (!config.welded) scores[i].add(fleet.truth(i), target, fleet.batch().status(i), flights.t_s(), settled);
+        if (!config.welded) scores[i].add(fleet.truth(i), target, fleet.events(i), flights.t_s(), settled);
         if (ended[i] == 0) ended[i] = fleet.ended(i);
       });
       result.scoring_s += seconds_since(before);

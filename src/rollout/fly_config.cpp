@@ -7,6 +7,7 @@
 #include "io/sha256.hpp"
 #include "io/toml_writer.hpp"
 #include "model/beat_averaged.hpp"
+#include "model/contact.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::rollout {
@@ -41,6 +42,31 @@ auto for_file(const std::string& name, const Read& read) {
   }
 }
 
+void read_shapes(const io::Table& world, sim::World& w) {
+  constexpr io::Range kPlace{-1e4, 1e4}, kAngle{-100, 100};
+  double a[3], b[3], c[3];
+  const auto read = [](const io::Table& t, const char* key, io::Range range, double(&to)[3]) {
+    std::ranges::copy(t.numbers(key, 3, range), to);
+  };
+  for (const io::Table& t : world.tables("sphere")) {
+    read(t, "centre_m", kPlace, a);
+    w.shapes.push_back(sim::sphere(a, t.number("radius_m", io::positive(1e4))));
+  }
+  for (const io::Table& t : world.tables("box")) {
+    read(t, "centre_m", kPlace, a);
+    read(t, "edges_m", io::positive(1e4), b);
+    std::ranges::fill(c, 0);
+    if (t.has("rotation_rad")) read(t, "rotation_rad", kAngle, c);
+    w.shapes.push_back(sim::box(a, b, c));
+  }
+  for (const io::Table& t : world.tables("cylinder")) {
+    read(t, "from_m", kPlace, a);
+    read(t, "to_m", kPlace, b);
+    if (std::ranges::equal(a, b)) t.fail("to_m", "is where from_m is", "the other end of the axis");
+    w.shapes.push_back(sim::cylinder(a, b, t.number("radius_m", io::positive(1e4))));
+  }
+}
+
 sim::World read_world(const io::Table& root) {
   constexpr io::Range kPlace{-1e4, 1e4};
   sim::World w;
@@ -51,6 +77,7 @@ sim::World read_world(const io::Table& root) {
   w.ceiling_z_m = table->number_or("ceiling_z_m", w.ceiling_z_m, kPlace);
   if (w.ceiling_z_m <= w.ground_z_m)
     table->fail("ceiling_z_m", "is not above the ground", "a ceiling above ground_z_m");
+  read_shapes(*table, w);
   if (!table->has("walls")) return w;
   for (const auto& row : table->rows("walls", 4, kPlace)) {
     const double length = std::sqrt(row[2] * row[2] + row[3] * row[3]);
@@ -112,6 +139,7 @@ class Reader {
     root_.finish();
     if (c_.fleet.task.sets_voltages()) refuse_inputs();
     if (c_.vehicle.beat_averaged) refuse_wings();
+    if (!c_.vehicle.contact.empty() && !c_.fleet.task.says_contact) c_.fleet.task.constants.contact_ends = 0;
     if (c_.welded && c_.fleet.task.start.settled)
       root_.fail("flight.support",
                  "is \"welded\", but task " + io::toml_string(c_.fleet.task.name) + " starts from hover", "\"task\"");
@@ -221,6 +249,11 @@ class Reader {
         root_.fail("flight.step_s",
                    "is longer than the " + io::shortest_digits(1 / rate) + " s between samples of a sensor",
                    "a shorter step, or a slower sensor");
+    if (const auto fault = model::contact_fault(c_.vehicle, step))
+      for_file("vehicle", [&] {
+        files_.at("vehicle").root().fail(fault->path, fault->what, fault->accepted);
+        return 0;
+      });
     const char* const delay = model::CommandDelay::kInfo.id;
     if (const auto found = c_.vehicle.effects.find(delay);
         found != c_.vehicle.effects.end() && !c_.vehicle.beat_averaged) {

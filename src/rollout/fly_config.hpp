@@ -7,6 +7,9 @@
 //   [flight]          duration_s, seed; first_flapper (0: number of the first flight), settle_s (3), control_hz (500),
 //                     step_s (250e-6), threads (0: all), support ("task", or "welded": on a stand)
 //   [world]           gravity_m_s2, ground_z_m, ceiling_z_m, walls = [[x_m, y_m, normal_x, normal_y], ...]
+//   [[world.sphere]]  centre_m = [x, y, z], radius_m
+//   [[world.box]]     centre_m, edges_m, rotation_rad = [x, y, z] (a rotation vector, optional)
+//   [[world.cylinder]] from_m, to_m (ends of its axis), radius_m
 //   [constant_input]  and [[excitation]]: excitation.hpp
 //   [log.power]       battery_nominal_V, rate_hz, latency_s, voltage_noise_V, current_noise_A
 //   [log.wings]       rate_hz, noise_rad

@@ -16,6 +16,20 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
+/// A solid of the world as a log has it.
+void add_solid(const sim::Shape& s, flightlog::LogAmbient& ambient) {
+  const double *c = s.centre_m, *q = s.attitude, *half = s.half_m;
+  if (s.kind == sim::Shape::Kind::sphere) ambient.spheres.push_back({c[0], c[1], c[2], half[0]});
+  if (s.kind == sim::Shape::Kind::box)
+    ambient.boxes.push_back({c[0], c[1], c[2], 2 * half[0], 2 * half[1], 2 * half[2], q[0], q[1], q[2], q[3]});
+  if (s.kind == sim::Shape::Kind::cylinder) {
+    const auto z = model::rotation_matrix(model::Quaternion<double>{q[0], q[1], q[2], q[3]});
+    const double way[] = {half[2] * z.row_x.z, half[2] * z.row_y.z, half[2] * z.row_z.z};
+    ambient.cylinders.push_back(
+        {c[0] - way[0], c[1] - way[1], c[2] - way[2], c[0] + way[0], c[1] + way[1], c[2] + way[2], half[0]});
+  }
+}
+
 /// Without the last digits that sums of steps leave.
 double tidy(double t_s) { return std::round(t_s * 1e9) / 1e9; }
 
@@ -117,7 +131,7 @@ struct Recorder<T>::Storage {
   double held_V[2] = {0, 0};
   struct {
     sim::Block<T> block;
-    std::vector<T> effect_states;
+    std::vector<T> effect_states, contact_memory;
   } metered;  // where power.csv is asked for
   double step_hz;
 
@@ -134,6 +148,7 @@ struct Recorder<T>::Storage {
     h.gravity_m_s2 = o.batch.world.gravity_m_s2;
     h.ambient = {config.vehicle.air_density_kg_m3, o.batch.world.ground_z_m, o.batch.world.ceiling_z_m, {}};
     for (const sim::Wall& w : o.batch.world.walls) h.ambient.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
+    for (const sim::Shape& s : o.batch.world.shapes) add_solid(s, h.ambient);
     const flight::MocapSensor& m = o.sensors.mocap;
     h.mocap = {m.rate_hz, m.latency_s, m.position_noise_m, m.attitude_noise_rad};
     h.imu = imu_header(o.sensors.imu);
@@ -163,6 +178,8 @@ struct Recorder<T>::Storage {
     const T* states = body.effects_of(block).states;
     metered.block = body.blocks[block];
     metered.effect_states.assign(states, states + body.state_size());
+    const T* const bristles = body.effects_of(block).contact.memory;
+    metered.contact_memory.assign(bristles, bristles + body.contact_memory_size());
   }
 
   double time_s(std::int64_t step) const { return static_cast<double>(step) / step_hz; }
@@ -245,6 +262,7 @@ struct Recorder<T>::Storage {
     for (std::size_t side = 0; side < 2; ++side) voltages_V[side * kLanes + lane] = static_cast<T>(held_V[side]);
     sim::BlockEffects<T> in_force = body.effects_of(flapper / kLanes);
     in_force.states = metered.effect_states.data();
+    in_force.contact.memory = metered.contact_memory.data();
     in_force.voltages_V = voltages_V;
     in_force.meter = meter;
     in_force.motors = nullptr;  // the step was metered when it was flown

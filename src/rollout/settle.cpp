@@ -25,6 +25,7 @@ std::vector<flight::Snapshot<T>> settle(const flight::FleetOptions& options, std
   if (count == 0) return list;
   flight::FleetOptions o = options;
   o.task = staying();
+  o.batch.world.shapes.clear();  // they stand where the task has them, not about the hover
   flight::Fleet<T> fleet(count, vehicle(o.first_flapper), o);
   const long settled = std::lround(seconds / fleet.period_s());
   std::vector<long> taken_at(count);  // of control ticks, over one beat

@@ -19,6 +19,9 @@ using model::Parameters;
 using model::State;
 using model::Vec3;
 
+/// h^2 omega^2 of the stiffest contact that is flown: of vehicles that are drawn about one whose file keeps to less.
+constexpr double kStiffestDrawn = 2;
+
 /// How the centre of mass moves relative to the torso origin, in W.
 Vec3<double> com_minus_origin_velocity(const Parameters<double>& p, const State<double>& x) {
   const auto whole = model::whole_vehicle<double>(p, {model::place_wing<+1>(p.left, x.left, x.body_rate_rad_s),
@@ -69,6 +72,39 @@ void Batch<T>::Storage::put_motors(std::size_t i, const std::vector<T>& rows) {
 template <class T>
 void Batch<T>::Storage::clear_energy(std::size_t i) {
   if (!motors.empty()) motors[i / kLanes<T>].energy_J[i % kLanes<T>] = 0;
+}
+
+template <class T>
+void Batch<T>::Storage::put_contact(std::size_t i, const model::Vehicle& v) {
+  if (v.contact.empty() && points.empty()) return;
+  if (!std::ranges::equal(v.contact, points, [](const model::ContactPoint& a, const model::ContactPoint& b) {
+        return a.name == b.name && a.on == b.on;
+      }))
+    throw std::invalid_argument("all flappers of a batch have the same points of contact");
+  if (const auto fault = model::contact_fault(v, step_s, kStiffestDrawn))
+    throw std::invalid_argument(fault->path + ": " + fault->what + "; accepted: " + fault->accepted);
+  T* rows = row_of_contact(i);
+  for (const auto& constants : model::contact_constants(v)) {
+    const double* from = reinterpret_cast<const double*>(&constants);
+    for (std::size_t k = 0; k < kContactRows; ++k, rows += kLanes<T>) *rows = static_cast<T>(from[k]);
+  }
+}
+
+template <class T>
+std::pair<std::vector<T>, std::vector<T>> Batch<T>::Storage::get_contact(std::size_t i) {
+  std::pair<std::vector<T>, std::vector<T>> all;
+  for (std::size_t k = 0; k < points.size() * kContactRows; ++k) all.first.push_back(row_of_contact(i)[k * kLanes<T>]);
+  for_contact_memory(i, [&](T number) { all.second.push_back(number); });
+  return all;
+}
+
+template <class T>
+void Batch<T>::Storage::put_contact(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory) {
+  if (rows.size() != points.size() * kContactRows)
+    throw std::invalid_argument("all flappers of a batch have the same points of contact");
+  for (std::size_t k = 0; k < rows.size(); ++k) row_of_contact(i)[k * kLanes<T>] = rows[k];
+  std::size_t next = 0;
+  for_contact_memory(i, [&](T& number) { number = memory[next++]; });
 }
 
 /// Of a robot that is known by the beat: its own rows have the others.
@@ -215,6 +251,13 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
   if (options.meters_energy && !vehicle.beat_averaged) s.motors.resize(s.blocks.size());
   for (std::size_t i = 0; i < count; ++i) s.put_motors(i, motor_rows<T>(vehicle));
   for (std::size_t i = 0; i < count && !vehicle.effects.empty(); ++i) s.put_effects(i, vehicle);
+  if (vehicle.contact.empty()) return;
+  s.points = vehicle.contact;
+  for (const model::ContactPoint& p : s.points) s.points_on.push_back(p.on);
+  s.contact_rows.assign(s.blocks.size() * s.points.size() * Storage::kContactRows * kLanes<T>, T(0));
+  s.contact_memory.assign(s.blocks.size() * s.points.size() * Storage::kContactMemory * kLanes<T>, T(0));
+  s.keep_effects(0);  // contact is a stage of the step with effects
+  for (std::size_t i = 0; i < s.blocks.size() * kLanes<T>; ++i) s.put_contact(i, vehicle);
 }
 
 template <class T>
@@ -239,6 +282,7 @@ void Batch<T>::set_vehicle(std::size_t i, const model::Vehicle& vehicle) {
   storage_->put_vehicle(block, lane, vehicle);
   if (storage_->mean) storage_->put_mean(i, vehicle);
   storage_->put_effects(i, vehicle);
+  storage_->put_contact(i, vehicle);
   storage_->put_motors(i, motor_rows<T>(vehicle));
 }
 
@@ -263,7 +307,8 @@ void Batch<T>::Storage::put_state(std::size_t i, const FlapperState& state, Star
   x.right = hinges(1);
   const Vec3<double> velocity{state.velocity_m_s[0], state.velocity_m_s[1], state.velocity_m_s[2]};
   x.com_velocity_m_s = velocity + com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
-  if (start == Start::standing) x.support = static_cast<double>(model::Support::standing);
+  // on points of contact it stands by itself
+  if (start == Start::standing && points.empty()) x.support = static_cast<double>(model::Support::standing);
   if (start == Start::welded) x.support = static_cast<double>(model::Support::welded);
   put(x, block.state, lane);
   block.status[lane] = 0;
@@ -280,6 +325,7 @@ void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   block.phase[lane] = 0;
   storage_->clear_energy(i);
   storage_->for_states(i, ~std::uint64_t{0}, [](T& number) { number = 0; });
+  storage_->for_contact_memory(i, [](T& number) { number = 0; });
   if (storage_->mean) *storage_->mean->memory_of(i) = 0;
 }
 
@@ -386,6 +432,7 @@ std::uint64_t Batch<T>::hash(std::size_t first, std::size_t last) const {
     h = mixed(mixed(h, block.phase[lane]), block.status[lane]);
     storage_->for_states(i, storage_->effects_of_lane(i) & ~model::sensor_effects(),
                          [&](T number) { h = mixed(h, bits_of(number)); });
+    storage_->for_contact_memory(i, [&](T number) { h = mixed(h, bits_of(number)); });
     if (storage_->mean) storage_->mean->for_memory(i, [&](T number) { h = mixed(h, bits_of(number)); });
     all = mixed(all, h);
   }

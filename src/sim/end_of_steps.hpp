@@ -3,6 +3,7 @@
 
 #include "sim/rows.hpp"
 #include "sim/step.hpp"
+#include "sim/touch.hpp"
 
 namespace flappy::sim {
 inline namespace FLAPPY_ISA {
@@ -42,6 +43,8 @@ FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const StepPl
     const L clearance = L(w.normal_x) * L(x.position_m.x - L(w.x_m)) + L(w.normal_y) * L(x.position_m.y - L(w.y_m));
     mark(flying & (clearance < p.around_m), kTouchedWall);
   }
+  for (const Shape* shape = plan.shapes; shape != plan.shapes + plan.shape_count; ++shape)
+    mark(flying & (gap_to(*shape, x.position_m).distance_m < p.around_m), kTouchedShape);
 }
 
 template <class L>

@@ -6,6 +6,7 @@
 #include "model/vehicle_dynamics.hpp"
 #include "model/wing_aerodynamics.hpp"
 #include "sim/step.hpp"
+#include "sim/touch.hpp"
 
 namespace flappy::sim {
 inline namespace FLAPPY_ISA {
@@ -30,7 +31,10 @@ struct ActiveEffects {
   Element<T>* meter = nullptr;         // of the first lane
   const Element<T>* motors = nullptr;  // rows of MotorRows, where energy is metered
   T* energy_J = nullptr;               // what motors drew beyond what the driver's voltage has them
-  T rows[kEffectRows];                 // parameters, then figures
+  ContactBlock<Element<T>> contact;    // of the first lane
+  const StepPlan* world = nullptr;
+  Touched<T>* touched = nullptr;
+  T rows[kEffectRows];  // parameters, then figures
 
   const Sides<SideFigures<T>>& figures() const {
     return *reinterpret_cast<const Sides<SideFigures<T>>*>(rows + kEffectParameterRows);
@@ -415,6 +419,12 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
 
   T slip_left(0), slip_right(0);
   if constexpr (with_effects) {
+    if (effects.contact.points > 0) {
+      const Surroundings<T>& s = acting.s;
+      touch(*effects.world, effects.contact,
+            TouchingVehicle<T>{vehicle, pose, R, s.position_m, s.velocity_B_m_s, w, s.com_m}, held, k.step, acting.body,
+            load, *effects.touched);
+    }
     slip_left = acting.hinges.left.motor_rate_rad_s - x.left.stroke_rate_rad_s;
     slip_right = acting.hinges.right.motor_rate_rad_s - x.right.stroke_rate_rad_s;
   }

@@ -33,6 +33,22 @@ FLAPPY_INLINE S load_rows(const T (*rows)[lanes], int first) {
   return s;
 }
 
+/// Rows that follow one another `stride` numbers apart, of lanes of any width.
+template <class S, class T>
+FLAPPY_INLINE S load_rows_at(const T* rows, int stride) {
+  S s;
+  using L = Lanes<T, kWidth<T>>;
+  L* to = reinterpret_cast<L*>(&s);
+  for (std::size_t i = 0; i < sizeof(S) / sizeof(L); ++i) to[i] = L::load(rows + static_cast<int>(i) * stride);
+  return s;
+}
+template <class S, class T>
+FLAPPY_INLINE void store_rows_at(const S& s, T* rows, int stride) {
+  using L = Lanes<T, kWidth<T>>;
+  const L* from = reinterpret_cast<const L*>(&s);
+  for (std::size_t i = 0; i < sizeof(S) / sizeof(L); ++i) from[i].store(rows + static_cast<int>(i) * stride);
+}
+
 /// Rows to read from again and again: in place where lanes fill a row, a copy where they are part of one. In place they
 /// leave the stack, whose spills would otherwise collide with them in the cache: 4 % of the step.
 template <class S, class T, int lanes>

@@ -139,9 +139,9 @@ FLAPPY_INLINE void shift_positions(const Parameters<L>& p, const L& reach_rad, c
 template <class T, class L>
 FLAPPY_INLINE void finish(State<L>& x, const Vec3<L>& com_m, const Voltages<L>& voltages,
                           const EnergyMeter<T, L>& meter, const Parameters<L>& p, const StepPlan& plan, Block<T>& block,
-                          int first) {
+                          bool touches_with_points, int first) {
   x.position_m = where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
-  look_around(x, p, plan, block, first);
+  if (!touches_with_points) look_around(x, p, plan, block, first);
   const typename L::Mask moves = freeze_implausible(x, block, first);
   if (rarely(!moves)) keep(!moves, load_rows<State<L>>(block.state, first), x);
   store_rows(x, block.state, first);
@@ -149,12 +149,31 @@ FLAPPY_INLINE void finish(State<L>& x, const Vec3<L>& com_m, const Voltages<L>& 
   store_rows(voltages, &block.drive[offsetof(Drive<L>, voltages) / sizeof(L)], first);
 }
 
-/// Effects remember nothing of a frozen flapper: what they saw of it last is no number that means anything.
+/// Effects and points of contact remember nothing of a frozen flapper: what they saw of it last is no number that means anything.
 template <class T>
 FLAPPY_INLINE void forget_frozen(BlockEffects<T> effects, const Block<T>& block, int first) {
-  for (int i = first; i < first + kWidth<T>; ++i)
-    if (block.status[i] & kFrozen)
-      for (int row = 0; row < state_rows(effects.kept); ++row) effects.states[row * kLanes<T> + i] = T(0);
+  for (int i = first; i < first + kWidth<T>; ++i) {
+    if (!(block.status[i] & kFrozen)) continue;
+    for (int row = 0; row < state_rows(effects.kept); ++row) effects.states[row * kLanes<T> + i] = T(0);
+    for (int row = 0; row < effects.contact.points * kRows<Bristle>; ++row)
+      effects.contact.memory[row * kLanes<T> + i] = T(0);
+  }
+}
+
+/// Says what points of contact have touched.
+template <class T, class L>
+FLAPPY_INLINE void report_touched(const Touched<L>& touched, Block<T>& block, int first) {
+  const auto mark = [&](const L& flag, std::uint32_t bit) {
+    const typename L::Mask mask = flag > L(0);
+    for (int i = 0; any(mask) && i < kWidth<T>; ++i)
+      if (mask.raw[i]) block.status[first + i] |= bit;
+  };
+  for (int i = 0; i < kWidth<T>; ++i) block.status[first + i] &= ~std::uint32_t{kTouching};
+  mark(touched.ground, kTouchedGround);
+  mark(touched.ceiling, kTouchedCeiling);
+  mark(touched.wall, kTouchedWall);
+  mark(touched.shape, kTouchedShape);
+  mark(touched.now, kTouching);
 }
 
 template <bool with_effects, class T>
@@ -170,6 +189,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     Voltages<L> voltages = load_rows<Drive<L>>(block.drive, first).voltages;
     ActiveEffects<L> effects;
     Parameters<L> own;
+    Touched<L> touched;
     if constexpr (with_effects) {
       own = p;
       effects.own = &own;
@@ -180,6 +200,13 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
       effects.meter = in_force.meter != nullptr ? in_force.meter + first : nullptr;
       effects.walls = plan.walls;
       effects.wall_count = plan.wall_count;
+      effects.contact = in_force.contact;
+      if (effects.contact.points > 0) {
+        effects.contact.rows += first;
+        effects.contact.memory += first;
+      }
+      effects.world = &plan;
+      effects.touched = &touched;
       for (int i = 0; i < kEffectRows; ++i) effects.rows[i] = L::load(in_force.rows + i * kLanes<T> + first);
     }
     Vec3<L> com_m = x.position_m + rotation_matrix(x.attitude) * centre_of_mass(p, x);
@@ -213,7 +240,9 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     }
     measure();
     shift_positions<with_effects>(p, reach_rad, L(-k.half_step), x, com_m);
-    finish(x, com_m, voltages, meter, p, plan, block, first);
+    const bool with_points = with_effects && in_force.contact.points > 0;
+    if (with_points) report_touched(touched, block, first);
+    finish(x, com_m, voltages, meter, p, plan, block, with_points, first);
     if constexpr (with_effects) forget_frozen(in_force, block, first);
   }
 }
@@ -221,7 +250,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
 template <class T>
 void step_any_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first, int steps,
                     const Ahead& ahead) {
-  if (kOldRates || (in_force.set == 0 && in_force.meter == nullptr))
+  if (kOldRates || (in_force.set == 0 && in_force.meter == nullptr && in_force.contact.points == 0))
     step_block<false>(block, in_force, plan, first, steps, ahead);
   else if constexpr (!kOldRates) step_block<true>(block, in_force, plan, first, steps, ahead);
 }

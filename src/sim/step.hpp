@@ -1,6 +1,7 @@
 // The step of a block, compiled once for each instruction set.
 #pragma once
 
+#include "flappy/vehicle.hpp"
 #include "flappy/world.hpp"
 #include "sim/block.hpp"
 #include "sim/mean_block.hpp"
@@ -14,6 +15,18 @@ struct StepPlan {
   double gravity_m_s2, ground_z_m, ceiling_z_m;
   const Wall* walls;
   std::size_t wall_count;
+  const Shape* shapes;
+  std::size_t shape_count;
+};
+
+/// Points of contact of the flappers in a block: the same points, each flapper with figures and memory of its own.
+template <class T>
+struct ContactBlock {
+  int points = 0;
+  const model::ContactPoint::Body* on = nullptr;  // the body that each is on
+  const T* rows = nullptr;                        // of model::ContactConstants, point after point
+  T* memory = nullptr;                            // of model::Bristle, point after point
+  int stride = 0;                                 // numbers of a row
 };
 
 /// What the motors of a block draw.
@@ -36,6 +49,8 @@ struct BlockEffects {
   T* meter = nullptr;
   /// Where energy is metered, if it is.
   MotorRows<T>* motors = nullptr;
+  /// Of robots that touch the world with points. Needs `rows`, whatever the set.
+  ContactBlock<T> contact;
   /// Of robots that are known by the beat.
   MeanRows<T> mean;
 };

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "flappy/batch.hpp"
+#include "model/contact.hpp"
 #include "model/effects/registry.hpp"
 #include "sim/step.hpp"
 
@@ -103,6 +104,9 @@ struct Batch<T>::Storage {
   std::vector<T> effect_states;              // [block][row][lane]
   std::vector<MotorRows<T>> motors;          // of each block, where energy is metered
   std::unique_ptr<Mean<T>> mean;             // where robots are known by the beat
+  std::vector<model::ContactPoint> points;   // of contact; their names and bodies are those of the whole batch
+  std::vector<model::ContactPoint::Body> points_on;
+  std::vector<T> contact_rows, contact_memory;  // [block][point][row][lane]
 
   struct Place {
     Block<T>& block;
@@ -120,7 +124,9 @@ struct Batch<T>::Storage {
             world.ground_z_m,
             world.ceiling_z_m,
             world.walls.data(),
-            world.walls.size()};
+            world.walls.size(),
+            world.shapes.data(),
+            world.shapes.size()};
   }
   BlockEffects<T> effects_of(std::size_t b) {
     BlockEffects<T> all;
@@ -129,7 +135,25 @@ struct Batch<T>::Storage {
              effect_states.data() + b * state_size()};
     if (!motors.empty()) all.motors = &motors[b];
     if (mean) all.mean = mean->block(b);
+    if (!points.empty())
+      all.contact = {static_cast<int>(points.size()), points_on.data(), row_of_contact(b * kLanes<T>),
+                     memory_of_contact(b * kLanes<T>), kLanes<T>};
     return all;
+  }
+  static constexpr std::size_t kContactRows = model::kRows<model::ContactConstants>;
+  static constexpr std::size_t kContactMemory = model::kRows<model::Bristle>;
+  /// Of flapper `i`, a number each kLanes.
+  T* row_of_contact(std::size_t i) {
+    return &contact_rows[i / kLanes<T> * points.size() * kContactRows * kLanes<T> + i % kLanes<T>];
+  }
+  T* memory_of_contact(std::size_t i) {
+    return &contact_memory[i / kLanes<T> * points.size() * kContactMemory * kLanes<T> + i % kLanes<T>];
+  }
+  /// Numbers of a block that points of contact remember.
+  std::size_t contact_memory_size() const { return points.size() * kContactMemory * kLanes<T>; }
+  /// Calls `use(number)` for each that the points of contact of flapper `i` remember.
+  void for_contact_memory(std::size_t i, const auto& use) {
+    for (std::size_t k = 0; k < points.size() * kContactMemory; ++k) use(memory_of_contact(i)[k * kLanes<T>]);
   }
   /// Numbers of a block that effects remember.
   std::size_t state_size() const { return static_cast<std::size_t>(model::state_rows(effects_kept)) * kLanes<T>; }
@@ -162,6 +186,11 @@ struct Batch<T>::Storage {
   std::vector<T> get_motors(std::size_t i) const;
   void put_motors(std::size_t i, const std::vector<T>& rows);
   void clear_energy(std::size_t i);
+  /// std::invalid_argument where its points are not those of the batch, or too stiff for the step.
+  void put_contact(std::size_t i, const model::Vehicle& v);
+  /// Rows and memory of the points of contact of flapper `i`, to be put to one of any batch with the same points.
+  std::pair<std::vector<T>, std::vector<T>> get_contact(std::size_t i);
+  void put_contact(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
   void put_effects(std::size_t i, const model::Vehicle& v);
   void put_effects_of_sensors(std::size_t i, const model::Vehicle& v);
   void put_effect_rows(std::size_t i, const model::Vehicle& v);

@@ -146,7 +146,11 @@ Json take_swapped(FlightLog& log, Packing& packing, Json& notes) {
 Json json_of(const flightlog::LogAmbient& a) {
   Json walls = Json::array();
   for (const flightlog::LogWall& w : a.walls) walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
-  return {{"ground_z_m", a.ground_z_m}, {"ceiling_z_m", a.ceiling_z_m}, {"walls", walls}};
+  Json json = {{"ground_z_m", a.ground_z_m}, {"ceiling_z_m", a.ceiling_z_m}, {"walls", walls}};
+  if (!a.spheres.empty()) json["spheres"] = a.spheres;
+  if (!a.boxes.empty()) json["boxes"] = a.boxes;
+  if (!a.cylinders.empty()) json["cylinders"] = a.cylinders;
+  return json;
 }
 
 /// What lies between an instant and its sample's time, as declared.

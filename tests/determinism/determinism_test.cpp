@@ -281,6 +281,74 @@ void one_hash_of_set(std::uint64_t golden) {
 TEST(Determinism, VoltagesInFloat) { one_hash_of_set<float>(kGoldenVoltagesFloat); }
 TEST(Determinism, VoltagesInDouble) { one_hash_of_set<double>(kGoldenVoltagesDouble); }
 
+// ---- points of contact that touch ground, wall and solids, that slide and grasp
+
+constexpr std::uint64_t kGoldenContactFloat = 0x670bea869993d833;
+constexpr std::uint64_t kGoldenContactDouble = 0xd33764b229ea2eba;
+
+/// As many as fill blocks and leave some over.
+constexpr std::size_t kTouch = 19;
+
+/// Hash of kTouch flappers that fall and flap among solids.
+template <class T>
+std::uint64_t hash_of_touching(std::size_t size, int threads, const std::string& instruction_set) {
+  static const model::Vehicle legs = model::read_vehicle(test::source_path("configs/vehicles/hummingbird_legs.toml"));
+  BatchOptions options;
+  options.threads = threads;
+  options.instruction_set = instruction_set;
+  options.world.ground_z_m = 0;
+  options.world.walls = {{0.15, 0, -1, 0}};
+  options.world.shapes = {box({0, 0, 0}, {0.1, 0.3, 0.06}, {0.2, 0.1, 0.5}), sphere({-0.15, 0, 0.05}, 0.06),
+                          cylinder({0.1, -0.2, 0.08}, {0.05, 0.2, 0.1}, 0.02)};
+  std::uint64_t all = 0;
+  std::uint32_t touched = 0;
+  std::size_t together = 0;
+  for (std::size_t first = 0; first < kTouch; first += size) {
+    const std::size_t count = std::min(size, kTouch - first);
+    Batch<T> batch(count, legs, options);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t id = first + i;
+      model::Vehicle v = legs;
+      v.torso.mass_kg *= 1 + 0.01 * static_cast<double>(id);
+      v.contact[id % 4].friction = 0.1 * static_cast<double>(id);
+      if (id % 5 == 0) v.effects["ground_effect"] = {{"gain", 0.2}, {"length_m", 0.05}};
+      batch.set_vehicle(i, v);
+      FlapperState s;
+      s.position_m[0] = 0.02 * static_cast<double>(id) - 0.2;
+      s.position_m[1] = 0.01 * static_cast<double>(id % 7);
+      s.position_m[2] = 0.16;
+      s.velocity_m_s[0] = 0.2 * static_cast<double>(id % 3);
+      s.body_rate_rad_s[1] = static_cast<double>(id % 4);
+      batch.reset(i, s, id % 4 == 0 ? Start::standing : Start::flying);
+      batch.set_input(i, {static_cast<double>(id % 10), 0.5, -0.2, 0.02});
+    }
+    for (int period = 0; period < 40; ++period) batch.step(kSteps);
+    EXPECT_EQ(batch.count_status(kFrozen), 0u);
+    for (std::size_t i = 0; i < count; ++i) {
+      all = all * 31 + batch.hash(i, i + 1);
+      touched |= batch.status(i);
+      together += (batch.status(i) & kTouchedShape) != 0;
+    }
+  }
+  EXPECT_EQ(touched, kTouchedGround | kTouchedWall | kTouchedShape | kTouching);
+  EXPECT_GT(together, kTouch / 2);
+  return all;
+}
+
+template <class T>
+void one_hash_of_touching(std::uint64_t golden) {
+  std::vector<std::size_t> sizes = test::kBatchSizes;
+  sizes.push_back(kTouch);
+  for (const std::string& set : test::instruction_sets())
+    for (const std::size_t size : sizes) {
+      const std::uint64_t hash = hash_of_touching<T>(size, size == kTouch ? 3 : 1, set);
+      EXPECT_EQ(hash, golden) << set << ", batches of " << size << ": 0x" << std::hex << hash;
+    }
+}
+
+TEST(Determinism, ContactInFloat) { one_hash_of_touching<float>(kGoldenContactFloat); }
+TEST(Determinism, ContactInDouble) { one_hash_of_touching<double>(kGoldenContactDouble); }
+
 TEST(Determinism, HashSeesEveryNumber) {
   Batch<float> a = fly<float>(0, 2, 1, ""), b = fly<float>(0, 2, 1, "");
   EXPECT_EQ(a.hash(), b.hash());

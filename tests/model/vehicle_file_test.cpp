@@ -272,6 +272,49 @@ TEST_F(VehicleFile, TextKeepsThePosterior) {
   expect_same(back, v);
 }
 
+TEST_F(VehicleFile, TextKeepsPointsOfContact) {
+  Vehicle v = test::nominal();
+  v.contact = {{"foot", ContactPoint::Body::torso, {0.01, -0.02, -0.03}, 150, 0.5, 0.6, 0.3},
+               {"tip", ContactPoint::Body::right_wing, {0, -0.07, -0.01}, 20, 0, 0.1, 0}};
+  const Vehicle back = read(vehicle_text(v));
+  ASSERT_EQ(back.contact.size(), 2u);
+  EXPECT_EQ(back.contact[1].name, "tip");
+  EXPECT_EQ(back.contact[1].on, ContactPoint::Body::right_wing);
+  expect_same(back, v);
+  EXPECT_EQ(vehicle_text(v).find("contact.tip.grasp_m_s"), std::string::npos);
+}
+
+TEST_F(VehicleFile, RefusesWhatIsNoPointOfContact) {
+  const auto point = [](const std::string& name, const std::string& more = "") {
+    return "\n[contact." + name +
+           "]\non = \"torso\"\nposition_m = { x = 0.0, y = 0.0, z = 0.0 }\nstiffness_N_m = 100.0\n" +
+           "damping_s_m = 0.5\n" + (more.empty() ? "friction = 0.6\n" : more);
+  };
+  EXPECT_EQ(with(point("foot")), "accepted");
+  EXPECT_EQ(with(point("foot", "^friction_N = 0.6\n")).substr(0, 40), "^: contact.foot.friction_N: unknown key;");
+  EXPECT_NE(with(point("\"left foot\"")).find("is no name of a point; accepted: letters"), std::string::npos);
+  EXPECT_NE(with("\n[contact]\n").find("contact: has no point; accepted: 1 to 16 tables [contact.NAME]"),
+            std::string::npos);
+  std::string many;
+  for (int i = 0; i < 17; ++i) many += point("p" + std::to_string(i));
+  EXPECT_NE(with(many).find("contact: has too many points; accepted: 1 to 16"), std::string::npos);
+  // of a robot that is known by the beat there is nothing to touch with
+  std::string text = io::read_text(test::source_path("configs/vehicles/flapper_nimble.toml")) + point("foot");
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / ("flappy_contact_" + std::to_string(getpid()));
+  std::ofstream(file) << text;
+  try {
+    read_any_vehicle(file);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::runtime_error& e) {
+    EXPECT_NE(
+        std::string(e.what()).find("contact: is given, but a robot that is known by the beat has no points that touch"),
+        std::string::npos)
+        << e.what();
+  }
+  std::filesystem::remove(file);
+}
+
 TEST_F(VehicleFile, RefusesWhatIsNoPosterior) {
   const std::string means = "[0.011, 12.0]", fine = "[[1e-8, 1e-5], [1e-5, 0.04]]";
   EXPECT_EQ(with(posterior(kTwo, means, fine)), "accepted");
@@ -374,9 +417,10 @@ TEST_F(VehicleFile, RefusesWhatIsNoVehicle) {
             "^: air.density_kg_m3: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(edited("[torso]", "mass_kg = 10.9067e-3", "^mass_g = 10.9067"),
             "^: torso.mass_g: unknown key; accepted here with another unit: \"mass_kg\"");
-  EXPECT_EQ(edited("", "[air]", "[^wind]\nspeed_m_s = 1.0\n\n[air]"),
-            "^: wind: unknown key; accepted: air, driver, effects, extent, left, model, name, posterior, right, "
-            "schema, torso");
+  EXPECT_EQ(
+      edited("", "[air]", "[^wind]\nspeed_m_s = 1.0\n\n[air]"),
+      "^: wind: unknown key; accepted: air, contact, driver, effects, extent, left, model, name, posterior, right, "
+      "schema, torso");
   EXPECT_EQ(edited("[left.motor]", "gear_ratio = 10.0", "gear_ratio = 10.0\ngear_ratio = ^10.0"),
             "^: not valid TOML: Error while parsing key-value pair: cannot redefine existing floating-point "
             "'gear_ratio'");

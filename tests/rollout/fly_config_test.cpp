@@ -114,6 +114,12 @@ TEST(FlyConfig, RefusesInOneLine) {
   EXPECT_EQ(refusal({"world.walls=[[0, 0, 1, 1]]"}),
             "--set world.walls=[[0, 0, 1, 1]]: world.walls: normal of wall 0 has length 1.4142135623730951; accepted: "
             "[x_m, y_m, normal_x, normal_y], the normal of length 1");
+  EXPECT_EQ(refusal({"world.cylinder=[{from_m=[0, 0, 1], to_m=[0, 0, 1], radius_m=0.1}]"}),
+            "--set world.cylinder=[{from_m=[0, 0, 1], to_m=[0, 0, 1], radius_m=0.1}]: world.cylinder[0].to_m: is where "
+            "from_m is; accepted: the other end of the axis");
+  EXPECT_EQ(refusal({"world.sphere=[{centre_m=[0, 0, 1], radius_m=0}]"}),
+            "--set world.sphere=[{centre_m=[0, 0, 1], radius_m=0}]: world.sphere[0].radius_m: 0 is out of range; "
+            "accepted: a number above 0, at most 10000");
   EXPECT_EQ(refusal({"randomisation.schema=1"}),
             kHover + ": randomisation: is missing, but overridden; accepted: a file of [[randomise]] tables");
   EXPECT_EQ(refusal({"log.power={battery_nominal_V=8, rate_hz=600, latency_s=0, voltage_noise_V=0, current_noise_A=0}"})
@@ -123,6 +129,40 @@ TEST(FlyConfig, RefusesInOneLine) {
             source_path("configs/fly/none_such.json") + ": cannot be read: No such file or directory");
   EXPECT_EQ(refusal({"fligth.seed=1"}).substr(0, 60), "--set fligth.seed=1: fligth: unknown key; accepted: actor, c");
   EXPECT_EQ(message([&] { rollout::read_fly_config(pid); }).find(": flight"), std::string::npos);
+}
+
+TEST(FlyConfig, ReadsShapesAndLetsVehiclesWithPointsTouch) {
+  const auto read = [](const std::vector<std::string>& o) {
+    return rollout::read_fly_config(source_path("configs/fly/landing.toml"), o);
+  };
+  const rollout::FlyConfig c = read({"world.sphere=[{centre_m=[1, 2, 3], radius_m=0.5}]",
+                                     "world.cylinder=[{from_m=[0, 0, 0], to_m=[0, 2, 0], radius_m=0.1}]"});
+  const std::vector<sim::Shape>& shapes = c.fleet.batch.world.shapes;
+  ASSERT_EQ(shapes.size(), 3u);
+  EXPECT_EQ(shapes[0].kind, sim::Shape::Kind::sphere);
+  EXPECT_EQ(shapes[0].centre_m[2], 3);
+  EXPECT_EQ(shapes[1].half_m[2], 0.05);
+  EXPECT_EQ(shapes[2].centre_m[1], 1);
+  EXPECT_EQ(shapes[2].half_m[2], 1);
+  EXPECT_NEAR(shapes[2].attitude[1], -std::sqrt(0.5), 1e-15) << "its z is y of the world";
+  EXPECT_EQ(c.fleet.task.constants.contact_ends, 0) << "it has points of contact, and its task does not say";
+  EXPECT_EQ(read({"task.end.contact=true"}).fleet.task.constants.contact_ends, 1);
+  const std::string nominal = "vehicle=" + source_path("configs/vehicles/hummingbird_nominal.toml");
+  EXPECT_EQ(read({nominal}).fleet.task.constants.contact_ends, 1);
+  const auto refused = [&](const std::string& o) { return message([&] { read({o}); }); };
+  EXPECT_EQ(
+      refused("vehicle.contact.left_wing_tip.stiffness_N_m=2000"),
+      "--set vehicle.contact.left_wing_tip.stiffness_N_m=2000: contact.left_wing_tip.stiffness_N_m: the points of "
+      "this body are too stiff for its mass in steps of 0.00025 s; accepted: up to 286.932 N/m where all its points "
+      "are softer by as much, or shorter steps");
+  EXPECT_EQ(refused("vehicle.contact.top.on=nose"),
+            "--set vehicle.contact.top.on=nose: contact.top.on: \"nose\" is not known; accepted: \"torso\", "
+            "\"left.leading_edge\", \"left.wing\", \"right.leading_edge\", \"right.wing\"");
+  EXPECT_EQ(refused("vehicle.contact.top.friction=-1"),
+            "--set vehicle.contact.top.friction=-1: contact.top.friction: -1 is out of range; accepted: a number from "
+            "0 to 10");
+  EXPECT_EQ(refused("vehicle.contact.top.frictoin=1").substr(0, 72),
+            "--set vehicle.contact.top.frictoin=1: contact.top.frictoin: unknown key;");
 }
 
 TEST(FlyConfig, RefusesAVehicleWhoseForcesStandInFiles) {

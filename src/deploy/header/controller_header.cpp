@@ -227,6 +227,8 @@ std::string no_controller(const rollout::FlyConfig& config) {
   if (config.fleet.controller.kind == flight::kNoController) return "the policy flies by itself";
   if (task.parts >> static_cast<int>(flight::Part::wings) & 1)
     return "the policy sees the wings, which it has no sensor for";
+  if (task.constants.hand_back.touching > 0 || task.constants.hand_back.rests > 0)
+    return "it rests when the robot touches something, which it has no sensor for";
   return "";
 }
 

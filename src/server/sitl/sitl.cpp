@@ -70,7 +70,7 @@ class Flight {
       ++period_;
       recorder_->record();
       sense();
-      result_.crashed |= fleet_.batch().status(0) != 0;
+      result_.crashed |= fleet_.events(0) != 0;
       result_.stopped =
           options_.keep_going && !options_.keep_going(static_cast<double>(period_) / static_cast<double>(periods));
       if (result_.stopped) break;

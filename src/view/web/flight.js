@@ -6,7 +6,7 @@ import {meanBetween, placeOf, runningSums, unwrapped, valueAt} from "./series.js
 /**
  * @typedef {import("./packing.js").Packed} Packed
  * @typedef {import("./geometry.js").Vehicle} Vehicle
- * @typedef {{ground_z_m: number, ceiling_z_m: number, walls: number[][]}} Ambient
+ * @typedef {{ground_z_m: number, ceiling_z_m: number, walls: number[][], spheres?: number[][], boxes?: number[][], cylinders?: number[][]}} Ambient
  * @typedef {{name: string, declared: string, flapping_Hz: number, gravity_m_s2: number, vehicle: Vehicle, ambient: Ambient,
  *   wings: string, latency_s: Record<string, number>, streams: Record<string, Record<string, Packed>>,
  *   swapped: {begin_s: Packed, end_s: Packed} | null, notes: string[]}} FlightJson

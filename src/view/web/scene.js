@@ -5,7 +5,7 @@ import {rotated, spanOf} from "./geometry.js";
  * @typedef {import("./geometry.js").Vehicle} Vehicle
  * @typedef {import("./geometry.js").Side} Side
  * @typedef {{position: number[], attitude: number[], wings: number[], velocity: number[], force: number[]}} Pose
- * @typedef {{ground_z_m: number, ceiling_z_m: number, walls: number[][]}} Place
+ * @typedef {{ground_z_m: number, ceiling_z_m: number, walls: number[][], spheres?: number[][], boxes?: number[][], cylinders?: number[][]}} Place
  * @typedef {"chase" | "free" | "front" | "side" | "top"} View
  */
 
@@ -299,6 +299,7 @@ export class Scene {
       wall.lookAt(wall.position.x + nx, wall.position.y + ny, wall.position.z);
       this.scene.add(wall);
     }
+    this.addSolids(place);
     const corner = [x - half + 0.1, y - half + 0.1, this.floor_m];
     [["x", "#d55e00", [1, 0, 0]], ["y", "#009e73", [0, 1, 0]], ["z", "#0072b2", [0, 0, 1]]].forEach(([name, colour, along]) => {
       const axis = arrow(/** @type {string} */ (colour)), way = /** @type {number[]} */ (along);
@@ -315,6 +316,28 @@ export class Scene {
       dot.position.set(...goal_m);
       name.position.set(goal_m[0], goal_m[1], goal_m[2] + 0.06);
       this.scene.add(ring, dot, name);
+    }
+  }
+
+  /**
+   * What stands in the room, as the log's [ambient] has it.
+   * @param {Place} place
+   */
+  addSolids(place) {
+    const add = (/** @type {any} */ geometry, /** @type {number[]} */ at) => {
+      const solid = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({color: 0xa68a64, roughness: 0.9}));
+      solid.position.set(...at);
+      this.scene.add(solid);
+      return solid;
+    };
+    for (const [x, y, z, radius] of place.spheres ?? []) add(new THREE.SphereBufferGeometry(radius, 40, 24), [x, y, z]);
+    for (const [x, y, z, ex, ey, ez, qw, qx, qy, qz] of place.boxes ?? []) {
+      add(new THREE.BoxBufferGeometry(ex, ey, ez), [x, y, z]).quaternion.set(qx, qy, qz, qw);
+    }
+    for (const [ax, ay, az, bx, by, bz, radius] of place.cylinders ?? []) {
+      const axis = new THREE.Vector3(bx - ax, by - ay, bz - az), length = axis.length();
+      add(new THREE.CylinderBufferGeometry(radius, radius, length, 40), [(ax + bx) / 2, (ay + by) / 2, (az + bz) / 2])
+        .quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), axis.divideScalar(length));
     }
   }
 
