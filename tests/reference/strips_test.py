@@ -27,7 +27,8 @@ class Strips(unittest.TestCase):
         v, w = (0.0, 0.0, 2.0), (0.0, 50.0, 0.0)
         still = Wing(rectangle(lead=0.75 * 0.02), rotational_lift=1.0).load(v, w)["rotation"][0]
         self.assertAlmostEqual(still[0], 0.0)
-        force = Wing(rectangle(), density=1.2, rotational_lift=1.0).load(v, w)["rotation"][0]
+        force, moment = Wing(rectangle(), density=1.2, rotational_lift=1.0).load(v, w)["rotation"]
+        self.assertAlmostEqual(moment[1] / (force[0] * (0.005 - 0.01)), 1.0, places=12)  # at mid-chord
         self.assertAlmostEqual(force[0] / (1.2 * math.pi * 0.5 * 0.02**2 * 50.0 * 2.0 * 0.05), 1.0, places=12)
 
     def test_pitching_drag_is_the_integral_over_the_chord(self):
@@ -38,6 +39,13 @@ class Strips(unittest.TestCase):
             force, moment = Wing(rectangle(lead=lead), density=1.2, pitching_drag=2.0).load((0, 0, 0), (0, w, 0))["pitching"]
             self.assertAlmostEqual(force[0], sum(drag), delta=1e-7 * sum(map(abs, drag)))
             self.assertAlmostEqual(moment[1], sum(d * x for d, x in zip(drag, z)), delta=1e-7 * abs(moment[1]))
+
+    def test_added_mass_of_a_plate_that_starts_to_pitch(self):
+        # pi rho b^2 (a^2 + b^2/8) about an axis a from mid-chord, b = c/2: a flat plate's, per span.
+        force, moment = Wing(rectangle(), density=1.2, added_mass=1.0).load((0, 0, 0), (0, 0, 0), (0, 0, 0), (0, 9.0, 0))["added mass"]
+        b, a = 0.01, 0.005
+        self.assertAlmostEqual(force[0] / (math.pi * 1.2 * b**2 * a * 9.0 * 0.05), 1.0, places=12)
+        self.assertAlmostEqual(moment[1] / (-math.pi * 1.2 * b**2 * (a**2 + b**2 / 8) * 9.0 * 0.05), 1.0, places=12)
 
     def test_added_mass_gives_back_over_a_beat_what_it_took(self):
         wing, work, taken = Wing(rectangle(), added_mass=1.0), 0.0, 0.0
