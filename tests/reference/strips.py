@@ -139,16 +139,16 @@ class Gait:
 
 
 def pose(side, angles):
-    """R_BW of (stroke-plane offset, stroke, deviation, rotation): R_y(-s Phi) R_z(s psi) R_x(s phi) R_y(theta)."""
+    """R_BW of (stroke-plane offset, stroke, deviation, rotation): R_y(-Phi) R_z(s psi) R_x(s phi) R_y(theta)."""
     plane, stroke, deviation, rotation = angles
-    R = times(turned("y", -side * plane), turned("z", side * stroke))
+    R = times(turned("y", -plane), turned("z", side * stroke))
     return times(times(R, turned("x", side * deviation)), turned("y", rotation))
 
 
 def angular_velocity(side, angles, rates):
     """Of the wing relative to the body, in W: each rate about its axis, carried through the turns that follow it."""
     plane, stroke, deviation, rotation = angles
-    w = (0.0, -side * rates[0], 0.0)
+    w = (0.0, -rates[0], 0.0)
     w = add(apply(transposed(turned("z", side * stroke)), w), (0.0, 0.0, side * rates[1]))
     w = add(apply(transposed(turned("x", side * deviation)), w), (side * rates[2], 0.0, 0.0))
     return add(apply(transposed(turned("y", rotation)), w), (0.0, rates[3], 0.0))

@@ -15,6 +15,7 @@ import sys
 BIN, ROOT, FOLDER = (pathlib.Path(a) for a in sys.argv[1:4])
 sys.path.insert(0, str(ROOT / "tests/reference"))
 
+import flight  # noqa: E402
 from strips import TERMS, Gait, Wing, add, angular_velocity, apply, pose, scaled, times, total, transposed, turned  # noqa: E402
 
 GRAVITY = 9.81
@@ -153,7 +154,67 @@ def motion(gaits, up, x, frequency):
     return pose(1, angles), angular_velocity(1, angles, rates), rates
 
 
-for title, table in (("Bumblebee, computed flow", bumblebee), ("D. hydei, hover", hydei)):
+# --- vehicles: hover, power, stability -------------------------------------------------------------------------------------------------------------
+
+
+def animals():
+    for path in sorted((ROOT / "configs/vehicles").glob("*.toml")):
+        text = path.read_text()
+        if 'model = "jointed"' in text and 'mode = "free"' not in text and "[left.aerodynamics]" in text:
+            yield flight.Vehicle(path)
+
+
+def degrees(gait):
+    values = [gait.at(i / 360, 1)[0] for i in range(360)]
+    return math.degrees(max(values) - min(values)), math.degrees(gait.mean)
+
+
+def hover():
+    print("| vehicle | mass, g | beats, Hz | stroke, deg | mean | lift / weight | thrust / weight | pitching moment / (weight x wing) | lift while forward |\n|---|"
+          + "---|" * 8)
+    for v in animals():
+        force, moment = v.mean_load()
+        weight, (amplitude, mean) = v.mass * GRAVITY, degrees(v.gaits["stroke"])
+        print(f"| {v.name} | {1e3 * v.mass:.4g} | {v.frequency:.1f} | {amplitude:.1f} | {mean:.1f} | {force[2] / weight:.4f} | {force[0] / weight:.4f} | "
+              f"{moment[1] / weight / v.air['strips'][-1][0]:.4f} | {v.power()[2]:.2f} |")
+
+
+def power():
+    print("| vehicle | air, W/kg of body | without elastic storage | air, W/kg of muscle | without elastic storage |\n|---|---|---|---|---|")
+    for v in animals():
+        air, whole, _ = v.power()
+        muscle = f"{air / v.muscle_mass:.1f} | {whole / v.muscle_mass:.1f}" if v.muscle_mass else "- | -"
+        print(f"| {v.name} | {air / v.mass:.1f} | {whole / v.mass:.1f} | {muscle} |")
+
+
+def shown(root):
+    return f"{root.real:.2f}" if root.imag == 0 else f"{root.real:.2f} +- {abs(root.imag):.2f}i"
+
+
+def stability():
+    print("Derivatives without dimension: velocities over U = 2 Phi f r2, rates times the beat, forces over 1/2 rho U^2 S, moments besides over the mean chord.\n")
+    names = ("X_u", "Z_u", "M_u", "X_w", "Z_w", "M_w", "X_q", "Z_q", "M_q")
+    print("| vehicle | " + " | ".join(names) + " |\n|---|" + "---|" * 9)
+    modes = []
+    for v in animals():
+        D = flight.derivatives(v)
+        strips, stroke = v.air["strips"], degrees(v.gaits["stroke"])[0]
+        area = sum(dr * c for _, dr, c, _ in strips)
+        r2 = math.sqrt(sum(dr * c * r * r for r, dr, c, _ in strips) / area)
+        chord, U = area / (strips[-1][0] + strips[-1][1] / 2), 2 * math.radians(stroke) * v.frequency * r2
+        push = 0.5 * v.air["density"] * U**2 * 2 * area
+        figures = []
+        for name in names:
+            row, column = {"X": 0, "Z": 2, "M": 4}[name[0]], {"u": 0, "w": 2, "q": 4}[name[2]]
+            figures.append(D[row][column] * (v.frequency if column == 4 else U) / push / (chord if row == 4 else 1.0))
+        print(f"| {v.name} | " + " | ".join(f"{x:.2f}" for x in figures) + " |")
+        modes.append((v.name, flight.eigenvalues(flight.system(v, D)), flight.eigenvalues(flight.system(v, D, True))))
+    print("\n| vehicle | longitudinal modes, 1/s | lateral modes, 1/s |\n|---|---|---|")
+    for name, *both in modes:
+        print(f"| {name} | " + " | ".join("; ".join(shown(r) for r in roots if r.imag >= 0) for roots in both) + " |")
+
+
+for title, table in (("Bumblebee, computed flow", bumblebee), ("D. hydei, hover", hydei), ("Hover", hover), ("Power", power), ("Stability", stability)):
     print(f"\n## {title}\n")
     try:
         table()
