@@ -144,17 +144,17 @@ struct Jointed {
     double stop_stiffness_Nm_rad = 0, stop_damping_Nm_s = 0;
   };
   struct Strip {
-    double span_m = 0;          ///< of its middle, from the shoulder
-    double width_m = 0;         ///< along the span
+    double span_m = 0;   ///< of its middle, from the shoulder
+    double width_m = 0;  ///< along the span
     double chord_m = 0;
     double leading_edge_m = 0;  ///< above the axis of rotation
   };
   struct Wing {
     std::array<Angle, 4> angles;  ///< stroke plane, stroke, deviation, rotation
     std::vector<Strip> strips;
-    double rotational_lift = 0, added_mass = 0;         ///< factors on theory; strips alone have them
-    double rotational_damping_coefficient = 0;          ///< of strips
-    std::vector<double> normal_sin, tangential_cos;     ///< C_N, C_T; empty: the published C_N, no C_T
+    double rotational_lift = 0, added_mass = 0;      ///< factors on theory; strips alone have them
+    double rotational_damping_coefficient = 0;       ///< of strips
+    std::vector<double> normal_sin, tangential_cos;  ///< C_N, C_T; empty: the published C_N, no C_T
   };
   /// What 1 of an input adds, of which opposed ones are added on the left and taken on the right.
   struct Input : BeatAveraged::Input {

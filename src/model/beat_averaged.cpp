@@ -219,9 +219,8 @@ BeatAveraged read_beat_averaged(const io::Table& root, bool predicted) {
     const io::Table all = root.table(key);
     for (const std::string& name : all.keys()) read(all, name, all.table(name));
   };
-  each("input", [&](const io::Table&, const std::string& name, const io::Table& t) {
-    v.inputs.push_back(read_input(name, t));
-  });
+  each("input",
+       [&](const io::Table&, const std::string& name, const io::Table& t) { v.inputs.push_back(read_input(name, t)); });
   std::vector<std::string> columns;
   for (const BeatAveraged::Input& i : v.inputs) columns.push_back(i.name);
   each("actuator", [&](const io::Table& actuators, const std::string& name, const io::Table& t) {

@@ -161,9 +161,10 @@ Parameters<double> derive(const Vehicle& vehicle, double step_s) {
   p.inverse_mass_1_kg = 1 / (v.torso.mass_kg + wing_mass(v.left) + wing_mass(v.right));
   if (!v.jointed) {  // so that the velocity of its state is that of its origin
     p.fixed_moment_kg_m =
-      first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
-  p.fixed_second_kg_m2 = second_moment(v.torso) + disc(-rotor_spin(v.left.motor) - rotor_spin(v.right.motor)) +
-                         (outer(wing_mass(v.left), p.left.shoulder_m) + outer(wing_mass(v.right), p.right.shoulder_m));
+        first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
+    p.fixed_second_kg_m2 =
+        second_moment(v.torso) + disc(-rotor_spin(v.left.motor) - rotor_spin(v.right.motor)) +
+        (outer(wing_mass(v.left), p.left.shoulder_m) + outer(wing_mass(v.right), p.right.shoulder_m));
   }
   p.air_density_kg_m3 = v.air_density_kg_m3;
   p.below_m = v.extent.below_m;
@@ -180,9 +181,11 @@ double beat_Hz(const Vehicle& v) {
 namespace {
 
 JointParameters<double> joint(const Jointed::Angle& a) {
-  return {a.mean_rad, a.stiffness_Nm_rad, a.rest_rad,    a.damping_Nm_s,
-          a.lower_rad, a.upper_rad,       a.stop_stiffness_Nm_rad, a.stop_damping_Nm_s};
+  return {a.mean_rad,  a.stiffness_Nm_rad,      a.rest_rad,         a.damping_Nm_s, a.lower_rad,
+          a.upper_rad, a.stop_stiffness_Nm_rad, a.stop_damping_Nm_s};
 }
+
+double square(double x) { return x * x; }
 
 /// Strips along the span; y is `side` times the span.
 JointedSide<double> jointed_side(const Side& s, const Jointed::Wing& w, double air_density, double side) {
@@ -196,11 +199,12 @@ JointedSide<double> jointed_side(const Side& s, const Jointed::Wing& w, double a
   for (std::size_t k = 0; k < w.angles.size(); ++k) p.joints[k] = joint(w.angles[k]);
   for (const Jointed::Strip& strip : w.strips) {
     const double c = strip.chord_m, below = c - strip.leading_edge_m, y = side * strip.span_m;
-    const double z = strip.leading_edge_m - c / 2, plate = w.added_mass * air_density * std::numbers::pi * strip.width_m;
+    const double z = strip.leading_edge_m - c / 2,
+                 plate = w.added_mass * air_density * std::numbers::pi * strip.width_m;
     const double m = plate / 4 * c * c, turned = plate / 128 * c * c * c * c;
     p.added = p.added + Sym3<double>{m, m * z * z + turned, m * y * y, m * z, -m * z * y, -m * y};
     p.rotational_damping_Nm_s2 += air_density / 8 * w.rotational_damping_coefficient * strip.width_m *
-                                  (std::pow(below, 4) + std::pow(strip.leading_edge_m, 4));
+                                  (square(square(below)) + square(square(strip.leading_edge_m)));
   }
   if (w.strips.empty()) {
     SideParameters<double> air{};

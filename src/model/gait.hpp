@@ -43,8 +43,7 @@ struct InputFilter {
 
 inline InputFilter<double> input_filter(double lag_s, double time_s) {
   const double x = time_s / lag_s, left = exp(-x);
-  return {(1 + x) * left,      time_s * left,        -x / lag_s * left,
-          (1 - x) * left,      1 / (lag_s * lag_s),  2 / lag_s};
+  return {(1 + x) * left, time_s * left, -x / lag_s * left, (1 - x) * left, 1 / (lag_s * lag_s), 2 / lag_s};
 }
 
 template <class T>

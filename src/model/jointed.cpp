@@ -27,8 +27,8 @@ Jointed::Angle read_angle(const io::Table& side, const std::string& name) {
   a.mode = static_cast<Jointed::Mode>(std::ranges::find(kModes, mode) - std::begin(kModes));
   if (a.mode != Jointed::Mode::driven) return a;
   const auto series = [&](const char* key) {
-    const std::vector<double> list = t.has(key) ? t.numbers(key, {-kFullTurn_rad * 60, kFullTurn_rad * 60})
-                                                : std::vector<double>{};
+    const std::vector<double> list =
+        t.has(key) ? t.numbers(key, {-kFullTurn_rad * 60, kFullTurn_rad * 60}) : std::vector<double>{};
     if (list.size() > kMostHarmonics)
       t.fail(key, std::to_string(list.size()) + " harmonics", "at most " + std::to_string(kMostHarmonics));
     for (const double x : list)
@@ -122,8 +122,7 @@ Jointed read_jointed(const io::Table& root) {
   Jointed v;
   if (const auto inputs = root.optional_table("input"))
     for (const std::string& name : inputs->keys()) v.inputs.push_back(read_modulation(name, inputs->table(name)));
-  if (v.inputs.size() > kMostInputs)
-    root.fail("input", "there are too many", "at most " + std::to_string(kMostInputs));
+  if (v.inputs.size() > kMostInputs) root.fail("input", "there are too many", "at most " + std::to_string(kMostInputs));
   v.left = read_wing(root.table("left"));
   if (is_symmetric(root)) {
     if (root.has("right")) root.fail("right", "is beside symmetric = true", "no such table, or symmetric = false");
@@ -167,8 +166,7 @@ void check_gait(const io::Table& root, const Jointed& v) {
       const double largest = std::abs(a.mean_rad) + scale * largest_swing(a) + offset;
       if (largest > kLargestAngle_rad)
         root.fail(std::string(left ? "left." : "right.") + kAngles[k],
-                  "reaches " + io::toml_number(std::round(largest * 1e3) / 1e3) +
-                      " rad with all inputs at their ends",
+                  "reaches " + io::toml_number(std::round(largest * 1e3) / 1e3) + " rad with all inputs at their ends",
                   limit(kLargestAngle_rad) + " rad either way");
     }
   }

@@ -46,7 +46,7 @@ struct JointedSide {
   Sym3<T> edge_second_kg_m2;
   Vec3<T> wing_moment_kg_m;  // in the wing's frame
   Sym3<T> wing_second_kg_m2;
-  Sym3<T> added;             // K: kg, kg m^2, kg m^2, kg m, kg m^2, kg m
+  Sym3<T> added;  // K: kg, kg m^2, kg m^2, kg m, kg m^2, kg m
   T rotational_damping_Nm_s2;
   JointParameters<T> joints[kJoints];
 };
@@ -78,8 +78,7 @@ struct JointedPose {
     return rotate_y(plane.sin, plane.cos, rotate_z(beta.sin, beta.cos, rotate_x(lift.sin, lift.cos, p)));
   }
   FLAPPY_INLINE Vec3<T> to_E(const Vec3<T>& v) const {
-    return rotate_back_x(lift.sin, lift.cos,
-                         rotate_back_z(beta.sin, beta.cos, rotate_back_y(plane.sin, plane.cos, v)));
+    return rotate_back_x(lift.sin, lift.cos, rotate_back_z(beta.sin, beta.cos, rotate_back_y(plane.sin, plane.cos, v)));
   }
   FLAPPY_INLINE Vec3<T> to_wing(const Vec3<T>& v_E) const { return rotate_back_y(theta.sin, theta.cos, v_E); }
   FLAPPY_INLINE Vec3<T> from_wing(const Vec3<T>& v) const { return rotate_y(theta.sin, theta.cos, v); }
@@ -189,6 +188,7 @@ FLAPPY_INLINE void solve(JointedSystem<T>& s, int size) {
 /// Which unknown each angle of a side is; none below 0.
 struct FreeJoints {
   int unknown[kJoints] = {-1, -1, -1, -1};
+  bool operator==(const FreeJoints&) const = default;
 };
 
 /// The torso alone: what gravity does and its motion takes.
@@ -228,9 +228,8 @@ FLAPPY_INLINE void add_carried_air(const JointedSide<T>& p, const JointedPose<T>
   const T zero(0), one(1);
   const Vec3<T> x = g.to_B(g.from_wing({one, zero, zero})), y = g.to_B(Vec3<T>{zero, one, zero}),
                 z = g.to_B(g.from_wing({zero, zero, one})), about = cross(p.shoulder_m, x);
-  const T rows[3][kBodyUnknowns] = {{x.x, x.y, x.z, about.x, about.y, about.z},
-                                    {zero, zero, zero, y.x, y.y, y.z},
-                                    {zero, zero, zero, z.x, z.y, z.z}};
+  const T rows[3][kBodyUnknowns] = {
+      {x.x, x.y, x.z, about.x, about.y, about.z}, {zero, zero, zero, y.x, y.y, y.z}, {zero, zero, zero, z.x, z.y, z.z}};
   for (int i = 0; i < kBodyUnknowns; ++i) {
     const Vec3<T> carried = p.added * Vec3<T>{rows[0][i], rows[1][i], rows[2][i]};
     for (int k = 0; k <= i; ++k)
@@ -329,7 +328,7 @@ struct JointedMotion {
 template <class T, class Held>
 FLAPPY_INLINE JointedMotion<T> accelerate(const JointedParameters<T>& p, const Sides<JointedPose<T>>& pose,
                                           const Sides<Moving<T>[kJoints]>& q, const Sides<JointedLoad<T>>& load,
-                                          const Vec3<T>& w, const Vec3<T>& gravity_B, const Sides<FreeJoints>& free,
+                                          const Vec3<T>& w, const Vec3<T>& gravity_B, const FreeJoints (&free)[2],
                                           int size, bool carries_air, const Held& held) {
   JointedSystem<T> s;
   begin_system(p, w, gravity_B, size, s);
@@ -337,12 +336,12 @@ FLAPPY_INLINE JointedMotion<T> accelerate(const JointedParameters<T>& p, const S
   const auto side = [&](const JointedSide<T>& own, const JointedPose<T>& g, const JointedLoad<T>& acts,
                         const FreeJoints& joints) {
     const Vec3<T> moves = g.to_E(at_shoulder(own)), felt = g.to_E(at_shoulder(own) - gravity_B);
-    const SideWrench<T> taken = inertial_wrench(own, g, felt, moves, acts.air_speed_m_s, g.edge_acceleration,
-                                                g.wing_acceleration, carries_air);
+    const SideWrench<T> taken =
+        inertial_wrench(own, g, felt, moves, acts.air_speed_m_s, g.edge_acceleration, g.wing_acceleration, carries_air);
     add_side(own, g, taken, acts.force_N, acts.moment_Nm, acts.pulls, joints, carries_air, s);
   };
-  side(p.left, pose.left, load.left, free.left);
-  side(p.right, pose.right, load.right, free.right);
+  side(p.left, pose.left, load.left, free[0]);
+  side(p.right, pose.right, load.right, free[1]);
   const Vec3<T> h_left = pose.left.to_B(p.left.edge_moment_kg_m + pose.left.wing_moment),
                 h_right = pose.right.to_B(p.right.edge_moment_kg_m + pose.right.wing_moment);
   const auto second = [](const JointedSide<T>& own, const JointedPose<T>& g, const Vec3<T>& h) {
@@ -390,8 +389,8 @@ FLAPPY_INLINE JointedMotion<T> accelerate(const JointedParameters<T>& p, const S
     const Vec3<T> of_wing = taken.wing_moment - acts.moment_Nm, all = of_wing + taken.edge_moment;
     for (int j = 0; j < kJoints; ++j) torque_Nm[j] = dot(g.axis[j], j == kRotation ? of_wing : all);
   };
-  found(p.left, pose.left, q.left, load.left, free.left, m.joint_rad_s2.left, m.torque_Nm.left);
-  found(p.right, pose.right, q.right, load.right, free.right, m.joint_rad_s2.right, m.torque_Nm.right);
+  found(p.left, pose.left, q.left, load.left, free[0], m.joint_rad_s2.left, m.torque_Nm.left);
+  found(p.right, pose.right, q.right, load.right, free[1], m.joint_rad_s2.right, m.torque_Nm.right);
   return m;
 }
 

@@ -28,8 +28,8 @@ inline namespace FLAPPY_ISA {
 template <class T>
 struct Strip {
   T y_m;
-  T pressure_kg_m;      // 1/2 rho c dr
-  T circulation_kg;     // factor rho c^2 dr C_R
+  T pressure_kg_m;   // 1/2 rho c dr
+  T circulation_kg;  // factor rho c^2 dr C_R
   T chord_m;
   T leading_edge_m;
 };
@@ -60,13 +60,14 @@ FLAPPY_INLINE void add_strip(const Strip<T>& strip, const SeriesOfForce<T>& seri
   const T speed2 = T(normal * normal + chordwise * chordwise) + T(kStillAir_m2_s2);
   const T speed = sqrt(speed2), inverse = T(1) / speed;
   const T cos_alpha = chordwise * inverse, c2 = cos_alpha * cos_alpha;
-  const T P = T(series.normal[0] + series.normal[1] * cos_alpha) + c2 * T(series.normal[2] + series.normal[3] * cos_alpha);
+  const T P =
+      T(series.normal[0] + series.normal[1] * cos_alpha) + c2 * T(series.normal[2] + series.normal[3] * cos_alpha);
   const T N = -(T(strip.pressure_kg_m * T(normal * speed)) * P);
   const T behind = cos_alpha * T(T(T(T(-0.208) * c2 + T(0.112)) * c2) + T(-0.286)) + T(0.46);  // d_cp
   const T R = T(strip.circulation_kg * chordwise) * w.y;
   const T all = N + R;
-  const T about_axis = N * T(strip.leading_edge_m - strip.chord_m * behind) +
-                       R * T(strip.leading_edge_m - T(0.5) * strip.chord_m);
+  const T about_axis =
+      N * T(strip.leading_edge_m - strip.chord_m * behind) + R * T(strip.leading_edge_m - T(0.5) * strip.chord_m);
   load.force_N.x += all;
   load.moment_Nm.y += about_axis;
   load.moment_Nm.z -= strip.y_m * all;

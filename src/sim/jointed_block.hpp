@@ -55,19 +55,22 @@ struct JointedShape {
   model::Jointed::Mode modes[kSides][kJoints] = {};
   int harmonics[kSides][kJoints] = {};
   int strips[kSides] = {};
-  model::Sides<model::FreeJoints> free;
+  model::FreeJoints free[kSides];
   int unknowns = model::kBodyUnknowns;
-  bool timed[kSides] = {};     // some input shifts the phase
-  bool slides[kSides] = {};    // some C_T
-  bool carries_air = false;    // some added mass
-  bool same_gait = false;      // both sides have the same harmonics
+  bool timed[kSides] = {};   // some input shifts the phase
+  bool slides[kSides] = {};  // some C_T
+  bool carries_air = false;  // some added mass
+  bool same_gait = false;    // both sides have the same harmonics
   // Where rows are, after those of the vehicle's JointedParameters.
-  int input_row = 0, modulation_row = 0, series_row[kSides] = {}, harmonic_row[kSides][kJoints] = {}, strip_row[kSides] = {}, rows = 0;
+  int input_row = 0, modulation_row = 0, series_row[kSides] = {}, harmonic_row[kSides][kJoints] = {},
+      strip_row[kSides] = {}, rows = 0;
+  bool operator==(const JointedShape&) const = default;
 };
 
 struct JointedProgram {
   JointedShape shape;
   std::vector<Modulation> modulations;
+  bool operator==(const JointedProgram&) const = default;
 };
 
 /// A block's part.

@@ -2,11 +2,10 @@
 // Positions, free angles and the clock of the beat drift for half a step; in the middle, loads and accelerations are taken, at rates u + h/2 u'(the step
 // before), and kick the rates; positions drift on with the new ones (leapfrog, rates by the method of Adams and Bashforth: of second order). Driven
 // angles are where the gait has them in the middle, exactly. Compiled once for each instruction set (FLAPPY_ISA); the bits are the same on all of them.
-#include "sim/jointed_block.hpp"
-
 #include <cstddef>
 
 #include "sim/end_of_steps.hpp"
+#include "sim/jointed_block.hpp"
 
 namespace flappy::sim {
 inline namespace FLAPPY_ISA {
@@ -17,7 +16,6 @@ using Mode = Jointed::Mode;
 /// Angles of both sides.
 template <class L>
 using Angles = Sides<Moving<L>[kJoints]>;
-
 
 /// One register of lanes, and what stays the same while it steps.
 template <class T>
@@ -72,7 +70,7 @@ class JointedLanes {
     const L zero(0), one(1);
     const Moving<L> still{zero, zero, zero};
     Moving<L> frequency{one, zero, zero}, timing[kSides] = {still, still}, scale[kSides][kJoints],
-                        offset[kSides][kJoints];
+                                          offset[kSides][kJoints];
     for (int side = 0; side < kSides; ++side)
       for (int j = 0; j < kJoints; ++j) {
         scale[side][j] = {one, zero, zero};
@@ -91,8 +89,8 @@ class JointedLanes {
     const SinCos<L> turn = turn_of(m_.clock);
     BeatPhase<L> phase[kSides];
     for (int side = 0; side < kSides; ++side)
-      phase[side] = shape_.timed[side] ? timed_phase(m_.clock, turn, frequency, timing[side])
-                                       : untimed_phase(turn, frequency);
+      phase[side] =
+          shape_.timed[side] ? timed_phase(m_.clock, turn, frequency, timing[side]) : untimed_phase(turn, frequency);
     const bool once = shape_.same_gait && !shape_.timed[0] && !shape_.timed[1];
     Moving<L> g[kJoints];
     for (int side = 0; side < kSides; ++side)
@@ -123,8 +121,8 @@ class JointedLanes {
     JointedLoad<L> load;
     load.air_speed_m_s = g.to_E(shoulder_m_s);
     if (shape_.strips[kSide] == 0) {
-      const WingWrench<L> air = blade_element<s>(s > 0 ? block_.left : block_.right, g.theta, g.wing_rate.y,
-                                                 load.air_speed_m_s, g.edge_rate);
+      const WingWrench<L> air =
+          blade_element<s>(s > 0 ? block_.left : block_.right, g.theta, g.wing_rate.y, load.air_speed_m_s, g.edge_rate);
       load.force_N = {air.force_x_N, L(0), air.force_z_N};
       load.moment_Nm = air.moment_Nm;
     } else {
@@ -145,7 +143,7 @@ class JointedLanes {
       load.pulls[j] = pull_of(p.joints[j], m_.angle_rad[kSide][j], m_.rate_rad_s[kSide][j], step_);
       if (j != kRotation) continue;
       // what damps a light wing is taken as if it grew with the rate's change since the last step: explicit, it may be stiff
-      const L damped = T(2) * L(half_ * L(p.rotational_damping_Nm_s2 * abs(g.wing_rate.y)));
+      const L damped = L(step_ * L(p.rotational_damping_Nm_s2 * abs(g.wing_rate.y)));
       load.pulls[j].inertia_kg_m2 += damped;
       load.pulls[j].torque_Nm += damped * m_.acceleration_rad_s2[kSide][j];
     }
@@ -170,7 +168,8 @@ class JointedLanes {
           continue;
         }
         const JointParameters<L>& own = joint(side, j);
-        const L muscle = torque + L(own.stiffness_Nm_rad * L(angle.value - own.rest_rad) + own.damping_Nm_s * angle.rate);
+        const L muscle =
+            torque + L(own.stiffness_Nm_rad * L(angle.value - own.rest_rad) + own.damping_Nm_s * angle.rate);
         m_.torque_Nm[side][j] = muscle;
         m_.angle_rad[side][j] = angle.value + half_ * L(angle.rate + L(0.5) * L(half_ * angle.acceleration));
         m_.rate_rad_s[side][j] = angle.rate + half_ * angle.acceleration;
@@ -183,12 +182,12 @@ class JointedLanes {
     all_J += step_ * all;
   }
 
-  JointedMotion<L> accelerate_at(const Angles<L>& q, const Vec3<L>& velocity_B, const Vec3<L>& w, const Vec3<L>& gravity_B,
-                                 const typename L::Mask& held, Vec3<L>& air_force_B, Vec3<L>& air_moment_B) const {
+  JointedMotion<L> accelerate_at(const Angles<L>& q, const Vec3<L>& velocity_B, const Vec3<L>& w,
+                                 const Vec3<L>& gravity_B, const typename L::Mask& held, Vec3<L>& air_force_B,
+                                 Vec3<L>& air_moment_B) const {
     const Sides<JointedPose<L>> pose{place_side<+1>(p_.left, q.left, w), place_side<-1>(p_.right, q.right, w)};
-    const Sides<JointedLoad<L>> load{
-        load_side<+1>(pose.left, velocity_B + cross(w, p_.left.shoulder_m)),
-        load_side<-1>(pose.right, velocity_B + cross(w, p_.right.shoulder_m))};
+    const Sides<JointedLoad<L>> load{load_side<+1>(pose.left, velocity_B + cross(w, p_.left.shoulder_m)),
+                                     load_side<-1>(pose.right, velocity_B + cross(w, p_.right.shoulder_m))};
     const Vec3<L> left = pose.left.to_B(load.left.force_N), right = pose.right.to_B(load.right.force_N);
     air_force_B = left + right;
     if (rarely(held))
@@ -271,9 +270,9 @@ class JointedLanes {
       m_.input[k] = where(fresh, wanted_[k], m_.input[k]);
       clear(m_.input_rate[k]);
     }
-    for (L* number : {&m_.acceleration_B_m_s2.x, &m_.acceleration_B_m_s2.y, &m_.acceleration_B_m_s2.z,
-                      &m_.angular_acceleration_rad_s2.x, &m_.angular_acceleration_rad_s2.y,
-                      &m_.angular_acceleration_rad_s2.z})
+    for (L* number :
+         {&m_.acceleration_B_m_s2.x, &m_.acceleration_B_m_s2.y, &m_.acceleration_B_m_s2.z,
+          &m_.angular_acceleration_rad_s2.x, &m_.angular_acceleration_rad_s2.y, &m_.angular_acceleration_rad_s2.z})
       clear(*number);
     for_free([&](int side, int j) {
       const SideState<L>& seen = side == 0 ? x.left : x.right;

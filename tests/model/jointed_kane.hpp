@@ -47,8 +47,12 @@ inline model::Vehicle random_jointed(Random& random) {
     b.mass_kg = mass * random.within(0.7, 1.3);
     b.com_m = {random(size), random(size), random(size)};
     const double i = b.mass_kg * size * size / 3;
-    b.inertia_kg_m2 = {i * random.within(0.8, 1.2), i * random.within(0.8, 1.2), i * random.within(0.8, 1.2),
-                       random(0.2 * i), random(0.2 * i), random(0.2 * i)};
+    b.inertia_kg_m2 = {i * random.within(0.8, 1.2),
+                       i * random.within(0.8, 1.2),
+                       i * random.within(0.8, 1.2),
+                       random(0.2 * i),
+                       random(0.2 * i),
+                       random(0.2 * i)};
     return b;
   };
   model::Vehicle v;
@@ -66,8 +70,10 @@ inline model::Vehicle random_jointed(Random& random) {
     for (model::Jointed::Angle& a : w->angles) {
       a.mode = static_cast<model::Jointed::Mode>(random.whole(3));
       a.mean_rad = random(0.2);
-      if (a.mode == model::Jointed::Mode::driven) a.cos_rad = {random(0.4), random(0.1)}, a.sin_rad = {random(0.4), random(0.1)};
-      if (a.mode == model::Jointed::Mode::free) a.stiffness_Nm_rad = random.within(1e-3, 5e-3), a.rest_rad = random(0.3), a.damping_Nm_s = 1e-6;
+      if (a.mode == model::Jointed::Mode::driven)
+        a.cos_rad = {random(0.4), random(0.1)}, a.sin_rad = {random(0.4), random(0.1)};
+      if (a.mode == model::Jointed::Mode::free)
+        a.stiffness_Nm_rad = random.within(1e-3, 5e-3), a.rest_rad = random(0.3), a.damping_Nm_s = 1e-6;
     }
   return v;
 }
@@ -171,8 +177,7 @@ inline JointedAnswer jointed_kane(const model::Vehicle& v, const JointedState& x
     }
   Row right = f - M * u;
   for (std::size_t side = 0; side < 2; ++side)
-    for (std::size_t j = 0; j < 4; ++j)
-      right[static_cast<Eigen::Index>(6 + 4 * side + j)] += x.joints[side][j].torque;
+    for (std::size_t j = 0; j < 4; ++j) right[static_cast<Eigen::Index>(6 + 4 * side + j)] += x.joints[side][j].torque;
   const Eigen::MatrixXd A = M(unknown, unknown);
   const Eigen::VectorXd solution = A.ldlt().solve(Eigen::VectorXd(right(unknown)));
   for (std::size_t i = 0; i < unknown.size(); ++i) u[unknown[i]] = solution[static_cast<Eigen::Index>(i)];

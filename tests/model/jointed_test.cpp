@@ -23,7 +23,7 @@ struct Case {
   model::Sides<Moving<double>[model::kJoints]> q;
   model::Sides<model::JointedPose<double>> pose;
   model::Sides<model::JointedLoad<double>> load{};
-  model::Sides<model::FreeJoints> free;
+  model::FreeJoints free[2];
   int size = model::kBodyUnknowns;
 };
 
@@ -38,7 +38,7 @@ Case random_case(Random& random, bool carries_air) {
   }
   for (std::size_t side = 0; side < 2; ++side) {
     auto& q = side == 0 ? c.q.left : c.q.right;
-    auto& free = side == 0 ? c.free.left : c.free.right;
+    auto& free = c.free[side];
     auto& load = side == 0 ? c.load.left : c.load.right;
     const Jointed::Wing& w = side == 0 ? c.vehicle.jointed->left : c.vehicle.jointed->right;
     for (std::size_t j = 0; j < 4; ++j) {
@@ -58,8 +58,7 @@ Case random_case(Random& random, bool carries_air) {
     load.force_N = g.to_E(to_vec(c.state.force[side]));
     load.moment_Nm = g.to_E(to_vec(c.state.moment[side]));
     const model::Triple& s = (side == 0 ? c.vehicle.left : c.vehicle.right).shoulder_m;
-    load.air_speed_m_s =
-        g.to_E(to_vec(c.state.velocity_B) + cross(w, Vec3<double>{s.x, s.y, s.z}));
+    load.air_speed_m_s = g.to_E(to_vec(c.state.velocity_B) + cross(w, Vec3<double>{s.x, s.y, s.z}));
   }
   return c;
 }
@@ -98,8 +97,7 @@ TEST(Jointed, AcceleratesAsKaneSays) {
         for (std::size_t j = 0; j < 4; ++j) {
           EXPECT_NEAR((side == 0 ? m.joint_rad_s2.left : m.joint_rad_s2.right)[j], kane.joint[side][j],
                       kTolerance * joint);
-          EXPECT_NEAR((side == 0 ? m.torque_Nm.left : m.torque_Nm.right)[j], kane.torque[side][j],
-                      kTolerance * torque);
+          EXPECT_NEAR((side == 0 ? m.torque_Nm.left : m.torque_Nm.right)[j], kane.torque[side][j], kTolerance * torque);
         }
     }
   }
@@ -110,7 +108,8 @@ TEST(Jointed, HeldTorsoLeavesTheFreeAnglesOfKane) {
   for (int trial = 0; trial < 100; ++trial) {
     Case c = random_case(random, false);
     const auto m = solved(c, false, true);
-    const test::JointedAnswer kane = test::jointed_kane(c.vehicle, c.state, {Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()}, true);
+    const test::JointedAnswer kane =
+        test::jointed_kane(c.vehicle, c.state, {Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()}, true);
     EXPECT_EQ(m.acceleration_m_s2.x, 0);
     EXPECT_EQ(m.angular_acceleration_rad_s2.z, 0);
     for (std::size_t side = 0; side < 2; ++side)
