@@ -59,7 +59,8 @@ struct Snapshot {
   std::uint64_t effects = 0;    ///< in force
   std::vector<T> effect_rows, effect_states;
   std::vector<T> motors;  ///< conductance and back-EMF's current of left and right, where energy is metered
-  std::pair<std::vector<T>, std::vector<T>> mean;  ///< rows and memory of a robot that is known by the beat
+  std::pair<std::vector<T>, std::vector<T>>
+      own;  ///< rows and memory of a robot that is known by the beat, or has four angles a wing
   std::uint32_t phase, phase_per_update;
   Target target;  ///< where it was meant to be
 };

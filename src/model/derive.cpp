@@ -32,15 +32,7 @@ Sym3<double> disc(double inertia) { return {inertia / 2, inertia / 2, 0, 0, 0, 0
 
 double wing_mass(const Side& s) { return s.leading_edge.mass_kg + s.wing.mass_kg; }
 
-SideParameters<double> derive_side(const Side& s, double air_density, double step_s) {
-  SideParameters<double> p;
-  p.shoulder_m = vec(s.shoulder_m);
-  p.edge_moment_kg_m = first_moment(s.leading_edge);
-  p.edge_second_kg_m2 = second_moment(s.leading_edge) + disc(rotor_spin(s.motor));
-  p.wing_moment_kg_m = first_moment(s.wing);
-  p.wing_second_kg_m2 = second_moment(s.wing);
-
-  const Planform& w = s.planform;
+void put_planform(const Planform& w, double air_density, SideParameters<double>& p) {
   const double R = w.wing_length_m, c = w.mean_chord_m;
   const double pressure = 0.5 * air_density;
   p.force2 = pressure * c * R * R * R * w.r22;
@@ -51,6 +43,16 @@ SideParameters<double> derive_side(const Side& s, double air_density, double ste
   p.moment0 = pressure * c * c * R * w.z_cp0;
   p.rotational_damping_Nm_s2 = 0.125 * air_density * w.rotational_damping_coefficient * R * c * c * c * c * w.z_rd;
   p.span_to_pressure_m = R * w.r33 / w.r22;
+}
+
+SideParameters<double> derive_side(const Side& s, double air_density, double step_s) {
+  SideParameters<double> p;
+  p.shoulder_m = vec(s.shoulder_m);
+  p.edge_moment_kg_m = first_moment(s.leading_edge);
+  p.edge_second_kg_m2 = second_moment(s.leading_edge) + disc(rotor_spin(s.motor));
+  p.wing_moment_kg_m = first_moment(s.wing);
+  p.wing_second_kg_m2 = second_moment(s.wing);
+  put_planform(s.planform, air_density, p);
 
   const Motor& m = s.motor;
   const double N = m.gear_ratio, K = m.torque_constant_Nm_A;
@@ -136,7 +138,7 @@ Vehicle built(Vehicle v) {
 }
 
 Sides<SideFigures<double>> effect_figures(const Vehicle& vehicle) {
-  if (vehicle.beat_averaged) return {};
+  if (vehicle.beat_averaged || vehicle.jointed) return {};
   const Vehicle v = built(vehicle);
   return {side_figures(v.left, v.air_density_kg_m3), side_figures(v.right, v.air_density_kg_m3)};
 }
@@ -149,21 +151,103 @@ double total_mass_kg(const Vehicle& vehicle) {
 Parameters<double> derive(const Vehicle& vehicle, double step_s) {
   const Vehicle v = built(vehicle);
   Parameters<double> p{};
-  if (!v.beat_averaged) {
+  if (v.jointed) {  // what moves the bodies stands in JointedParameters
+    if (v.jointed->left.strips.empty()) put_planform(v.left.planform, v.air_density_kg_m3, p.left);
+    if (v.jointed->right.strips.empty()) put_planform(v.right.planform, v.air_density_kg_m3, p.right);
+  } else if (!v.beat_averaged) {
     p.left = derive_side(v.left, v.air_density_kg_m3, step_s);
     p.right = derive_side(v.right, v.air_density_kg_m3, step_s);
   }
   p.inverse_mass_1_kg = 1 / (v.torso.mass_kg + wing_mass(v.left) + wing_mass(v.right));
-  p.fixed_moment_kg_m =
-      first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
-  p.fixed_second_kg_m2 = second_moment(v.torso) + disc(-rotor_spin(v.left.motor) - rotor_spin(v.right.motor)) +
-                         (outer(wing_mass(v.left), p.left.shoulder_m) + outer(wing_mass(v.right), p.right.shoulder_m));
+  if (!v.jointed) {  // so that the velocity of its state is that of its origin
+    p.fixed_moment_kg_m =
+        first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
+    p.fixed_second_kg_m2 =
+        second_moment(v.torso) + disc(-rotor_spin(v.left.motor) - rotor_spin(v.right.motor)) +
+        (outer(wing_mass(v.left), p.left.shoulder_m) + outer(wing_mass(v.right), p.right.shoulder_m));
+  }
   p.air_density_kg_m3 = v.air_density_kg_m3;
   p.below_m = v.extent.below_m;
   p.above_m = v.extent.above_m;
   p.around_m = v.extent.around_m;
-  p.beat_steps = 2 / ((v.beat_averaged ? v.beat_averaged->nominal_Hz : v.driver.flapping_Hz) * step_s);
+  p.beat_steps = 2 / (beat_Hz(v) * step_s);
   return p;
+}
+
+double beat_Hz(const Vehicle& v) {
+  return v.beat_averaged ? v.beat_averaged->nominal_Hz : v.jointed ? v.jointed->frequency_Hz : v.driver.flapping_Hz;
+}
+
+namespace {
+
+JointParameters<double> joint(const Jointed::Angle& a) {
+  return {a.mean_rad,  a.stiffness_Nm_rad,      a.rest_rad,         a.damping_Nm_s, a.lower_rad,
+          a.upper_rad, a.stop_stiffness_Nm_rad, a.stop_damping_Nm_s};
+}
+
+double square(double x) { return x * x; }
+
+/// Strips along the span; y is `side` times the span.
+JointedSide<double> jointed_side(const Side& s, const Jointed::Wing& w, double air_density, double side) {
+  JointedSide<double> p{};
+  p.shoulder_m = vec(s.shoulder_m);
+  p.mass_kg = wing_mass(s);
+  p.edge_moment_kg_m = first_moment(s.leading_edge);
+  p.edge_second_kg_m2 = second_moment(s.leading_edge);
+  p.wing_moment_kg_m = first_moment(s.wing);
+  p.wing_second_kg_m2 = second_moment(s.wing);
+  for (std::size_t k = 0; k < w.angles.size(); ++k) p.joints[k] = joint(w.angles[k]);
+  for (const Jointed::Strip& strip : w.strips) {
+    const double c = strip.chord_m, below = c - strip.leading_edge_m, y = side * strip.span_m;
+    const double z = strip.leading_edge_m - c / 2,
+                 plate = w.added_mass * air_density * std::numbers::pi * strip.width_m;
+    const double m = plate / 4 * c * c, turned = plate / 128 * c * c * c * c;
+    p.added = p.added + Sym3<double>{m, m * z * z + turned, m * y * y, m * z, -m * z * y, -m * y};
+    p.rotational_damping_Nm_s2 += air_density / 8 * w.rotational_damping_coefficient * strip.width_m *
+                                  (square(square(below)) + square(square(strip.leading_edge_m)));
+  }
+  if (w.strips.empty()) {
+    SideParameters<double> air{};
+    put_planform(s.planform, air_density, air);
+    p.rotational_damping_Nm_s2 = air.rotational_damping_Nm_s2;
+  }
+  return p;
+}
+
+}  // namespace
+
+JointedParameters<double> derive_jointed(const Vehicle& v) {
+  const Jointed& j = *v.jointed;
+  return {v.torso.mass_kg,
+          first_moment(v.torso),
+          second_moment(v.torso),
+          j.frequency_Hz,
+          jointed_side(v.left, j.left, v.air_density_kg_m3, 1),
+          jointed_side(v.right, j.right, v.air_density_kg_m3, -1)};
+}
+
+std::vector<Strip<double>> derive_strips(const Jointed::Wing& w, double air_density, double side) {
+  std::vector<Strip<double>> list;
+  for (const Jointed::Strip& s : w.strips) {
+    const double pressure = air_density / 2 * s.chord_m * s.width_m;
+    const double circulation = w.rotational_lift * air_density * s.chord_m * s.chord_m * s.width_m * std::numbers::pi *
+                               (0.75 - s.leading_edge_m / s.chord_m);
+    list.push_back({side * s.span_m, pressure, circulation, s.chord_m, s.leading_edge_m});
+  }
+  return list;
+}
+
+SeriesOfForce<double> derive_series(const Jointed::Wing& w) {
+  // sin(k a) = sin a U_(k-1)(cos a), cos(k a) = T_k(cos a): Chebyshev's polynomials
+  constexpr double kSecond[4][4] = {{1, 0, 0, 0}, {0, 2, 0, 0}, {-1, 0, 4, 0}, {0, -4, 0, 8}};
+  constexpr double kFirst[4][5] = {{0, 1, 0, 0, 0}, {-1, 0, 2, 0, 0}, {0, -3, 0, 4, 0}, {1, 0, -8, 0, 8}};
+  SeriesOfForce<double> series{};
+  if (w.normal_sin.empty()) series.normal[0] = 3.45, series.normal[2] = 0.6;  // wing_aerodynamics.hpp
+  for (std::size_t k = 0; k < w.normal_sin.size(); ++k)
+    for (std::size_t i = 0; i < 4; ++i) series.normal[i] += w.normal_sin[k] * kSecond[k][i];
+  for (std::size_t k = 0; k < w.tangential_cos.size(); ++k)
+    for (std::size_t i = 0; i < 5; ++i) series.tangential[i] += w.tangential_cos[k] * kFirst[k][i];
+  return series;
 }
 
 }  // namespace flappy::model

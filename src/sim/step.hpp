@@ -3,6 +3,7 @@
 
 #include "flappy/world.hpp"
 #include "sim/block.hpp"
+#include "sim/jointed_block.hpp"
 #include "sim/mean_block.hpp"
 
 namespace flappy::sim {
@@ -38,6 +39,8 @@ struct BlockEffects {
   MotorRows<T>* motors = nullptr;
   /// Of robots that are known by the beat.
   MeanRows<T> mean;
+  /// Of vehicles with four angles a wing.
+  JointedRows<T> jointed;
 };
 
 /// Rows of a meter: the source's voltage as a share of its nominal one, currents of the left and of the right motor, A.

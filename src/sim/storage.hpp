@@ -85,6 +85,25 @@ struct Mean {
   }
 };
 
+/// Rows of vehicles with four angles a wing.
+template <class T>
+struct JointedVehicles {
+  JointedProgram program;
+  std::vector<T> rows, memory;  // [block][row][lane]
+  std::vector<double> work_J;   // [block][positive, all][lane]
+
+  static constexpr std::size_t kMemoryRows = model::kRows<JointedMemory>;
+  std::size_t row_count() const { return static_cast<std::size_t>(program.shape.rows); }
+  /// Of one vehicle, a number each.
+  T* row_of(std::size_t i) { return &rows[i / kLanes<T> * row_count() * kLanes<T> + i % kLanes<T>]; }
+  T* memory_of(std::size_t i) { return &memory[i / kLanes<T> * kMemoryRows * kLanes<T> + i % kLanes<T>]; }
+  double* work_of(std::size_t i) { return &work_J[i / kLanes<T> * 2 * kLanes<T> + i % kLanes<T>]; }
+  JointedRows<T> block(std::size_t b) {
+    return {&program.shape, program.modulations.data(), row_of(b * kLanes<T>), memory_of(b * kLanes<T>),
+            work_of(b * kLanes<T>)};
+  }
+};
+
 template <class T>
 struct Batch<T>::Storage {
   std::size_t count = 0;
@@ -96,13 +115,14 @@ struct Batch<T>::Storage {
   std::int64_t steps = 0;
   StepBlock<T> kernel = nullptr;
   std::vector<Block<T>> blocks;
-  std::vector<std::uint64_t> lane_effects;   // set of each lane; empty while no flapper has an effect
-  std::vector<std::uint64_t> block_effects;  // their union
-  std::vector<T> effect_rows;                // [block][row][lane]
-  std::uint64_t effects_kept = 0;            // effects that some vehicle has named, whose memory is
-  std::vector<T> effect_states;              // [block][row][lane]
-  std::vector<MotorRows<T>> motors;          // of each block, where energy is metered
-  std::unique_ptr<Mean<T>> mean;             // where robots are known by the beat
+  std::vector<std::uint64_t> lane_effects;      // set of each lane; empty while no flapper has an effect
+  std::vector<std::uint64_t> block_effects;     // their union
+  std::vector<T> effect_rows;                   // [block][row][lane]
+  std::uint64_t effects_kept = 0;               // effects that some vehicle has named, whose memory is
+  std::vector<T> effect_states;                 // [block][row][lane]
+  std::vector<MotorRows<T>> motors;             // of each block, where energy is metered
+  std::unique_ptr<Mean<T>> mean;                // where robots are known by the beat
+  std::unique_ptr<JointedVehicles<T>> jointed;  // where wings have four angles
 
   struct Place {
     Block<T>& block;
@@ -129,6 +149,7 @@ struct Batch<T>::Storage {
              effect_states.data() + b * state_size()};
     if (!motors.empty()) all.motors = &motors[b];
     if (mean) all.mean = mean->block(b);
+    if (jointed) all.jointed = jointed->block(b);
     return all;
   }
   /// Numbers of a block that effects remember.
@@ -158,6 +179,10 @@ struct Batch<T>::Storage {
   /// Rows and memory of a robot that is known by the beat, to be put to one of any batch; none otherwise.
   std::pair<std::vector<T>, std::vector<T>> get_mean(std::size_t i) const;
   void put_mean(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
+  /// The same of a vehicle with four angles a wing; std::invalid_argument where it shares not the batch's modes and inputs.
+  void put_jointed(std::size_t i, const model::Vehicle& v);
+  std::pair<std::vector<T>, std::vector<T>> get_jointed(std::size_t i) const;
+  void put_jointed(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
   /// What a meter of flapper `i` needs to know of its motors, to be put to a flapper of any batch.
   std::vector<T> get_motors(std::size_t i) const;
   void put_motors(std::size_t i, const std::vector<T>& rows);
