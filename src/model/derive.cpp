@@ -185,8 +185,6 @@ JointParameters<double> joint(const Jointed::Angle& a) {
           a.upper_rad, a.stop_stiffness_Nm_rad, a.stop_damping_Nm_s};
 }
 
-double square(double x) { return x * x; }
-
 /// Strips along the span; y is `side` times the span.
 JointedSide<double> jointed_side(const Side& s, const Jointed::Wing& w, double air_density, double side) {
   JointedSide<double> p{};
@@ -203,8 +201,11 @@ JointedSide<double> jointed_side(const Side& s, const Jointed::Wing& w, double a
                  plate = w.added_mass * air_density * std::numbers::pi * strip.width_m;
     const double m = plate / 4 * c * c, turned = plate / 128 * c * c * c * c;
     p.added = p.added + Sym3<double>{m, m * z * z + turned, m * y * y, m * z, -m * z * y, -m * y};
-    p.rotational_damping_Nm_s2 += air_density / 8 * w.rotational_damping_coefficient * strip.width_m *
-                                  (square(square(below)) + square(square(strip.leading_edge_m)));
+    const double drag = air_density * w.rotational_damping_coefficient * strip.width_m, l = strip.leading_edge_m;
+    const double below3 = std::abs(below * below * below), above3 = std::abs(l * l * l);
+    p.rotational_damping_Nm_s2 += drag / 8 * (below * below3 + l * above3);
+    p.pitching_force_N_s2 += drag / 6 * (below3 - above3);
+    p.pitching_force_moment_Nm_s2 += y * drag / 6 * (below3 - above3);
   }
   if (w.strips.empty()) {
     SideParameters<double> air{};

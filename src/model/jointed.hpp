@@ -29,7 +29,7 @@
 //   strips_m = [[0.001, 0.001, 0.004, 0.001], ...]  # of each its middle along the span, width, chord, leading edge above the axis of rotation
 //   rotational_lift = 1.0                    #   factor on theory; 0 unless it is there
 //   added_mass = 1.0                         #   the same
-//   rotational_damping_coefficient = 5.0     #   0 unless it is there
+//   rotational_damping_coefficient = 5.0     #   C_rd, of a plate's drag as it turns about the axis: moment and force; 0 unless it is there
 //   normal_sin = [3.4]                       #   C_N = sum of b_k sin(k a), k = 1, ..., 4; unless it is there, the published one
 //   tangential_cos = [0.4]                   #   C_T = sum of a_k cos(k a), k = 1, ..., 4, towards the trailing edge where a < pi/2; none unless there
 //

@@ -48,6 +48,7 @@ struct JointedSide {
   Sym3<T> wing_second_kg_m2;
   Sym3<T> added;  // K: kg, kg m^2, kg m^2, kg m, kg m^2, kg m
   T rotational_damping_Nm_s2;
+  T pitching_force_N_s2, pitching_force_moment_Nm_s2;  // of strips: the force of that damping, and about z
   JointParameters<T> joints[kJoints];
 };
 

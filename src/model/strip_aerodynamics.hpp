@@ -6,7 +6,8 @@
 //   dN  = 1/2 rho c dr C_N(a) U^2              along x, at d_cp(a) c behind the leading edge [1]
 //   dT  = 1/2 rho c dr C_T(a) U^2              along -z
 //   dR  = factor rho c^2 dr C_R v_c w_y        along x, at mid-chord, C_R = pi (3/4 - l/c) [2]
-//   dM  = -1/8 rho C_rd |w_y| w_y ((c - l)^4 + l^4) dr     about y
+//   dM  = -1/8 rho C_rd |w_y| w_y ((c - l)|c - l|^3 + l|l|^3) dr     about y [1]
+//   dD  = 1/6 rho C_rd |w_y| w_y (|c - l|^3 - |l|^3) dr     along x: both of the drag of a plate that turns about y, integrated over its chord
 // C_N = sin a P(cos a), C_T = Q(cos a): sums of sin(k a), of cos(k a), as Chebyshev's polynomials of cos a. w_y is the real rate about the wing's axis,
 // in which stroke, deviation and body have their parts: theta' alone is not it. v_c, not U, carries the circulation's force, normal to the plate:
 // it changes its sign with the flow, as thin-aerofoil theory has it.
@@ -79,10 +80,13 @@ FLAPPY_INLINE void add_strip(const Strip<T>& strip, const SeriesOfForce<T>& seri
   load.moment_Nm.x -= strip.y_m * tangential;
 }
 
-/// M_rd.
+/// Adds M_rd, the sum of all dM, and its force. `rate_rad_s`: w_y.
 template <class T>
-FLAPPY_INLINE T rotational_damping(const T& coefficient_Nm_s2, const T& rate_rad_s) {
-  return -(T(coefficient_Nm_s2 * abs(rate_rad_s)) * rate_rad_s);
+FLAPPY_INLINE void add_pitching_drag(const JointedSide<T>& p, const T& rate_rad_s, WingLoad<T>& load) {
+  const T squared = abs(rate_rad_s) * rate_rad_s;
+  load.force_N.x += p.pitching_force_N_s2 * squared;
+  load.moment_Nm.y -= p.rotational_damping_Nm_s2 * squared;
+  load.moment_Nm.z -= p.pitching_force_moment_Nm_s2 * squared;
 }
 
 }  // namespace FLAPPY_ISA

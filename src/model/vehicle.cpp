@@ -30,9 +30,9 @@ class Lister {
     add(path + ".mass_kg", b.mass_kg, 1e-9, 10);
     add(path + ".com_m", b.com_m);
     InertiaTensor& i = b.inertia_kg_m2;
-    add(path + ".inertia_kg_m2.xx", i.xx, 1e-15, 1);
-    add(path + ".inertia_kg_m2.yy", i.yy, 1e-15, 1);
-    add(path + ".inertia_kg_m2.zz", i.zz, 1e-15, 1);
+    add(path + ".inertia_kg_m2.xx", i.xx, 1e-18, 1);
+    add(path + ".inertia_kg_m2.yy", i.yy, 1e-18, 1);
+    add(path + ".inertia_kg_m2.zz", i.zz, 1e-18, 1);
     add(path + ".inertia_kg_m2.xy", i.xy, -1, 1);
     add(path + ".inertia_kg_m2.yz", i.yz, -1, 1);
     add(path + ".inertia_kg_m2.xz", i.xz, -1, 1);

@@ -132,7 +132,7 @@ class JointedLanes {
       for (int i = 0; i < shape_.strips[kSide]; ++i)
         add_strip(load_rows<Strip<L>>(rows(shape_.strip_row[kSide] + i * model::kRows<Strip>), first_), series,
                   shape_.slides[kSide], v, w, air);
-      air.moment_Nm.y += rotational_damping(p.rotational_damping_Nm_s2, w.y);
+      add_pitching_drag(p, w.y, air);
       load.force_N = g.from_wing(air.force_N);
       load.moment_Nm = g.from_wing(air.moment_Nm);
     }
