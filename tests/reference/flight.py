@@ -1,5 +1,6 @@
 """A vehicle file's wings driven along its gait, by strips.py: mean loads over a beat, power, hover trim, stability derivatives and their modes.
-Independent of src, plain Python; for files of model = "jointed" whose angles are all fixed or driven and whose wings have strips.
+Independent of src, plain Python; for files of model = "jointed" whose angles are all fixed or driven and whose wings have strips; of those whose
+rotation alone is free, hinged_beat() has a beat of a wing on a body that stands still.
 
 The body stands still or moves steadily; a beat is averaged (rigid-body approximation [1]). Derivatives are central differences. Modes are those of
   m u' = X_u u + X_w w + X_q q - m g theta,  m w' = Z_u u + Z_w w + Z_q q,  I q' = M_u u + M_w w + M_q q,  theta' = q
@@ -45,6 +46,9 @@ class Vehicle:
         self.gaits = {}
         for angle in ANGLES:
             a = left[angle]
+            if a["mode"] == "free":
+                self.hinge, self.gaits[angle] = a, Gait(a["rest_rad"])
+                continue
             self.gaits[angle] = Gait(a["angle_rad"]) if a["mode"] == "fixed" else Gait(a["mean_rad"], a.get("cos_rad", ()), a.get("sin_rad", ()))
         air = left["aerodynamics"]
         self.air = {"strips": [(y, c, d, e) for y, c, d, e in air["strips_m"]], "density": table["air"]["density_kg_m3"],
@@ -134,6 +138,36 @@ class Vehicle:
         n, step = self.samples, 1 / (self.frequency * self.samples)
         whole = [air[i] + (energy[(i + 1) % n] - energy[i - 1]) / (2 * step) for i in range(n)]
         return 2 * sum(air) / n, 2 * sum(max(p, 0.0) for p in whole) / n, down / (down + up)
+
+
+def hinged_beat(vehicle, beats=8, steps=800):
+    """A left wing whose rotation is free, the body still: lift of both wings over a beat, N, rotation's extremes, rad, and power of both strokes,
+    W, as means over the last two of `beats` from rest. Euler's equation of the wing about its span, semi-implicit steps."""
+    a, wing, I, f = vehicle.hinge, vehicle.wing(1), vehicle.wing_inertia, vehicle.frequency
+    theta, rate, h = 0.0, 0.0, 1 / (f * steps)
+    lift = power = low = high = 0.0
+    for i in range(beats * steps):
+        (plane, stroke, deviation), t = (vehicle.gaits[n].at(i / steps, f) for n in ANGLES[:3]), i / steps
+        angles, rates = (plane[0], stroke[0], deviation[0], theta), (plane[1], stroke[1], deviation[1], rate)
+        w = angular_velocity(1, angles, rates)
+        force, moment = total(wing.load((0, 0, 0), w))
+        # w' without theta'': the slope of w along the motion
+        e = 1e-6 / f
+        ahead = [gait.at(t + e * f, f) for gait in (vehicle.gaits[n] for n in ANGLES[:3])]
+        w_ahead = angular_velocity(1, tuple(b[0] for b in ahead) + (theta + e * rate,), tuple(b[1] for b in ahead) + (rate,))
+        dw = scaled(1 / e, add(w_ahead, scaled(-1, w)))
+        torque = moment[1] - a["stiffness_Nm_rad"] * (theta - a["rest_rad"]) - a["damping_Nm_s"] * rate
+        for limit, sign in ((a.get("lower_rad"), -1), (a.get("upper_rad"), 1)):
+            if limit is not None and sign * (theta - limit) > 0:
+                torque -= a["stop_stiffness_Nm_rad"] * (theta - limit) + a["stop_damping_Nm_s"] * rate
+        turning = add(apply(I, dw), cross(w, apply(I, w)))
+        rate += h * (torque - turning[1]) / I[1][1]
+        theta += h * rate
+        if i >= (beats - 2) * steps:
+            lift += 2 * apply(pose(1, angles), force)[2] / (2 * steps)
+            power += 2 * -(dot(moment, w) - moment[1] * rate) / (2 * steps)
+            low, high = min(low, theta), max(high, theta)
+    return lift, (low, high), power
 
 
 def solved(rows, right):

@@ -245,7 +245,17 @@ def stability():
         print(f"| {name} | " + " | ".join("; ".join(shown(r) for r in roots if r.imag >= 0) for roots in both) + " |")
 
 
-for title, table in (("Bumblebee, computed flow", bumblebee), ("D. hydei, hover", hydei), ("Hover", hover), ("Power", power), ("Stability", stability)):
+def robots():
+    print("| vehicle | mass, g | beats, Hz | stroke, deg | rotation, deg | lift / weight | air at the strokes, mW |\n|---|---|---|---|---|---|---|")
+    for path in sorted((ROOT / "configs/vehicles").glob("*_like.toml")):
+        v = flight.Vehicle(path)
+        lift, extremes, power = flight.hinged_beat(v)
+        print(f"| {v.name} | {1e3 * v.mass:.4g} | {v.frequency:.1f} | {degrees(v.gaits['stroke'])[0]:.1f} | "
+              f"{math.degrees(extremes[0]):.0f} to {math.degrees(extremes[1]):.0f} | {lift / v.mass / GRAVITY:.3f} | {1e3 * power:.3g} |")
+
+
+for title, table in (("Bumblebee, computed flow", bumblebee), ("D. hydei, hover", hydei), ("Hover", hover), ("Power", power), ("Stability", stability),
+                     ("Robots", robots)):
     print(f"\n## {title}\n")
     try:
         table()
