@@ -63,7 +63,8 @@ struct WingJoints {
   double torque_Nm
       [2]
       [4];  ///< in the last step: of the muscle of a driven angle, of the spring of a free one, of what holds a fixed one
-  double work_J;  ///< of all muscles since the reset, what they take back subtracted
+  bool driven[2][4];  ///< or fixed, but for what inputs add: not free
+  double work_J;      ///< of all muscles since the reset, what they take back subtracted
 };
 
 template <class T>

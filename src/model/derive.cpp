@@ -10,12 +10,13 @@ namespace {
 
 Vec3<double> vec(const Triple& t) { return {t.x, t.y, t.z}; }
 
-/// First moment of mass about the frame's origin, kg m.
-Vec3<double> first_moment(const RigidBody& b) { return b.mass_kg * vec(b.com_m); }
-
 Sym3<double> outer(double mass, const Vec3<double>& r) {
   return {mass * r.x * r.x, mass * r.y * r.y, mass * r.z * r.z, mass * r.x * r.y, mass * r.y * r.z, mass * r.x * r.z};
 }
+
+}  // namespace
+
+Vec3<double> first_moment(const RigidBody& b) { return b.mass_kg * vec(b.com_m); }
 
 /// Second moment of mass (integral of r r^T) about the frame's origin, from the inertia I about the centre of
 /// mass: P = tr(I)/2 1 - I + m c c^T.
@@ -25,6 +26,8 @@ Sym3<double> second_moment(const RigidBody& b) {
   const Sym3<double> about_com{half - i.xx, half - i.yy, half - i.zz, -i.xy, -i.yz, -i.xz};
   return about_com + outer(b.mass_kg, vec(b.com_m));
 }
+
+namespace {
 
 /// S of motor.hpp, and the second moment of mass of a disc about z with that inertia.
 double rotor_spin(const Motor& m) { return m.rotor_spin_sense * m.gear_ratio * m.rotor_inertia_kg_m2; }
@@ -126,6 +129,12 @@ SideFigures<double> side_figures(const Side& s, double air_density) {
 
 }  // namespace
 
+SideParameters<double> derive_planform(const Planform& planform, double air_density) {
+  SideParameters<double> p{};
+  put_planform(planform, air_density, p);
+  return p;
+}
+
 Vehicle built(Vehicle v) {
   const auto given = v.effects;
   for (const EffectEntry& e : catalogue_of(v)) {
@@ -152,8 +161,8 @@ Parameters<double> derive(const Vehicle& vehicle, double step_s) {
   const Vehicle v = built(vehicle);
   Parameters<double> p{};
   if (v.jointed) {  // what moves the bodies stands in JointedParameters
-    if (v.jointed->left.strips.empty()) put_planform(v.left.planform, v.air_density_kg_m3, p.left);
-    if (v.jointed->right.strips.empty()) put_planform(v.right.planform, v.air_density_kg_m3, p.right);
+    if (v.jointed->left.strips.empty()) p.left = derive_planform(v.left.planform, v.air_density_kg_m3);
+    if (v.jointed->right.strips.empty()) p.right = derive_planform(v.right.planform, v.air_density_kg_m3);
   } else if (!v.beat_averaged) {
     p.left = derive_side(v.left, v.air_density_kg_m3, step_s);
     p.right = derive_side(v.right, v.air_density_kg_m3, step_s);
@@ -176,79 +185,6 @@ Parameters<double> derive(const Vehicle& vehicle, double step_s) {
 
 double beat_Hz(const Vehicle& v) {
   return v.beat_averaged ? v.beat_averaged->nominal_Hz : v.jointed ? v.jointed->frequency_Hz : v.driver.flapping_Hz;
-}
-
-namespace {
-
-JointParameters<double> joint(const Jointed::Angle& a) {
-  return {a.mean_rad,  a.stiffness_Nm_rad,      a.rest_rad,         a.damping_Nm_s, a.lower_rad,
-          a.upper_rad, a.stop_stiffness_Nm_rad, a.stop_damping_Nm_s};
-}
-
-/// Strips along the span; y is `side` times the span.
-JointedSide<double> jointed_side(const Side& s, const Jointed::Wing& w, double air_density, double side) {
-  JointedSide<double> p{};
-  p.shoulder_m = vec(s.shoulder_m);
-  p.mass_kg = wing_mass(s);
-  p.edge_moment_kg_m = first_moment(s.leading_edge);
-  p.edge_second_kg_m2 = second_moment(s.leading_edge);
-  p.wing_moment_kg_m = first_moment(s.wing);
-  p.wing_second_kg_m2 = second_moment(s.wing);
-  for (std::size_t k = 0; k < w.angles.size(); ++k) p.joints[k] = joint(w.angles[k]);
-  for (const Jointed::Strip& strip : w.strips) {
-    const double c = strip.chord_m, below = c - strip.leading_edge_m, y = side * strip.span_m;
-    const double z = strip.leading_edge_m - c / 2,
-                 plate = w.added_mass * air_density * std::numbers::pi * strip.width_m;
-    const double m = plate / 4 * c * c, turned = plate / 128 * c * c * c * c;
-    p.added = p.added + Sym3<double>{m, m * z * z + turned, m * y * y, m * z, -m * z * y, -m * y};
-    const double drag = air_density * w.rotational_damping_coefficient * strip.width_m, l = strip.leading_edge_m;
-    const double below3 = std::abs(below * below * below), above3 = std::abs(l * l * l);
-    p.rotational_damping_Nm_s2 += drag / 8 * (below * below3 + l * above3);
-    p.pitching_force_N_s2 += drag / 6 * (below3 - above3);
-    p.pitching_force_moment_Nm_s2 += y * drag / 6 * (below3 - above3);
-  }
-  if (w.strips.empty()) {
-    SideParameters<double> air{};
-    put_planform(s.planform, air_density, air);
-    p.rotational_damping_Nm_s2 = air.rotational_damping_Nm_s2;
-  }
-  return p;
-}
-
-}  // namespace
-
-JointedParameters<double> derive_jointed(const Vehicle& v) {
-  const Jointed& j = *v.jointed;
-  return {v.torso.mass_kg,
-          first_moment(v.torso),
-          second_moment(v.torso),
-          j.frequency_Hz,
-          jointed_side(v.left, j.left, v.air_density_kg_m3, 1),
-          jointed_side(v.right, j.right, v.air_density_kg_m3, -1)};
-}
-
-std::vector<Strip<double>> derive_strips(const Jointed::Wing& w, double air_density, double side) {
-  std::vector<Strip<double>> list;
-  for (const Jointed::Strip& s : w.strips) {
-    const double pressure = air_density / 2 * s.chord_m * s.width_m;
-    const double circulation = w.rotational_lift * air_density * s.chord_m * s.chord_m * s.width_m * std::numbers::pi *
-                               (0.75 - s.leading_edge_m / s.chord_m);
-    list.push_back({side * s.span_m, pressure, circulation, s.chord_m, s.leading_edge_m});
-  }
-  return list;
-}
-
-SeriesOfForce<double> derive_series(const Jointed::Wing& w) {
-  // sin(k a) = sin a U_(k-1)(cos a), cos(k a) = T_k(cos a): Chebyshev's polynomials
-  constexpr double kSecond[4][4] = {{1, 0, 0, 0}, {0, 2, 0, 0}, {-1, 0, 4, 0}, {0, -4, 0, 8}};
-  constexpr double kFirst[4][5] = {{0, 1, 0, 0, 0}, {-1, 0, 2, 0, 0}, {0, -3, 0, 4, 0}, {1, 0, -8, 0, 8}};
-  SeriesOfForce<double> series{};
-  if (w.normal_sin.empty()) series.normal[0] = 3.45, series.normal[2] = 0.6;  // wing_aerodynamics.hpp
-  for (std::size_t k = 0; k < w.normal_sin.size(); ++k)
-    for (std::size_t i = 0; i < 4; ++i) series.normal[i] += w.normal_sin[k] * kSecond[k][i];
-  for (std::size_t k = 0; k < w.tangential_cos.size(); ++k)
-    for (std::size_t i = 0; i < 5; ++i) series.tangential[i] += w.tangential_cos[k] * kFirst[k][i];
-  return series;
 }
 
 }  // namespace flappy::model

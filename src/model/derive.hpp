@@ -3,8 +3,6 @@
 
 #include "flappy/vehicle.hpp"
 #include "model/effects/effect.hpp"
-#include "model/jointed_dynamics.hpp"
-#include "model/strip_aerodynamics.hpp"
 
 namespace flappy::model {
 
@@ -14,10 +12,12 @@ Parameters<double> derive(const Vehicle& vehicle, double step_s);
 /// Beats of wings, about, 1/s.
 double beat_Hz(const Vehicle& vehicle);
 
-/// Constants of a vehicle with four angles a wing; `side`: +1 left, -1 right.
-JointedParameters<double> derive_jointed(const Vehicle& vehicle);
-std::vector<Strip<double>> derive_strips(const Jointed::Wing& wing, double air_density_kg_m3, double side);
-SeriesOfForce<double> derive_series(const Jointed::Wing& wing);
+/// Single-point blade element of a planform: what SideParameters has of it, all else 0.
+SideParameters<double> derive_planform(const Planform& planform, double air_density_kg_m3);
+
+/// A body's first and second moment of mass about its frame's origin, kg m and kg m^2.
+Vec3<double> first_moment(const RigidBody& body);
+Sym3<double> second_moment(const RigidBody& body);
 
 /// The vehicle with those of its effects that are part of it.
 Vehicle built(Vehicle vehicle);

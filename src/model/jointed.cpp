@@ -172,6 +172,12 @@ void check_gait(const io::Table& root, const Jointed& v) {
   }
 }
 
+std::vector<BeatAveraged::Input> mixed_inputs(const Vehicle& vehicle) {
+  if (vehicle.beat_averaged) return vehicle.beat_averaged->inputs;
+  if (vehicle.jointed) return {vehicle.jointed->inputs.begin(), vehicle.jointed->inputs.end()};
+  return {};
+}
+
 namespace {
 
 void add_wing(const std::string& side, const Jointed::Wing& w, const auto& line) {

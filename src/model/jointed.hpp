@@ -39,6 +39,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "flappy/vehicle.hpp"
 #include "io/config.hpp"
@@ -61,6 +62,8 @@ bool is_symmetric(const io::Table& root);
 void mirror_left(Vehicle& vehicle);
 /// Refuses a gait that goes beyond kLargestAngle_rad, and inputs that take it there.
 void check_gait(const io::Table& root, const Jointed& vehicle);
+/// The inputs of a vehicle without motors, which its file mixes of a controller's outputs; none of one with motors.
+std::vector<BeatAveraged::Input> mixed_inputs(const Vehicle& vehicle);
 /// Reads back the same, together with parameters().
 std::string jointed_text(const Jointed& vehicle);
 

@@ -162,25 +162,36 @@ struct JointedSystem {
   T right[kMostUnknowns];
 };
 
-/// Solves in place: `right` becomes the unknowns.
-template <class T>
-FLAPPY_INLINE void solve(JointedSystem<T>& s, int size) {
+/// Solves in place: `right` becomes the unknowns. `fixed`: the size where it is known beforehand, or 0.
+template <int fixed, class T>
+FLAPPY_INLINE void solve(JointedSystem<T>& s, int any_size) {
+  const int size = fixed > 0 ? fixed : any_size;
   T inverse[kMostUnknowns];
+#pragma GCC unroll 6
   for (int j = 0; j < size; ++j) {
     T scaled[kMostUnknowns];  // row j of L D
-    T d = s.matrix[j][j];
+    T d = s.matrix[j][j], x = s.right[j];
+#pragma GCC unroll 6
     for (int k = 0; k < j; ++k) {
       scaled[k] = s.matrix[j][k];
       s.matrix[j][k] = scaled[k] * inverse[k];
       d -= scaled[k] * s.matrix[j][k];
+      x -= s.matrix[j][k] * s.right[k];
     }
     inverse[j] = T(1) / d;
-    for (int i = j + 1; i < size; ++i)
-      for (int k = 0; k < j; ++k) s.matrix[i][j] -= s.matrix[i][k] * s.matrix[j][k];
-    for (int k = 0; k < j; ++k) s.right[j] -= s.matrix[j][k] * s.right[k];
+    s.right[j] = x;
+#pragma GCC unroll 6
+    for (int i = j + 1; i < size; ++i) {
+      T below = s.matrix[i][j];
+#pragma GCC unroll 6
+      for (int k = 0; k < j; ++k) below -= s.matrix[i][k] * s.matrix[j][k];
+      s.matrix[i][j] = below;
+    }
   }
+#pragma GCC unroll 6
   for (int j = size - 1; j >= 0; --j) {
     T x = s.right[j] * inverse[j];
+#pragma GCC unroll 6
     for (int i = j + 1; i < size; ++i) x -= s.matrix[i][j] * s.right[i];
     s.right[j] = x;
   }
@@ -366,7 +377,8 @@ FLAPPY_INLINE JointedMotion<T> accelerate(const JointedParameters<T>& p, const S
       s.right[i] = where(held, zero, s.right[i]);
     }
   }
-  solve(s, size);
+  if (size == kBodyUnknowns) solve<kBodyUnknowns>(s, size);
+  else solve<0>(s, size);
 
   JointedMotion<T> m;
   m.acceleration_m_s2 = {s.right[0], s.right[1], s.right[2]};

@@ -380,6 +380,9 @@ WingJoints Batch<T>::joints(std::size_t i) const {
   next(offsetof(JointedMemory<T>, angle_rad) / sizeof(T), all.angle_rad);
   next(offsetof(JointedMemory<T>, rate_rad_s) / sizeof(T), all.rate_rad_s);
   next(offsetof(JointedMemory<T>, torque_Nm) / sizeof(T), all.torque_Nm);
+  for (int side = 0; side < kSides; ++side)
+    for (int j = 0; j < kJoints; ++j)
+      all.driven[side][j] = storage_->jointed->program.shape.modes[side][j] != model::Jointed::Mode::free;
   const double* work = storage_->jointed->work_of(i);
   all.work_J = work[kLanes<T>];
   return all;

@@ -3,6 +3,7 @@
 // before), and kick the rates; positions drift on with the new ones (leapfrog, rates by the method of Adams and Bashforth: of second order). Driven
 // angles are where the gait has them in the middle, exactly. Compiled once for each instruction set (FLAPPY_ISA); the bits are the same on all of them.
 #include <cstddef>
+#include <type_traits>
 
 #include "sim/end_of_steps.hpp"
 #include "sim/jointed_block.hpp"
@@ -289,8 +290,11 @@ class JointedLanes {
   const JointedShape& shape_;
   int first_;
   const L step_, half_;
-  const JointedParameters<L> p_;
-  const Parameters<L> block_;
+  // in place where lanes fill a row, as view_rows() has it
+  template <class S>
+  using View = std::conditional_t<kWidth<T> == kLanes<T>, const S&, const S>;
+  View<JointedParameters<L>> p_;
+  View<Parameters<L>> block_;
   JointedMemory<L> m_;
   L wanted_[kMostInputs];
   InputFilter<L> follows_[kMostInputs];
@@ -317,7 +321,7 @@ void step_jointed_block(Block<T>& block, BlockEffects<T> in_force, const StepPla
   for (int first = 0; first < kLanes<T>; first += kWidth<T>) {
     const auto& p = view_rows<Parameters<L>>(block.parameters, first);
     auto x = load_rows<State<L>>(block.state, first);
-    JointedLanes<T> lanes(in_force.jointed, block, plan, first);
+    JointedLanes<T> lanes(*in_force.jointed, block, plan, first);
     lanes.set_inputs(load_rows<Drive<L>>(block.drive, first).input, x);
     const auto shift = [&](const L& time_s) {
       lanes.drift(time_s);

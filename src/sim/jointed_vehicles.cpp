@@ -1,7 +1,7 @@
 // Vehicles of a batch with four angles a wing: from a vehicle to its rows.
 #include <stdexcept>
 
-#include "model/derive.hpp"
+#include "model/derive_jointed.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::sim {
@@ -84,9 +84,10 @@ void Batch<T>::Storage::put_jointed(std::size_t i, const model::Vehicle& v) {
   if (!jointed) {
     jointed = std::make_unique<JointedVehicles<T>>();
     jointed->program = program;
-    jointed->rows.assign(blocks.size() * jointed->row_count() * kLanes<T>, T(0));
-    jointed->memory.assign(blocks.size() * jointed->kMemoryRows * kLanes<T>, T(0));
+    jointed->rows.assign(blocks.size() * jointed->row_count(), {});
+    jointed->memory.assign(blocks.size() * jointed->kMemoryRows, {});
     jointed->work_J.assign(blocks.size() * 2 * kLanes<T>, 0.0);
+    jointed->point(blocks.size());
   }
   if (program != jointed->program)
     throw std::invalid_argument("vehicles of a batch share modes, harmonics, strips and what inputs act on");

@@ -3,10 +3,13 @@
 
 #include "flappy/world.hpp"
 #include "sim/block.hpp"
-#include "sim/jointed_block.hpp"
 #include "sim/mean_block.hpp"
 
 namespace flappy::sim {
+
+/// Of vehicles with four angles a wing (jointed_block.hpp).
+template <class T>
+struct JointedRows;
 
 /// How a batch advances; the same for all of its blocks.
 struct StepPlan {
@@ -40,7 +43,7 @@ struct BlockEffects {
   /// Of robots that are known by the beat.
   MeanRows<T> mean;
   /// Of vehicles with four angles a wing.
-  JointedRows<T> jointed;
+  const JointedRows<T>* jointed = nullptr;
 };
 
 /// Rows of a meter: the source's voltage as a share of its nominal one, currents of the left and of the right motor, A.

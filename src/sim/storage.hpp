@@ -6,6 +6,7 @@
 
 #include "flappy/batch.hpp"
 #include "model/effects/registry.hpp"
+#include "sim/jointed_block.hpp"
 #include "sim/step.hpp"
 
 namespace flappy::sim {
@@ -88,19 +89,25 @@ struct Mean {
 /// Rows of vehicles with four angles a wing.
 template <class T>
 struct JointedVehicles {
+  struct alignas(64) Row {
+    T lanes[kLanes<T>];
+  };
   JointedProgram program;
-  std::vector<T> rows, memory;  // [block][row][lane]
-  std::vector<double> work_J;   // [block][positive, all][lane]
+  std::vector<Row> rows, memory;  // [block][row]
+  std::vector<double> work_J;     // [block][positive, all][lane]
 
   static constexpr std::size_t kMemoryRows = model::kRows<JointedMemory>;
   std::size_t row_count() const { return static_cast<std::size_t>(program.shape.rows); }
   /// Of one vehicle, a number each.
-  T* row_of(std::size_t i) { return &rows[i / kLanes<T> * row_count() * kLanes<T> + i % kLanes<T>]; }
-  T* memory_of(std::size_t i) { return &memory[i / kLanes<T> * kMemoryRows * kLanes<T> + i % kLanes<T>]; }
+  T* row_of(std::size_t i) { return rows[i / kLanes<T> * row_count()].lanes + i % kLanes<T>; }
+  T* memory_of(std::size_t i) { return memory[i / kLanes<T> * kMemoryRows].lanes + i % kLanes<T>; }
   double* work_of(std::size_t i) { return &work_J[i / kLanes<T> * 2 * kLanes<T> + i % kLanes<T>]; }
-  JointedRows<T> block(std::size_t b) {
-    return {&program.shape, program.modulations.data(), row_of(b * kLanes<T>), memory_of(b * kLanes<T>),
-            work_of(b * kLanes<T>)};
+  std::vector<JointedRows<T>> blocks;
+
+  void point(std::size_t count) {
+    for (std::size_t b = 0; b < count; ++b)
+      blocks.push_back({&program.shape, program.modulations.data(), row_of(b * kLanes<T>), memory_of(b * kLanes<T>),
+                        work_of(b * kLanes<T>)});
   }
 };
 
@@ -149,7 +156,7 @@ struct Batch<T>::Storage {
              effect_states.data() + b * state_size()};
     if (!motors.empty()) all.motors = &motors[b];
     if (mean) all.mean = mean->block(b);
-    if (jointed) all.jointed = jointed->block(b);
+    if (jointed) all.jointed = &jointed->blocks[b];
     return all;
   }
   /// Numbers of a block that effects remember.
@@ -174,7 +181,7 @@ struct Batch<T>::Storage {
   /// std::invalid_argument where it shares not the batch's inputs, actuators and expressions.
   void put_mean(std::size_t i, const model::Vehicle& as_filed);
   void keep_inputs(std::size_t slots);
-  /// Inputs of a robot that is known by the beat, as its controller has set them.
+  /// Inputs of a vehicle without motors, as its controller has set them.
   std::vector<double> inputs_of(std::size_t i);
   /// Rows and memory of a robot that is known by the beat, to be put to one of any batch; none otherwise.
   std::pair<std::vector<T>, std::vector<T>> get_mean(std::size_t i) const;

@@ -5,7 +5,7 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "model/derive.hpp"
+#include "model/derive_jointed.hpp"
 #include "model/jointed_kane.hpp"
 
 namespace flappy {

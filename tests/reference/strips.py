@@ -4,11 +4,12 @@ products here, components there. Plain Python, no package.
 
 Wing axes W: x the plate's normal, y along the span (+y to the animal's left on both wings), z towards the leading edge.
 A strip at y, of chord c, its leading edge l above the axis of rotation (so its chord spans l - c .. l), width dr, moves
-at a point p of the plate with V(p) = v + w x p relative to the air; V_n = V.x, V_c = V.z, at the axis unless said.
+at a point p of the plate with V(p) = v + w x p relative to the air; V_n = V.x, V_c = V.z at the quarter chord.
 
   translation   1/2 rho c dr U^2 C_N(a) against V_n, sin a = V_n/U, cos a = V_c/U, at d_cp(cos a) c behind the edge [1]
-  rotation      k_R pi (3/4 - l/c) rho c^2 dr V_c w_y along x, at mid-chord: thin-aerofoil circulation of a plate that
-                pitches about its real axis [2]; k_R = 1/2 is its Wagner value at onset, k_R = 1 its value when settled
+  rotation      k_R pi/2 rho c^2 dr V_c w_y along x, at mid-chord: what a pitching plate's flow at 3/4 chord adds to that
+                at the quarter chord in thin-aerofoil theory, pi (3/4 - x_0) about an axis at x_0 [2]; k_R = 1/2 is its
+                Wagner value at onset, k_R = 1 its value when settled
   pitching      1/2 rho C_rd |w_y z| (-w_y z) dz dr at every z of the chord: a plate's drag in its own pitching, whose
                 moment is the M_rd of [1]
   added mass    -k_A rho pi/4 c^2 dr d/dt V_n(mid-chord) along x, and -k_A rho pi/128 c^4 dr w_y' about y [2]
@@ -88,7 +89,7 @@ class Wing:
 
         for r, dr, c, lead in self.strips:
             y = self.side * r
-            V = add(v, cross(w, (0.0, y, 0.0)))
+            V = add(v, cross(w, (0.0, y, lead - c / 4)))
             normal, chordwise = V[0], V[2]
             speed = math.hypot(normal, chordwise)
             if speed > 0:
@@ -97,7 +98,7 @@ class Wing:
                 act("translation", (-pressure * self.normal(sin_a, cos_a), 0.0, 0.0), (0.0, y, lead - c * published_pressure_centre(cos_a)))
                 if self.tangential:
                     act("translation", (0.0, 0.0, -pressure * self.tangential(cos_a)), (0.0, y, 0.0))
-            circulation = self.rotational_lift * math.pi * (0.75 - lead / c) * c**2 * w[1]
+            circulation = self.rotational_lift * math.pi / 2 * c**2 * w[1]
             act("rotation", (rho * circulation * chordwise * dr, 0.0, 0.0), (0.0, y, lead - c / 2))
             top, bottom = lead, lead - c
             drag = -0.5 * rho * self.pitching_drag * abs(w[1]) * w[1] * dr

@@ -5,7 +5,7 @@
 #include <iostream>
 
 #include "flappy/vehicle_file.hpp"
-#include "model/derive.hpp"
+#include "model/derive_jointed.hpp"
 #include "model/jointed_dynamics.hpp"
 #include "model/strip_aerodynamics.hpp"
 

@@ -38,7 +38,7 @@ def compare(text, name):
                 gaps[k] = max(gaps[k], *(abs(a - b) for a, b in zip(ours, peer)))
     worst = max(gap / size for gap, size in zip(gaps, sizes))
     # of the largest load: about 25 roundings a strip, 20 strips, and sine and cosine of either side
-    assert worst < 1e-12, f"{name}: loads differ by {worst:.1e} of themselves"
+    assert worst < 2e-13, f"{name}: loads differ by {worst:.1e} of themselves"
     for side, got in ((1, added[:6]), (-1, added[6:])):
         unit = lambda dv, dw: v.wings[side].load((0, 0, 0), (0, 0, 0), dv, dw)["added mass"]
         rows = [unit((1, 0, 0), (0, 0, 0)), unit((0, 0, 0), (0, 1, 0)), unit((0, 0, 0), (0, 0, 1))]

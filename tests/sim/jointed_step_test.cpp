@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "flappy/batch.hpp"
-#include "model/derive.hpp"
 #include "model/jointed_kane.hpp"
 #include "sim/storage.hpp"
 #include "jointed_vehicles.hpp"

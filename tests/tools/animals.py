@@ -140,8 +140,8 @@ class Lag:
         for r, dr, c, lead in self.strips:
             states, before = [0.0, 0.0], None
             for k in range(len(t)):
-                V = add(v[k], (-w[k][2] * r, 0.0, w[k][0] * r))
-                now = (math.pi * (0.75 - lead / c) * c**2 * w[k][1], math.hypot(V[0], V[2]))
+                V = add(v[k], (w[k][1] * (lead - c / 4) - w[k][2] * r, 0.0, w[k][0] * r))
+                now = (math.pi / 2 * c**2 * w[k][1], math.hypot(V[0], V[2]))
                 if before:
                     middle, way = (now[0] + before[0]) / 2, (now[1] + before[1]) * (t[k] - t[k - 1]) / c
                     states = [middle + (z - middle) * math.exp(-b * way) for z, b in zip(states, (0.0455, 0.3))]

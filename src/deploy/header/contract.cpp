@@ -6,6 +6,8 @@
 
 #include "deploy/header/c_text.hpp"
 #include "io/files.hpp"
+#include "model/derive.hpp"
+#include "model/jointed.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -39,16 +41,13 @@ void list(std::ostringstream& text, const char* title, const std::vector<Signal>
 bool holds_trim(const FlyConfig& config) { return config.fleet.task.constants.holds_trim > 0; }
 bool sets_voltages(const FlyConfig& config) { return config.fleet.task.sets_voltages(); }
 
-double beats_Hz(const FlyConfig& config) {
-  const auto& robot = config.vehicle.beat_averaged;
-  return robot ? robot->nominal_Hz : config.vehicle.driver.flapping_Hz;
-}
+double beats_Hz(const FlyConfig& config) { return model::beat_Hz(config.vehicle); }
 
 std::string meaning_of_action(const FlyConfig& config) {
   if (sets_voltages(config)) return "It is the voltage of the left and of the right motor.\n";
   std::string inputs;  // as the vehicle mixes them
-  if (const auto& robot = config.vehicle.beat_averaged) {
-    for (const model::BeatAveraged::Input& i : robot->inputs) {
+  if (const auto mixed = model::mixed_inputs(config.vehicle); !mixed.empty()) {
+    for (const model::BeatAveraged::Input& i : mixed) {
       inputs += i.name + " = " + io::shortest_digits(i.neutral);
       for (std::size_t k = 0; k < i.mix.size(); ++k)
         if (i.mix[k] != 0) inputs += " + " + io::shortest_digits(i.mix[k]) + " " + config.fleet.task.action()[k].name;
@@ -72,7 +71,8 @@ Periods periods_of(const FlyConfig& config) {
   const double control_s = 1 / config.fleet.control_hz;
   return {whole_us("a control period", control_s),
           whole_us("a policy's period", control_s * config.fleet.task.action_repeat),
-          whole_us("the driver's hold", config.vehicle.beat_averaged ? control_s : config.vehicle.driver.hold_s)};
+          whole_us("the driver's hold",
+                   config.vehicle.beat_averaged || config.vehicle.jointed ? control_s : config.vehicle.driver.hold_s)};
 }
 
 std::string contract_text(const FlyConfig& config, const policy::RunInfo& run) {
