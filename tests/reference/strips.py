@@ -70,13 +70,13 @@ def published_pressure_centre(cos_a):
 
 class Wing:
     """`strips`: (distance from the shoulder, width, chord, leading edge above the axis), m; `side`: +1 left, -1 right;
-    `normal`(sin a, cos a): C_N; `tangential`(cos a): C_T along the chord, towards the trailing edge where cos a > 0."""
+    `normal`(sin a, cos a): C_N; `tangential`(cos a): C_T along the chord, towards the trailing edge where cos a > 0; `at_axis`: velocities there, and pi (3/4 - l/c) in place of pi/2."""
 
     def __init__(self, strips, side=1, density=1.2, rotational_lift=0.0, added_mass=0.0, pitching_drag=0.0, normal=published_normal,
-                 tangential=None):
+                 tangential=None, at_axis=False):
         self.strips, self.side, self.density = [tuple(s) for s in strips], side, density
         self.rotational_lift, self.added_mass, self.pitching_drag = rotational_lift, added_mass, pitching_drag
-        self.normal, self.tangential = normal, tangential
+        self.normal, self.tangential, self.at_axis = normal, tangential, at_axis
 
     def load(self, v, w, dv=(0, 0, 0), dw=(0, 0, 0)):
         """Of each term (force, moment about the shoulder) in W. `v`: velocity of the shoulder, `w`: angular velocity of
@@ -89,7 +89,7 @@ class Wing:
 
         for r, dr, c, lead in self.strips:
             y = self.side * r
-            V = add(v, cross(w, (0.0, y, lead - c / 4)))
+            V = add(v, cross(w, (0.0, y, 0.0 if self.at_axis else lead - c / 4)))
             normal, chordwise = V[0], V[2]
             speed = math.hypot(normal, chordwise)
             if speed > 0:
@@ -98,7 +98,7 @@ class Wing:
                 act("translation", (-pressure * self.normal(sin_a, cos_a), 0.0, 0.0), (0.0, y, lead - c * published_pressure_centre(cos_a)))
                 if self.tangential:
                     act("translation", (0.0, 0.0, -pressure * self.tangential(cos_a)), (0.0, y, 0.0))
-            circulation = self.rotational_lift * math.pi / 2 * c**2 * w[1]
+            circulation = self.rotational_lift * math.pi * (0.75 - lead / c if self.at_axis else 0.5) * c**2 * w[1]
             act("rotation", (rho * circulation * chordwise * dr, 0.0, 0.0), (0.0, y, lead - c / 2))
             top, bottom = lead, lead - c
             drag = -0.5 * rho * self.pitching_drag * abs(w[1]) * w[1] * dr

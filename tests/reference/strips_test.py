@@ -29,7 +29,9 @@ class Strips(unittest.TestCase):
         # Of slope 2 pi, and where the flow is along the chord: force -rho pi c V_c V_n(3/4 chord), wherever the axis is; its part by rotation at mid-chord.
         for lead in (0.005, 0.0, 0.03, -0.004):
             v, w, c = (1e-6, 0.0, 2.0), (0.0, 3e-4, 0.0), 0.02
-            loads = Wing(rectangle(lead=lead), density=1.2, rotational_lift=1.0, normal=lambda s, _: 2 * math.pi * s).load(v, w)
+            figures = {"density": 1.2, "rotational_lift": 1.0, "normal": lambda s, _: 2 * math.pi * s}
+            loads, same = (Wing(rectangle(lead=lead), at_axis=at, **figures).load(v, w) for at in (False, True))
+            self.assertAlmostEqual(total(loads)[0][0] / total(same)[0][0], 1.0, places=9)
             normal = v[0] + w[1] * (lead - 0.75 * c)
             self.assertAlmostEqual(total(loads)[0][0] / (-1.2 * math.pi * c * 2.0 * normal * 0.05), 1.0, places=9)
             force, moment = loads["rotation"]
