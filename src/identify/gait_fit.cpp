@@ -137,7 +137,7 @@ std::string gait_text(const std::vector<FittedAngle>& angles) {
   std::string text;
   const auto list = [](const std::vector<double>& numbers) {
     std::string all = "[";
-    for (const double x : numbers) all += (all.size() > 1 ? ", " : "") + io::toml_number(std::round(x * 1e7) / 1e7);
+    for (const double x : numbers) all += (all.size() > 1 ? ", " : "") + io::toml_number(std::round(x * 1e7) / 1e7 + 0.0);
     return all + "]\n";
   };
   for (const FittedAngle& f : angles)

@@ -400,7 +400,7 @@ bool Recorder<T>::write(const std::filesystem::path& folder) const {
   write_flight_log(folder, storage_->log);
   flightlog::write_truth(folder, kTruthNames, storage_->truth);
   if (!storage_->joints.empty()) {
-    io::CsvWriter csv(folder / "joints.csv", kJointNames);
+    io::CsvWriter csv(folder / flightlog::log_file::kJoints, kJointNames);
     std::vector<double> row(kJointNames.size());
     for (std::size_t i = 0; i < storage_->joints[0].size(); ++i) {
       for (std::size_t k = 0; k < row.size(); ++k) row[k] = storage_->joints[k][i];

@@ -3,10 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <cmath>
+#include <fstream>
+#include <numbers>
 #include <random>
 
+#include "io/files.hpp"
+#include "jointed_vehicles.hpp"
 #include "model/derive_jointed.hpp"
 #include "model/jointed_kane.hpp"
+#include "refusal.hpp"
 
 namespace flappy {
 namespace {
@@ -117,6 +123,105 @@ TEST(Jointed, HeldTorsoLeavesTheFreeAnglesOfKane) {
         EXPECT_NEAR((side == 0 ? m.joint_rad_s2.left : m.joint_rad_s2.right)[j], kane.joint[side][j],
                     kTolerance * (1e5 + std::abs(kane.joint[side][j])));
   }
+}
+
+// ---- the file
+
+std::string driven_text() { return io::read_text(test::source_path("configs/vehicles/hummingbird_driven.toml")); }
+
+/// What is said of the shipped file with `from` in it replaced.
+std::string refused(const std::string& from, const std::string& to) {
+  std::string text = driven_text();
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  text.replace(at, from.size(), to);
+  const std::string file = testing::TempDir() + "jointed.toml";
+  std::ofstream(file) << text;
+  const std::string said = test::refusal([&] { model::read_any_vehicle(file); });
+  const std::size_t key = said.find(": ");
+  return key == std::string::npos ? said : said.substr(key + 2);
+}
+
+TEST(JointedFile, ReadsBackTheSame) {
+  for (const Vehicle& v : {test::driven_hummingbird(), test::insect(true, 5)}) {
+    const std::string file = testing::TempDir() + "jointed_text.toml";
+    std::ofstream(file) << model::vehicle_text(v);
+    EXPECT_EQ(model::vehicle_text(model::read_any_vehicle(file)), model::vehicle_text(v));
+  }
+}
+
+TEST(JointedFile, MirrorsTheLeftSide) {
+  const Vehicle v = test::driven_hummingbird();
+  EXPECT_EQ(v.right.shoulder_m.y, -v.left.shoulder_m.y);
+  EXPECT_EQ(v.right.leading_edge.inertia_kg_m2.yz, -v.left.leading_edge.inertia_kg_m2.yz);
+  EXPECT_EQ(v.right.leading_edge.inertia_kg_m2.xz, v.left.leading_edge.inertia_kg_m2.xz);
+  EXPECT_EQ(v.jointed->right.angles[1].cos_rad, v.jointed->left.angles[1].cos_rad);
+}
+
+TEST(JointedFile, RefusesWhatNoWingDoes) {
+  EXPECT_EQ(refused("cos_rad = [0.11]", "cos_rad = [63.0]"),
+            "left.stroke.cos_rad: 63.0 rad is more than a turn; are these degrees?; accepted: amplitudes in rad");
+  EXPECT_EQ(refused("cos_rad = [0.11]", "cos_rad = [0.15]"),
+            "left.stroke: reaches 2.294 rad with all inputs at their ends; accepted: at most 1.75 rad either way");
+  EXPECT_EQ(refused("cos_rad = [0.11]", ""),
+            "left.stroke: is driven without a harmonic; accepted: cos_rad, sin_rad, or mode = \"fixed\"");
+  EXPECT_EQ(refused("timing_opposed = 4.0", "timing_opposed = 6.0"),
+            "input: all timing together stops the phase; accepted: at most 0.8 of all inputs at their ends");
+  EXPECT_EQ(refused("lag_s = 0.004 ", "lag_s = 0.0 "),
+            "input.amplitude.lag_s: 0 is out of range; accepted: a number from 1e-05 to 1");
+  EXPECT_EQ(refused("mode = \"fixed\"", "mode = \"loose\"").substr(0, 56),
+            "left.stroke_plane.mode: \"loose\" is not known; accepted: ");
+  EXPECT_EQ(refused("symmetric = true", "symmetric = false").substr(0, 22), "right: is missing; acc");
+  EXPECT_EQ(refused("[left.planform]", "[effects.battery_sag]\n[left.planform]"),
+            "effects.battery_sag: acts on wings and motors of another kind of vehicle; accepted: effects of sensors");
+  EXPECT_EQ(refused("[left.planform]", "[left.aerodynamics]\nstrips_m = [[0.01, 0.01, 0.02, 0.0]]\n[left.planform]"),
+            "left.planform: beside strips says nothing; accepted: [planform] or [aerodynamics]");
+  EXPECT_EQ(test::refusal([] {
+              model::read_vehicle(test::source_path("configs/vehicles/hummingbird_driven.toml"));
+            }).find("model: wings whose angles are driven have no motors; accepted:") != std::string::npos,
+            true);
+}
+
+// ---- air
+
+// A wing that translates at constant speed across uniform strips: their sum in closed form.
+TEST(StripAerodynamics, SumsToTheClosedForm) {
+  Jointed::Wing w;
+  const double span = 0.05, chord = 0.02, rho = 1.2, edge = 0.005;
+  for (int i = 0; i < 10; ++i) w.strips.push_back({(i + 0.5) * span / 10, span / 10, chord, edge});
+  w.rotational_lift = 1, w.normal_sin = {3}, w.tangential_cos = {0.4};
+  const Vec3<double> v{-2, 0, 1.5}, turn{0, 30, 0};
+  model::WingLoad<double> load = model::no_load<double>();
+  for (const auto& strip : model::derive_strips(w, rho, -1))
+    model::add_strip(strip, model::derive_series(w), true, v, turn, load);
+  const double normal = -2 + 30 * (edge - chord / 4), U = std::hypot(normal, 1.5), area = span * chord;
+  const double N = 0.5 * rho * area * U * U * 3 * (-normal / U), T = 0.5 * rho * area * U * U * 0.4 * (1.5 / U);
+  const double R = rho * chord * area * std::numbers::pi / 2 * 1.5 * 30;
+  EXPECT_NEAR(load.force_N.x, N + R, 1e-12);
+  EXPECT_NEAR(load.force_N.z, -T, 1e-12);
+  EXPECT_NEAR(load.moment_Nm.z, span / 2 * (N + R), 1e-12);
+  EXPECT_NEAR(load.moment_Nm.x, span / 2 * T, 1e-12);
+  const double c = 1.5 / U, behind = 0.46 - 0.332 * c - 0.037 * (4 * c * c * c - 3 * c) -
+                                     0.013 * (16 * std::pow(c, 5) - 20 * c * c * c + 5 * c);
+  EXPECT_NEAR(load.moment_Nm.y, N * (edge - chord * behind) + R * (edge - chord / 2), 1e-9);
+}
+
+// The series of the published C_N, in sines, are its polynomial.
+TEST(StripAerodynamics, TakesSeriesForPolynomials) {
+  Jointed::Wing published, sines;
+  sines.normal_sin = {3.45 + 0.15, 0, 0.15};  // sin a (0.6 cos^2 a + 3.45)
+  const auto a = model::derive_series(published), b = model::derive_series(sines);
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(a.normal[i], b.normal[i], 1e-15);
+  Jointed::Wing all;
+  all.normal_sin = {0.1, 0.2, 0.3, 0.4}, all.tangential_cos = {0.5, 0.6, 0.7, 0.8};
+  const auto s = model::derive_series(all);
+  const double x = 0.7, c = std::cos(x);
+  double normal = 0, tangential = 0, P = 0, Q = 0;
+  for (int k = 1; k <= 4; ++k) normal += 0.1 * k * std::sin(k * x), tangential += (0.4 + 0.1 * k) * std::cos(k * x);
+  for (int i = 3; i >= 0; --i) P = P * c + s.normal[i];
+  for (int i = 4; i >= 0; --i) Q = Q * c + s.tangential[i];
+  EXPECT_NEAR(std::sin(x) * P, normal, 1e-14);
+  EXPECT_NEAR(Q, tangential, 1e-14);
 }
 
 }  // namespace
