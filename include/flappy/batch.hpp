@@ -57,6 +57,16 @@ std::string best_instruction_set();
 /// All that this processor can run, best last.
 std::vector<std::string> instruction_sets();
 
+/// The wings of a vehicle with four angles each (model/jointed.hpp), left and right: stroke plane, stroke, deviation, rotation.
+struct WingJoints {
+  double angle_rad[2][4], rate_rad_s[2][4];
+  double torque_Nm
+      [2]
+      [4];  ///< in the last step: of the muscle of a driven angle, of the spring of a free one, of what holds a fixed one
+  bool driven[2][4];  ///< or fixed, but for what inputs add: not free
+  double work_J;      ///< of all muscles since the reset, what they take back subtracted
+};
+
 template <class T>
 class Batch {
  public:
@@ -88,8 +98,11 @@ class Batch {
   std::uint32_t status(std::size_t i) const;
   HeldImpulse held_impulse(std::size_t i) const;
   /// What both motors drew since the reset, V i in every step; what they give back counts. std::logic_error unless it is metered,
-  /// as it never is of robots that are known by the beat.
+  /// as it never is of robots that are known by the beat. Of driven angles the mechanical work of their muscles: of each wing, whose angles share
+  /// what they have, while its power is positive; nothing is stored of what they take back.
   double energy_J(std::size_t i) const;
+  /// std::logic_error for vehicles of another kind.
+  WingJoints joints(std::size_t i) const;
   /// What holds flapper `i` now: a standing one flies once its wings have carried it.
   Start support(std::size_t i) const;
   std::size_t count_status(std::uint32_t bits) const;

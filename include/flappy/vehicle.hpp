@@ -143,6 +143,45 @@ struct BeatAveraged {
   std::vector<Wrench> wrenches;
 };
 
+/// A vehicle whose sides have four angles each: fixed, driven along a gait, or free (src/model/jointed.hpp). It has no motors: its driver, and
+/// stroke, rotation, motor and spring of its sides, say nothing; nor does a planform where there are strips.
+struct Jointed {
+  enum class Mode { fixed, driven, free };
+  struct Angle {
+    Mode mode = Mode::fixed;
+    double mean_rad = 0;  ///< of a gait; all of it where it is fixed
+    std::vector<double> cos_rad, sin_rad;
+    double stiffness_Nm_rad = 0, rest_rad = 0, damping_Nm_s = 0;
+    double lower_rad = 0, upper_rad = 0;  ///< compliant stops of a free angle
+    double stop_stiffness_Nm_rad = 0, stop_damping_Nm_s = 0;
+  };
+  struct Strip {
+    double span_m = 0;   ///< of its middle, from the shoulder
+    double width_m = 0;  ///< along the span
+    double chord_m = 0;
+    double leading_edge_m = 0;  ///< above the axis of rotation
+  };
+  struct Wing {
+    std::array<Angle, 4> angles;  ///< stroke plane, stroke, deviation, rotation
+    std::vector<Strip> strips;
+    double rotational_lift = 0, added_mass = 0;      ///< factors on theory; strips alone have them
+    double rotational_damping_coefficient = 0;       ///< of strips
+    std::vector<double> normal_sin, tangential_cos;  ///< C_N, C_T; empty: the published C_N, no C_T
+  };
+  /// What 1 of an input adds, of which opposed ones are added on the left and taken on the right.
+  struct Input : BeatAveraged::Input {
+    double lag_s = 0;
+    double frequency = 0;  ///< to the factor on the base frequency
+    double timing = 0, timing_opposed = 0;
+    std::array<double, 4> scale = {}, scale_opposed = {};  ///< to the factor on harmonics of each angle
+    std::array<double, 4> offset_rad = {}, offset_opposed_rad = {};
+  };
+  double frequency_Hz = 0;
+  double muscle_mass_kg = 0;  ///< 0: not known
+  std::vector<Input> inputs;
+  Wing left, right;
+};
+
 struct Vehicle {
   std::string name;
   RigidBody torso;
@@ -155,6 +194,7 @@ struct Vehicle {
   std::map<std::string, std::map<std::string, double>> effects;
   std::optional<Posterior> posterior;         ///< of the file it was read from; a vehicle drawn at random has none
   std::optional<BeatAveraged> beat_averaged;  ///< instead of wings and motors
+  std::optional<Jointed> jointed;             ///< instead of motors
 };
 
 /// One leaf of a vehicle: where it is, and what is accepted there (closed interval).

@@ -470,6 +470,10 @@ std::vector<std::span<std::byte>> Fleet<T>::memory() {
     all.push_back(std::as_writable_bytes(std::span(body.mean->rows)));
     all.push_back(std::as_writable_bytes(std::span(body.mean->memory)));
   }
+  if (body.jointed) {
+    all.push_back(std::as_writable_bytes(std::span(body.jointed->rows)));
+    all.push_back(std::as_writable_bytes(std::span(body.jointed->memory)));
+  }
   return all;
 }
 

@@ -59,7 +59,8 @@ struct Snapshot {
   std::uint64_t effects = 0;    ///< in force
   std::vector<T> effect_rows, effect_states;
   std::vector<T> motors;  ///< conductance and back-EMF's current of left and right, where energy is metered
-  std::pair<std::vector<T>, std::vector<T>> mean;     ///< rows and memory of a robot that is known by the beat
+  /// Rows and memory of a robot that is known by the beat, or has four angles a wing.
+  std::pair<std::vector<T>, std::vector<T>> own;
   std::pair<std::vector<T>, std::vector<T>> contact;  ///< the same of points of contact
   std::uint32_t phase, phase_per_update;
   Target target;  ///< where it was meant to be

@@ -272,7 +272,7 @@ Snapshot<T> Fleet<T>::Storage::snapshot(std::size_t i, const Target& target) {
   Snapshot<T> s{{}, {}, 0, {}, {}, {}, {}, {}, block.phase[lane], block.phase_per_update[lane], target};
   s.effects = body.get_effects(i, s.effect_rows, s.effect_states);
   s.motors = body.get_motors(i);
-  s.mean = body.get_mean(i);
+  s.own = body.jointed ? body.get_jointed(i) : body.get_mean(i);
   s.contact = body.get_contact(i);
   for (int r = 0; r < kBodyRows; ++r) s.body.push_back(rows_of<T>(block)[r][lane]);
   for (int r = 0; r < kFlightRows<T>; ++r) s.flight.push_back(rows_of<T>(f)[r][lane]);
@@ -287,7 +287,8 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   for (int r = 0; r < kFlightRows<T>; ++r) rows_of<T>(f)[r][lane] = s.flight[static_cast<std::size_t>(r)];
   sim::storage_of(batch).put_effects(i, s.effects, s.effect_rows, s.effect_states);
   sim::storage_of(batch).put_motors(i, s.motors);
-  sim::storage_of(batch).put_mean(i, s.mean.first, s.mean.second);
+  sim::storage_of(batch).put_mean(i, s.own.first, s.own.second);
+  sim::storage_of(batch).put_jointed(i, s.own.first, s.own.second);
   sim::storage_of(batch).clear_energy(i);
   block.phase[lane] = s.phase;
   block.phase_per_update[lane] = s.phase_per_update;

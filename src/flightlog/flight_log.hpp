@@ -9,6 +9,7 @@
 //   attitude.csv  optional, declared in [attitude]: t_s,qw,qx,qy,qz, as a second estimator had it
 //   wings.csv     optional, declared in [wings]: t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad
 //   truth.csv     only from a simulator: the full state; no reader here opens it
+//   joints.csv    the same of vehicles with driven wings: angles, rates and torques of all joints, power and work of their muscles
 //
 // Where inputs are declared, imu.csv is optional as well; [imu] gyro = false: it has no gyro; [power] currents = false:
 // power.csv has the battery alone.
@@ -158,8 +159,9 @@ struct FlightLog {
 /// The names of the files.
 namespace log_file {
 inline const std::string kHeader = "flight.toml", kCommand = "command.csv", kMocap = "mocap.csv", kImu = "imu.csv",
-                         kPower = "power.csv", kWings = "wings.csv", kAttitude = "attitude.csv", kTruth = "truth.csv";
-inline const std::vector<std::string> kAll = {kHeader, kCommand, kMocap, kImu, kPower, kWings, kAttitude, kTruth};
+                         kPower = "power.csv", kWings = "wings.csv", kAttitude = "attitude.csv", kTruth = "truth.csv",
+                         kJoints = "joints.csv";
+inline const std::vector<std::string> kAll = {kHeader, kCommand, kMocap, kImu, kPower, kWings, kAttitude, kTruth, kJoints};
 }  // namespace log_file
 
 /// Columns of truth.csv: pose, motion and wings, as the flapper has them, and its gyro's bias.

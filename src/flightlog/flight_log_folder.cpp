@@ -84,7 +84,7 @@ FlightLog read_flight_log(const fs::path& folder) {
   const std::vector<std::string> optional = {kImu, kPower, kWings, kAttitude};
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
-    if (!name.ends_with(".csv") || name == kTruth) continue;
+    if (!name.ends_with(".csv") || name == kTruth || name == kJoints) continue;
     // An optional stream under a wrong name would be left out in silence.
     const std::string nearest = io::nearest_name(name, optional);
     if (!nearest.empty() && nearest != name)

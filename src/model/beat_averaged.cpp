@@ -197,6 +197,15 @@ MeanLoad MeanWrench::at(std::span<const double> variables) const {
   return load;
 }
 
+BeatAveraged::Input read_input(const std::string& name, const io::Table& t) {
+  const io::Range any{-kLargest, kLargest};
+  const double low = t.number("low", any);
+  BeatAveraged::Input input{name, low, t.number("high", {low, kLargest})};
+  input.neutral = t.number_or("neutral", std::clamp(0.0, low, input.high), {low, input.high});
+  for (std::size_t k = 0; k < input.mix.size(); ++k) input.mix[k] = t.number_or(kMixKeys[k], 0, any);
+  return input;
+}
+
 BeatAveraged read_beat_averaged(const io::Table& root, bool predicted) {
   BeatAveraged v;
   v.predicted = predicted;
@@ -210,13 +219,8 @@ BeatAveraged read_beat_averaged(const io::Table& root, bool predicted) {
     const io::Table all = root.table(key);
     for (const std::string& name : all.keys()) read(all, name, all.table(name));
   };
-  each("input", [&](const io::Table&, const std::string& name, const io::Table& t) {
-    const double low = t.number("low", any);
-    BeatAveraged::Input input{name, low, t.number("high", {low, kLargest})};
-    input.neutral = t.number_or("neutral", std::clamp(0.0, low, input.high), {low, input.high});
-    for (std::size_t k = 0; k < input.mix.size(); ++k) input.mix[k] = t.number_or(kMixKeys[k], 0, any);
-    v.inputs.push_back(std::move(input));
-  });
+  each("input",
+       [&](const io::Table&, const std::string& name, const io::Table& t) { v.inputs.push_back(read_input(name, t)); });
   std::vector<std::string> columns;
   for (const BeatAveraged::Input& i : v.inputs) columns.push_back(i.name);
   each("actuator", [&](const io::Table& actuators, const std::string& name, const io::Table& t) {
@@ -260,6 +264,19 @@ BeatAveraged read_beat_averaged(const io::Table& root, bool predicted) {
   return v;
 }
 
+std::string input_text(const BeatAveraged::Input& i) {
+  std::string text;
+  const auto number = [&](const std::string& key, double value) {
+    text += "input." + i.name + "." + key + " = " + io::toml_number(value) + "\n";
+  };
+  number("low", i.low);
+  number("high", i.high);
+  if (i.neutral != 0) number("neutral", i.neutral);
+  for (std::size_t k = 0; k < i.mix.size(); ++k)
+    if (i.mix[k] != 0) number(kMixKeys[k], i.mix[k]);
+  return text;
+}
+
 std::string beat_averaged_text(const BeatAveraged& v) {
   std::string text;
   const auto line = [&](const std::string& path, const std::string& value) { text += path + " = " + value + "\n"; };
@@ -267,13 +284,7 @@ std::string beat_averaged_text(const BeatAveraged& v) {
   number("beat.nominal_Hz", v.nominal_Hz);
   number("beat.bandwidth_Hz", v.bandwidth_Hz);
   if (!v.compares_moments) line("beat.compares_moments", "false");
-  for (const BeatAveraged::Input& i : v.inputs) {
-    number("input." + i.name + ".low", i.low);
-    number("input." + i.name + ".high", i.high);
-    if (i.neutral != 0) number("input." + i.name + ".neutral", i.neutral);
-    for (std::size_t k = 0; k < i.mix.size(); ++k)
-      if (i.mix[k] != 0) number("input." + i.name + "." + kMixKeys[k], i.mix[k]);
-  }
+  for (const BeatAveraged::Input& i : v.inputs) text += input_text(i);
   for (const BeatAveraged::Actuator& a : v.actuators) {
     line("actuator." + a.name + ".input", io::toml_string(a.input));
     line("actuator." + a.name + ".role", io::toml_string(kRoles[static_cast<int>(a.role)]));

@@ -81,6 +81,10 @@ std::optional<ExpressionFault> expression_fault(std::string_view text, const Bea
 inline constexpr std::array<const char*, 6> kLoadNames = {"force_x_N",   "force_y_N",   "force_z_N",
                                                           "moment_x_Nm", "moment_y_Nm", "moment_z_Nm"};
 
+/// An input as its table says, and as text that reads back to the same.
+BeatAveraged::Input read_input(const std::string& name, const io::Table& table);
+std::string input_text(const BeatAveraged::Input& input);
+
 /// Reads the tables beat, input, actuator, coefficients and, unless it is `predicted`, wrench of a vehicle's file.
 BeatAveraged read_beat_averaged(const io::Table& root, bool predicted);
 /// Reads back the same.

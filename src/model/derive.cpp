@@ -10,12 +10,13 @@ namespace {
 
 Vec3<double> vec(const Triple& t) { return {t.x, t.y, t.z}; }
 
-/// First moment of mass about the frame's origin, kg m.
-Vec3<double> first_moment(const RigidBody& b) { return b.mass_kg * vec(b.com_m); }
-
 Sym3<double> outer(double mass, const Vec3<double>& r) {
   return {mass * r.x * r.x, mass * r.y * r.y, mass * r.z * r.z, mass * r.x * r.y, mass * r.y * r.z, mass * r.x * r.z};
 }
+
+}  // namespace
+
+Vec3<double> first_moment(const RigidBody& b) { return b.mass_kg * vec(b.com_m); }
 
 /// Second moment of mass (integral of r r^T) about the frame's origin, from the inertia I about the centre of
 /// mass: P = tr(I)/2 1 - I + m c c^T.
@@ -26,21 +27,15 @@ Sym3<double> second_moment(const RigidBody& b) {
   return about_com + outer(b.mass_kg, vec(b.com_m));
 }
 
+namespace {
+
 /// S of motor.hpp, and the second moment of mass of a disc about z with that inertia.
 double rotor_spin(const Motor& m) { return m.rotor_spin_sense * m.gear_ratio * m.rotor_inertia_kg_m2; }
 Sym3<double> disc(double inertia) { return {inertia / 2, inertia / 2, 0, 0, 0, 0}; }
 
 double wing_mass(const Side& s) { return s.leading_edge.mass_kg + s.wing.mass_kg; }
 
-SideParameters<double> derive_side(const Side& s, double air_density, double step_s) {
-  SideParameters<double> p;
-  p.shoulder_m = vec(s.shoulder_m);
-  p.edge_moment_kg_m = first_moment(s.leading_edge);
-  p.edge_second_kg_m2 = second_moment(s.leading_edge) + disc(rotor_spin(s.motor));
-  p.wing_moment_kg_m = first_moment(s.wing);
-  p.wing_second_kg_m2 = second_moment(s.wing);
-
-  const Planform& w = s.planform;
+void put_planform(const Planform& w, double air_density, SideParameters<double>& p) {
   const double R = w.wing_length_m, c = w.mean_chord_m;
   const double pressure = 0.5 * air_density;
   p.force2 = pressure * c * R * R * R * w.r22;
@@ -51,6 +46,16 @@ SideParameters<double> derive_side(const Side& s, double air_density, double ste
   p.moment0 = pressure * c * c * R * w.z_cp0;
   p.rotational_damping_Nm_s2 = 0.125 * air_density * w.rotational_damping_coefficient * R * c * c * c * c * w.z_rd;
   p.span_to_pressure_m = R * w.r33 / w.r22;
+}
+
+SideParameters<double> derive_side(const Side& s, double air_density, double step_s) {
+  SideParameters<double> p;
+  p.shoulder_m = vec(s.shoulder_m);
+  p.edge_moment_kg_m = first_moment(s.leading_edge);
+  p.edge_second_kg_m2 = second_moment(s.leading_edge) + disc(rotor_spin(s.motor));
+  p.wing_moment_kg_m = first_moment(s.wing);
+  p.wing_second_kg_m2 = second_moment(s.wing);
+  put_planform(s.planform, air_density, p);
 
   const Motor& m = s.motor;
   const double N = m.gear_ratio, K = m.torque_constant_Nm_A;
@@ -124,6 +129,12 @@ SideFigures<double> side_figures(const Side& s, double air_density) {
 
 }  // namespace
 
+SideParameters<double> derive_planform(const Planform& planform, double air_density) {
+  SideParameters<double> p{};
+  put_planform(planform, air_density, p);
+  return p;
+}
+
 Vehicle built(Vehicle v) {
   const auto given = v.effects;
   for (const EffectEntry& e : catalogue_of(v)) {
@@ -136,12 +147,10 @@ Vehicle built(Vehicle v) {
 }
 
 Sides<SideFigures<double>> effect_figures(const Vehicle& vehicle) {
-  if (vehicle.beat_averaged) return {};
+  if (vehicle.beat_averaged || vehicle.jointed) return {};
   const Vehicle v = built(vehicle);
   return {side_figures(v.left, v.air_density_kg_m3), side_figures(v.right, v.air_density_kg_m3)};
 }
-
-double beats_Hz(const Vehicle& v) { return v.beat_averaged ? v.beat_averaged->nominal_Hz : v.driver.flapping_Hz; }
 
 double total_mass_kg(const Vehicle& vehicle) {
   const Vehicle v = built(vehicle);
@@ -151,21 +160,31 @@ double total_mass_kg(const Vehicle& vehicle) {
 Parameters<double> derive(const Vehicle& vehicle, double step_s) {
   const Vehicle v = built(vehicle);
   Parameters<double> p{};
-  if (!v.beat_averaged) {
+  if (v.jointed) {  // what moves the bodies stands in JointedParameters
+    if (v.jointed->left.strips.empty()) p.left = derive_planform(v.left.planform, v.air_density_kg_m3);
+    if (v.jointed->right.strips.empty()) p.right = derive_planform(v.right.planform, v.air_density_kg_m3);
+  } else if (!v.beat_averaged) {
     p.left = derive_side(v.left, v.air_density_kg_m3, step_s);
     p.right = derive_side(v.right, v.air_density_kg_m3, step_s);
   }
   p.inverse_mass_1_kg = 1 / (v.torso.mass_kg + wing_mass(v.left) + wing_mass(v.right));
-  p.fixed_moment_kg_m =
-      first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
-  p.fixed_second_kg_m2 = second_moment(v.torso) + disc(-rotor_spin(v.left.motor) - rotor_spin(v.right.motor)) +
-                         (outer(wing_mass(v.left), p.left.shoulder_m) + outer(wing_mass(v.right), p.right.shoulder_m));
+  if (!v.jointed) {  // so that the velocity of its state is that of its origin
+    p.fixed_moment_kg_m =
+        first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
+    p.fixed_second_kg_m2 =
+        second_moment(v.torso) + disc(-rotor_spin(v.left.motor) - rotor_spin(v.right.motor)) +
+        (outer(wing_mass(v.left), p.left.shoulder_m) + outer(wing_mass(v.right), p.right.shoulder_m));
+  }
   p.air_density_kg_m3 = v.air_density_kg_m3;
   p.below_m = v.extent.below_m;
   p.above_m = v.extent.above_m;
   p.around_m = v.extent.around_m;
   p.beat_steps = 2 / (beats_Hz(v) * step_s);
   return p;
+}
+
+double beats_Hz(const Vehicle& v) {
+  return v.beat_averaged ? v.beat_averaged->nominal_Hz : v.jointed ? v.jointed->frequency_Hz : v.driver.flapping_Hz;
 }
 
 }  // namespace flappy::model

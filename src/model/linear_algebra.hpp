@@ -142,6 +142,15 @@ FLAPPY_INLINE Sym3<T> rotate_y(const T& s, const T& c, const Sym3<T>& p) {
   return {mean + d, p.yy, mean - d, c * p.xy + s * p.yz, c * p.yz - s * p.xy, p.xz * c2 - half * s2};
 }
 
+/// R P R^T for a rotation about x.
+template <class T>
+FLAPPY_INLINE Sym3<T> rotate_x(const T& s, const T& c, const Sym3<T>& p) {
+  const T twice = s + s, s2 = twice * c, c2 = T(1) - twice * s;
+  const T mean = T(0.5) * T(p.yy + p.zz), half = T(0.5) * T(p.yy - p.zz);
+  const T d = half * c2 - p.yz * s2;
+  return {p.xx, mean + d, mean - d, c * p.xy - s * p.xz, half * s2 + p.yz * c2, s * p.xy + c * p.xz};
+}
+
 /// Unit quaternion, body to world.
 template <class T>
 struct Quaternion {

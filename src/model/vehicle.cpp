@@ -1,8 +1,11 @@
 #include "flappy/vehicle.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
 
 #include "model/effects/registry.hpp"
+#include "model/jointed.hpp"
 #include "model/math.hpp"
 
 namespace flappy::model {
@@ -27,9 +30,9 @@ class Lister {
     add(path + ".mass_kg", b.mass_kg, 1e-9, 10);
     add(path + ".com_m", b.com_m);
     InertiaTensor& i = b.inertia_kg_m2;
-    add(path + ".inertia_kg_m2.xx", i.xx, 1e-15, 1);
-    add(path + ".inertia_kg_m2.yy", i.yy, 1e-15, 1);
-    add(path + ".inertia_kg_m2.zz", i.zz, 1e-15, 1);
+    add(path + ".inertia_kg_m2.xx", i.xx, 1e-18, 1);
+    add(path + ".inertia_kg_m2.yy", i.yy, 1e-18, 1);
+    add(path + ".inertia_kg_m2.zz", i.zz, 1e-18, 1);
     add(path + ".inertia_kg_m2.xy", i.xy, -1, 1);
     add(path + ".inertia_kg_m2.yz", i.yz, -1, 1);
     add(path + ".inertia_kg_m2.xz", i.xz, -1, 1);
@@ -87,6 +90,40 @@ class Lister {
     }
     for (BeatAveraged::Coefficient& c : b.coefficients) add("coefficients." + c.name, c.value, -kAny, kAny);
   }
+  void add_optional(const std::string& path, double& value, double low, double high) {
+    list_.push_back({path, &value, low, high, true});
+  }
+  void add(Jointed& j) {
+    add("gait.frequency_Hz", j.frequency_Hz, 0.1, 2000);
+    add_optional("gait.muscle_mass_kg", j.muscle_mass_kg, 0, 10);
+    for (Jointed::Input& i : j.inputs) add("input." + i.name + ".lag_s", i.lag_s, 1e-5, 1);
+  }
+  void add(const std::string& path, Side& s, Jointed::Wing& w) {
+    add(path + ".shoulder_m", s.shoulder_m);
+    const std::size_t edge = list_.size();
+    add(path + ".leading_edge", s.leading_edge);
+    for (std::size_t k = edge; k < list_.size(); ++k) list_[k].optional = true;  // none, or all that it needs
+    add(path + ".wing", s.wing);
+    for (std::size_t k = 0; k < kAngles.size(); ++k) add(path + "." + kAngles[k], w.angles[k]);
+    if (w.strips.empty()) add(path + ".planform", s.planform);
+  }
+  void add(const std::string& path, Jointed::Angle& a) {
+    using Mode = Jointed::Mode;
+    if (a.mode == Mode::fixed) return add(path + ".angle_rad", a.mean_rad, -kLargestAngle_rad, kLargestAngle_rad);
+    const bool free = a.mode == Mode::free;
+    const auto put = [&](const char* key, double& value, double low, double high) {
+      list_.push_back({path + "." + key, &value, low, high, !free});
+    };
+    if (!free) add(path + ".mean_rad", a.mean_rad, -kLargestAngle_rad, kLargestAngle_rad);
+    put("stiffness_Nm_rad", a.stiffness_Nm_rad, 0, 100);
+    put("rest_rad", a.rest_rad, -kLargestAngle_rad, kLargestAngle_rad);
+    put("damping_Nm_s", a.damping_Nm_s, 0, 1);
+    if (!free) return;
+    add_optional(path + ".lower_rad", a.lower_rad, -kLargestAngle_rad, 0);
+    add_optional(path + ".upper_rad", a.upper_rad, 0, kLargestAngle_rad);
+    add_optional(path + ".stop_stiffness_Nm_rad", a.stop_stiffness_Nm_rad, 0, 1e4);
+    add_optional(path + ".stop_damping_Nm_s", a.stop_damping_Nm_s, 0, 10);
+  }
   void add(const std::string& path, Side& s) {
     add(path + ".shoulder_m", s.shoulder_m);
     add(path + ".leading_edge", s.leading_edge);
@@ -108,6 +145,14 @@ bool possible(const InertiaTensor& i) {
   m << i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz;
   const Eigen::Vector3d e = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
   return e[0] > 0 && e[0] + e[1] >= e[2];
+}
+
+/// A body that a file leaves out.
+bool absent(const RigidBody& b) {
+  const InertiaTensor& i = b.inertia_kg_m2;
+  const Triple& c = b.com_m;
+  return std::ranges::all_of(std::array{b.mass_kg, c.x, c.y, c.z, i.xx, i.yy, i.zz, i.xy, i.yz, i.xz},
+                             [](double x) { return x == 0; });
 }
 
 }  // namespace
@@ -135,6 +180,15 @@ std::vector<Parameter> parameters(Vehicle& v) {
     add_effects();
     return list;
   }
+  if (v.jointed) {
+    add_extent();
+    l.add("torso", v.torso);
+    l.add(*v.jointed);
+    l.add("left", v.left, v.jointed->left);
+    l.add("right", v.right, v.jointed->right);
+    add_effects();
+    return list;
+  }
   l.add("driver.flapping_Hz", v.driver.flapping_Hz, 0.1, 1000);
   l.add("driver.hold_s", v.driver.hold_s, 1e-6, 1);
   l.add("driver.amplitude_limit_V", v.driver.amplitude_limit_V, 0, 1e3);
@@ -157,7 +211,7 @@ std::optional<PhysicalFault> physical_fault(const Vehicle& v) {
                                                              {"right.leading_edge", &v.right.leading_edge},
                                                              {"right.wing", &v.right.wing}};
   for (const auto& [path, body] : bodies)
-    if ((body == &v.torso || !v.beat_averaged) && !possible(body->inertia_kg_m2))
+    if ((body == &v.torso || !v.beat_averaged) && !(v.jointed && absent(*body)) && !possible(body->inertia_kg_m2))
       return PhysicalFault{std::string(path) + ".inertia_kg_m2", "no rigid body has this inertia",
                            "positive principal moments, none above the sum of the other two"};
   return std::nullopt;

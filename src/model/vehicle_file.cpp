@@ -8,6 +8,7 @@
 #include "model/beat_averaged.hpp"
 #include "model/contact.hpp"
 #include "model/effects/registry.hpp"
+#include "model/jointed.hpp"
 #include "model/posterior.hpp"
 
 namespace flappy::model {
@@ -23,6 +24,8 @@ std::string known_effects(const std::string& wrong, const Vehicle& vehicle) {
 void read_effects(const io::Table& table, Vehicle& vehicle) {
   for (const std::string& id : table.keys()) {
     const EffectEntry* effect = find_effect(vehicle, id);
+    if (effect == nullptr && vehicle.jointed && is_effect(id))
+      table.fail(id, "acts on wings and motors of another kind of vehicle", "effects of sensors");
     if (effect == nullptr) table.fail(id, "unknown effect", known_effects(id, vehicle));
     if (effect->mean.drive != nullptr && vehicle.beat_averaged->predicted)
       table.fail(id, "acts between inputs and wings, which predicted forces have in them",
@@ -51,7 +54,8 @@ void read_contact(const io::Table& table, Vehicle& vehicle) {
                "1 to " + std::to_string(kMostContactPoints) + " tables [contact.NAME]");
 }
 
-const std::string kMultibody = "multibody", kBeatAveraged = "beat_averaged", kPredicted = "predicted";
+const std::string kMultibody = "multibody", kBeatAveraged = "beat_averaged", kPredicted = "predicted",
+                  kJointed = "jointed";
 
 }  // namespace
 
@@ -60,24 +64,30 @@ Vehicle read_any_vehicle(const std::filesystem::path& path, const std::vector<st
   root.schema(1);
   Vehicle vehicle;
   std::vector<std::string> keys = {"schema", "name", "model", "effects", "posterior", "contact"};
-  const std::string model = root.choice_or("model", kMultibody, {kMultibody, kBeatAveraged, kPredicted});
-  if (model != kMultibody) {
+  const std::string model = root.choice_or("model", kMultibody, {kMultibody, kBeatAveraged, kPredicted, kJointed});
+  if (model == kJointed) {
+    vehicle.jointed = read_jointed(root);
+    for (const char* key : {"gait", "input", "symmetric", "left", "right"}) keys.emplace_back(key);
+  } else if (model != kMultibody) {
     vehicle.beat_averaged = read_beat_averaged(root, model == kPredicted);
     for (const char* key : {"beat", "input", "actuator", "coefficients"}) keys.emplace_back(key);
     if (model == kBeatAveraged) keys.emplace_back("wrench");
   }
   if (const auto table = root.optional_table("contact")) {
-    if (vehicle.beat_averaged)
-      root.fail("contact", "is given, but a robot that is known by the beat has no points that touch",
-                "a vehicle of wings and motors");
+    if (vehicle.beat_averaged || vehicle.jointed)
+      root.fail("contact", "is given, but only a vehicle of wings and motors has points that touch",
+                "no such table, or model = " + io::toml_string(kMultibody));
     read_contact(*table, vehicle);
   }
   for (const Parameter& p : parameters(vehicle)) keys.push_back(p.path.substr(0, p.path.find('.')));
   root.accept(keys);
   vehicle.name = root.string("name");
+  const bool mirrored = vehicle.jointed && is_symmetric(root);
   for (const Parameter& p : parameters(vehicle))
-    if (!p.path.starts_with("coefficients."))
+    if (!p.path.starts_with("coefficients.") && !(mirrored && p.path.starts_with("right.")))
       *p.value = p.optional ? root.number_or(p.path, 0, {p.low, p.high}) : root.number(p.path, {p.low, p.high});
+  if (mirrored) mirror_left(vehicle);
+  if (vehicle.jointed) check_gait(root, *vehicle.jointed);
   if (const auto table = root.optional_table("effects")) read_effects(*table, vehicle);
   if (const auto table = root.optional_table("posterior")) vehicle.posterior = read_posterior(*table, vehicle);
   root.finish();
@@ -92,7 +102,7 @@ Vehicle read_flyable_vehicle(const std::filesystem::path& path, const std::vecto
     io::Config::load(path, overrides)
         .root()
         .fail("model", "a vehicle whose forces stand in files of recorded flights cannot be flown",
-              "\"multibody\" or \"beat_averaged\"; flappy-gap diagnose takes all three");
+              "\"multibody\", \"beat_averaged\" or \"jointed\"; flappy-gap diagnose takes it");
   return vehicle;
 }
 
@@ -102,6 +112,9 @@ Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::s
     io::Config::load(path).root().fail(
         "model", "a robot that is known by the beat has no wings",
         "a vehicle of wings and motors; flappy-fly, flappy-train and flappy-gap diagnose take both");
+  if (vehicle.jointed)
+    io::Config::load(path).root().fail("model", "wings whose angles are driven have no motors",
+                                       "a vehicle of wings and motors; flappy-fly and flappy-train take both");
   return vehicle;
 }
 
@@ -121,6 +134,7 @@ std::string vehicle_text(const Vehicle& vehicle) {
             beat_averaged_text(*vehicle.beat_averaged);
   for (const ContactPoint& p : vehicle.contact)
     text += "contact." + p.name + ".on = " + io::toml_string(kBodies[static_cast<std::size_t>(p.on)]) + "\n";
+  if (vehicle.jointed) text += "model = " + io::toml_string(kJointed) + "\n" + jointed_text(*vehicle.jointed);
   Vehicle copy = vehicle;
   for (const Parameter& p : parameters(copy))
     if ((!p.optional || *p.value != 0) && !p.path.starts_with("coefficients."))

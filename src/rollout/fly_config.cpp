@@ -140,6 +140,7 @@ class Reader {
     if (c_.fleet.task.sets_voltages()) refuse_inputs();
     if (c_.vehicle.beat_averaged) refuse_wings();
     if (!c_.vehicle.contact.empty() && !c_.fleet.task.says_contact) c_.fleet.task.constants.contact_ends = 0;
+    if (c_.vehicle.jointed) refuse_motors();
     if (c_.welded && c_.fleet.task.start.settled)
       root_.fail("flight.support",
                  "is \"welded\", but task " + io::toml_string(c_.fleet.task.name) + " starts from hover", "\"task\"");
@@ -235,12 +236,23 @@ class Reader {
     c_.fleet.task.input_unit = "1";
   }
 
+  /// Wings whose angles are driven have no motors.
+  void refuse_motors() {
+    const std::string but = ", but the wings of vehicle " + io::toml_string(c_.vehicle.name) + " have no motors";
+    if (c_.fleet.task.sets_voltages())
+      root_.fail("task", io::toml_string(c_.fleet.task.name) + " sets voltages of motors" + but,
+                 "a task whose actions are of the wing beat");
+    if (root_.has("log.power"))
+      root_.fail("log.power", "is asked for" + but, "no such log; joints.csv has their muscles'");
+    c_.fleet.task.input_unit = "1";
+  }
+
   void check_times() const {
     const flight::FleetOptions& o = c_.fleet;
     const double step = o.batch.step_s;
     if (!whole(1 / (o.control_hz * step)))
       root_.fail("flight.control_hz", "its period is no whole number of steps", "1 / (n step_s)");
-    if (!c_.vehicle.beat_averaged && !whole(c_.vehicle.driver.hold_s / step))
+    if (!c_.vehicle.beat_averaged && !c_.vehicle.jointed && !whole(c_.vehicle.driver.hold_s / step))
       root_.fail("flight.step_s",
                  "does not divide the driver's hold of " + io::shortest_digits(c_.vehicle.driver.hold_s) + " s",
                  "hold_s / n");

@@ -5,7 +5,9 @@
 #include <numbers>
 #include <utility>
 
+#include "io/csv.hpp"
 #include "model/derive.hpp"
+#include "model/jointed.hpp"
 #include "model/math.hpp"
 #include "model/wing_beat.hpp"
 #include "sim/lanes.hpp"
@@ -34,6 +36,19 @@ void add_solid(const sim::Shape& s, flightlog::LogAmbient& ambient) {
 double tidy(double t_s) { return std::round(t_s * 1e9) / 1e9; }
 
 /// What every truth has, and what holds the flapper: 0 nothing, 1 the ground, 2 it is welded.
+/// Of a vehicle with four angles a wing: what its joints do, the power of the muscles of each side, their work since the start, all of it while a
+/// side's power is positive, and less what they take back.
+const std::vector<std::string> kJointNames = [] {
+  std::vector<std::string> names = {"t_s"};
+  for (const std::string side : {"left_", "right_"}) {
+    for (const char* angle : model::kAngles)
+      for (const char* what : {"_rad", "_rate_rad_s", "_torque_Nm"}) names.push_back(side + angle + what);
+    names.push_back(side + "power_W");
+  }
+  names.insert(names.end(), {"positive_work_J", "work_J"});
+  return names;
+}();
+
 const std::vector<std::string> kTruthNames = [] {
   std::vector<std::string> names = flightlog::kMotionNames;
   names.emplace_back("support");
@@ -125,6 +140,7 @@ struct Recorder<T>::Storage {
   sim::RandomKey key;
   flightlog::FlightLog log;
   std::vector<flightlog::Column> truth = std::vector<flightlog::Column>(kTruthNames.size());
+  std::vector<flightlog::Column> joints;  // of driven angles
   TickSampler power{0}, wings{0};
   // at the last control tick
   sim::FlapperState state;
@@ -154,12 +170,13 @@ struct Recorder<T>::Storage {
     h.imu = imu_header(o.sensors.imu);
     h.power = config.log.power;
     h.wings = config.log.wings;
-    if (vehicle.beat_averaged) {
-      for (const model::BeatAveraged::Input& input : vehicle.beat_averaged->inputs) h.inputs.push_back(input.name);
+    if (vehicle.beat_averaged || vehicle.jointed) {
+      for (const model::BeatAveraged::Input& input : model::mixed_inputs(vehicle)) h.inputs.push_back(input.name);
       log.command.declared.resize(h.inputs.size());
     } else if (!o.task.sets_voltages()) {
       log.command.inputs.emplace(), log.command.phase_rad.emplace();
     }
+    if (vehicle.jointed) joints.resize(kJointNames.size());
     if (h.power) log.power.emplace(), power = TickSampler(h.power->rate_hz);
     if (h.wings) log.wings.emplace(), wings = TickSampler(h.wings->rate_hz);
     if (h.power) {  // a meter needs the rows of effects, whatever is in force
@@ -220,6 +237,24 @@ struct Recorder<T>::Storage {
                           bias[2],
                           static_cast<double>(fleet.batch().support(flapper))};
     for (std::size_t k = 0; k < truth.size(); ++k) truth[k].push_back(row[k]);
+    if (!joints.empty()) add_joints(t_s);
+  }
+
+  void add_joints(double t_s) {
+    const sim::WingJoints q = fleet.batch().joints(flapper);
+    std::size_t k = 0;
+    const auto put = [&](double x) { joints[k++].push_back(x); };
+    put(t_s);
+    for (int side = 0; side < 2; ++side) {
+      double power_W = 0;
+      for (int j = 0; j < 4; ++j) {
+        put(q.angle_rad[side][j]), put(q.rate_rad_s[side][j]), put(q.torque_Nm[side][j]);
+        power_W += q.driven[side][j] ? q.torque_Nm[side][j] * q.rate_rad_s[side][j] : 0;
+      }
+      put(power_W);
+    }
+    put(fleet.batch().energy_J(flapper));
+    put(q.work_J);
   }
 
   void add_command(const DriverUpdate& u) {
@@ -237,7 +272,7 @@ struct Recorder<T>::Storage {
     c.phase_rad->push_back(2 * kPi * 0x1p-32 * u.phase);
   }
 
-  /// Of a robot that is known by the beat.
+  /// Of a vehicle without motors.
   void add_inputs(std::int64_t step) {
     const std::vector<double> inputs = sim::storage_of(fleet.batch()).inputs_of(flapper);
     log.command.t_s.push_back(time_s(step));
@@ -381,15 +416,23 @@ bool Recorder<T>::write(const std::filesystem::path& folder) const {
   if (!storage_->complete()) return false;
   write_flight_log(folder, storage_->log);
   flightlog::write_truth(folder, kTruthNames, storage_->truth);
+  if (!storage_->joints.empty()) {
+    io::CsvWriter csv(folder / flightlog::log_file::kJoints, kJointNames);
+    std::vector<double> row(kJointNames.size());
+    for (std::size_t i = 0; i < storage_->joints[0].size(); ++i) {
+      for (std::size_t k = 0; k < row.size(); ++k) row[k] = storage_->joints[k][i];
+      csv.row(row);
+    }
+    csv.close();
+  }
   return true;
 }
 
 template <class T>
 double Recorder<T>::bytes_per_s(const FlyConfig& c) {
   const flight::FleetOptions& o = c.fleet;
-  const double commands = c.vehicle.beat_averaged
-                              ? static_cast<double>(1 + c.vehicle.beat_averaged->inputs.size()) * o.control_hz
-                              : 8 / c.vehicle.driver.hold_s;
+  const std::size_t inputs = model::mixed_inputs(c.vehicle).size();
+  const double commands = inputs > 0 ? static_cast<double>(1 + inputs) * o.control_hz : 8 / c.vehicle.driver.hold_s;
   const double numbers = commands + 7 * o.sensors.imu.rate_hz + 8 * o.sensors.mocap.rate_hz +
                          static_cast<double>(kTruthNames.size() + 9) * o.control_hz;
   return 2 * sizeof(double) * numbers;  // vectors grow by doubling

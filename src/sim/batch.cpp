@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <stdexcept>
 
@@ -33,7 +34,7 @@ Vec3<double> com_minus_origin_velocity(const Parameters<double>& p, const State<
 template <class T>
 std::vector<T> motor_rows(const model::Vehicle& v) {
   std::vector<T> rows;
-  if (v.beat_averaged) return rows;
+  if (v.beat_averaged || v.jointed) return rows;
   for (const model::Motor& m : {v.left.motor, v.right.motor}) {
     rows.push_back(static_cast<T>(1 / m.resistance_ohm));
     rows.push_back(static_cast<T>(m.gear_ratio * m.torque_constant_Nm_A / m.resistance_ohm));
@@ -72,6 +73,7 @@ void Batch<T>::Storage::put_motors(std::size_t i, const std::vector<T>& rows) {
 template <class T>
 void Batch<T>::Storage::clear_energy(std::size_t i) {
   if (!motors.empty()) motors[i / kLanes<T>].energy_J[i % kLanes<T>] = 0;
+  if (jointed) jointed->work_of(i)[0] = jointed->work_of(i)[kLanes<T>] = 0;
 }
 
 template <class T>
@@ -108,6 +110,7 @@ void Batch<T>::Storage::put_contact(std::size_t i, const std::vector<T>& rows, c
 }
 
 /// Of a robot that is known by the beat: its own rows have the others.
+/// Of a robot that is known by the beat, whose own rows have the others, or that has four angles a wing and no others.
 template <class T>
 void Batch<T>::Storage::put_effects_of_sensors(std::size_t i, const model::Vehicle& v) {
   model::Vehicle seen;
@@ -121,7 +124,7 @@ void Batch<T>::Storage::put_effects_of_sensors(std::size_t i, const model::Vehic
 /// A lane without an effect that its block has gets the sizes at which the effect vanishes.
 template <class T>
 void Batch<T>::Storage::put_effects(std::size_t i, const model::Vehicle& v) {
-  if (v.beat_averaged) return put_effects_of_sensors(i, v);
+  if (v.beat_averaged || v.jointed) return put_effects_of_sensors(i, v);
   if (v.effects.empty() && lane_effects.empty()) return;
   std::uint64_t named = 0;
   for (const auto& [id, values] : v.effects) {
@@ -224,8 +227,9 @@ template <class T>
 Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOptions& options)
     : storage_(std::make_unique<Storage>()) {
   Storage& s = *storage_;
-  // inputs of a robot that is known by the beat are held for as long as its controller says
-  const double steps = vehicle.beat_averaged ? 1 : vehicle.driver.hold_s / options.step_s;
+  // inputs of a vehicle without motors are held for as long as its controller says
+  const bool undriven = vehicle.beat_averaged || vehicle.jointed;
+  const double steps = undriven ? 1 : vehicle.driver.hold_s / options.step_s;
   if (!(options.step_s > 0) || std::llround(steps) < 1 || std::abs(steps - std::round(steps)) > 1e-6)
     throw std::invalid_argument("the driver's hold (" + std::to_string(vehicle.driver.hold_s) +
                                 " s) is no whole number of physics steps");
@@ -235,8 +239,9 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
   s.steps_per_update = static_cast<int>(std::llround(steps));
   s.world = options.world;
   s.hold_s = vehicle.driver.hold_s;
-  s.kernel =
-      vehicle.beat_averaged ? mean_step_kernel<T>(options.instruction_set) : step_kernel<T>(options.instruction_set);
+  s.kernel = vehicle.beat_averaged ? mean_step_kernel<T>(options.instruction_set)
+             : vehicle.jointed     ? jointed_step_kernel<T>(options.instruction_set)
+                                   : step_kernel<T>(options.instruction_set);
   s.blocks.resize((count + kLanes<T> - 1) / kLanes<T>);
   // lanes beyond the last flapper fly along as copies, so that no lane ever holds numbers of no vehicle
   Block<T> block{};
@@ -248,7 +253,8 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
   }
   for (Block<T>& b : s.blocks) b = block;
   for (std::size_t i = 0; vehicle.beat_averaged && i < s.blocks.size() * kLanes<T>; ++i) s.put_mean(i, vehicle);
-  if (options.meters_energy && !vehicle.beat_averaged) s.motors.resize(s.blocks.size());
+  for (std::size_t i = 0; vehicle.jointed && i < s.blocks.size() * kLanes<T>; ++i) s.put_jointed(i, vehicle);
+  if (options.meters_energy && !undriven) s.motors.resize(s.blocks.size());
   for (std::size_t i = 0; i < count; ++i) s.put_motors(i, motor_rows<T>(vehicle));
   for (std::size_t i = 0; i < count && !vehicle.effects.empty(); ++i) s.put_effects(i, vehicle);
   if (vehicle.contact.empty()) return;
@@ -276,11 +282,13 @@ template <class T>
 void Batch<T>::set_vehicle(std::size_t i, const model::Vehicle& vehicle) {
   if (vehicle.driver.hold_s != storage_->hold_s)
     throw std::invalid_argument("all flappers of a batch share the driver's hold");
-  if (vehicle.beat_averaged.has_value() != (storage_->mean != nullptr))
-    throw std::invalid_argument("all flappers of a batch have wings, or all are known by the beat");
+  if (vehicle.beat_averaged.has_value() != (storage_->mean != nullptr) ||
+      vehicle.jointed.has_value() != (storage_->jointed != nullptr))
+    throw std::invalid_argument("all flappers of a batch are of one kind");
   const auto [block, lane] = storage_->at(i);
   storage_->put_vehicle(block, lane, vehicle);
   if (storage_->mean) storage_->put_mean(i, vehicle);
+  if (storage_->jointed) storage_->put_jointed(i, vehicle);
   storage_->put_effects(i, vehicle);
   storage_->put_contact(i, vehicle);
   storage_->put_motors(i, motor_rows<T>(vehicle));
@@ -327,6 +335,7 @@ void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   storage_->for_states(i, ~std::uint64_t{0}, [](T& number) { number = 0; });
   storage_->for_contact_memory(i, [](T& number) { number = 0; });
   if (storage_->mean) *storage_->mean->memory_of(i) = 0;
+  if (storage_->jointed) *storage_->jointed->memory_of(i) = 0;
 }
 
 template <class T>
@@ -397,8 +406,31 @@ HeldImpulse Batch<T>::held_impulse(std::size_t i) const {
 template <class T>
 double Batch<T>::energy_J(std::size_t i) const {
   const int lane = storage_->at(i).lane;
+  if (storage_->jointed) return storage_->jointed->work_of(i)[0];
   if (storage_->motors.empty()) throw std::logic_error("a batch without BatchOptions::meters_energy has no energy");
   return storage_->motors[i / kLanes<T>].energy_J[lane];
+}
+
+template <class T>
+WingJoints Batch<T>::joints(std::size_t i) const {
+  storage_->at(i);
+  if (!storage_->jointed) throw std::logic_error("a batch of vehicles without driven angles has no torques of theirs");
+  WingJoints all{};
+  const T* number = storage_->jointed->memory_of(i);
+  const auto next = [&](std::size_t first, double(&to)[2][4]) {
+    const T* from = number + first * kLanes<T>;
+    for (auto& side : to)
+      for (double& joint : side) joint = *from, from += kLanes<T>;
+  };
+  next(offsetof(JointedMemory<T>, angle_rad) / sizeof(T), all.angle_rad);
+  next(offsetof(JointedMemory<T>, rate_rad_s) / sizeof(T), all.rate_rad_s);
+  next(offsetof(JointedMemory<T>, torque_Nm) / sizeof(T), all.torque_Nm);
+  for (int side = 0; side < kSides; ++side)
+    for (int j = 0; j < kJoints; ++j)
+      all.driven[side][j] = storage_->jointed->program.shape.modes[side][j] != model::Jointed::Mode::free;
+  const double* work = storage_->jointed->work_of(i);
+  all.work_J = work[kLanes<T>];
+  return all;
 }
 
 template <class T>
@@ -434,6 +466,8 @@ std::uint64_t Batch<T>::hash(std::size_t first, std::size_t last) const {
                          [&](T number) { h = mixed(h, bits_of(number)); });
     storage_->for_contact_memory(i, [&](T number) { h = mixed(h, bits_of(number)); });
     if (storage_->mean) storage_->mean->for_memory(i, [&](T number) { h = mixed(h, bits_of(number)); });
+    for (std::size_t k = 0; storage_->jointed && k < JointedVehicles<T>::kMemoryRows; ++k)
+      h = mixed(h, bits_of(storage_->jointed->memory_of(i)[k * kLanes<T>]));
     all = mixed(all, h);
   }
   return all;

@@ -11,6 +11,8 @@ FLAPPY_KERNELS(Kernel<float>, kernel_float);
 FLAPPY_KERNELS(Kernel<double>, kernel_double);
 FLAPPY_KERNELS(Kernel<float>, mean_float);
 FLAPPY_KERNELS(Kernel<double>, mean_double);
+FLAPPY_KERNELS(Kernel<float>, jointed_float);
+FLAPPY_KERNELS(Kernel<double>, jointed_double);
 
 std::vector<std::string> instruction_sets() {
 #if defined(__aarch64__)
@@ -53,5 +55,12 @@ StepBlock<T> mean_step_kernel(std::string_view instruction_set) {
 }
 template StepBlock<float> mean_step_kernel<float>(std::string_view);
 template StepBlock<double> mean_step_kernel<double>(std::string_view);
+
+template <class T>
+StepBlock<T> jointed_step_kernel(std::string_view instruction_set) {
+  return kernel_of<T>(jointed_floats, jointed_doubles, instruction_set).step;
+}
+template StepBlock<float> jointed_step_kernel<float>(std::string_view);
+template StepBlock<double> jointed_step_kernel<double>(std::string_view);
 
 }  // namespace flappy::sim

@@ -47,10 +47,12 @@ const auto& kernel_of(const Single* const (&singles)[sets], const Double* const 
   else return *doubles[place_of(instruction_set)];
 }
 
-/// The simulator's step, and that of robots that are known by the beat.
+/// The simulator's step, that of robots that are known by the beat, and that of vehicles with four angles a wing.
 template <class T>
 StepBlock<T> step_kernel(std::string_view instruction_set);
 template <class T>
 StepBlock<T> mean_step_kernel(std::string_view instruction_set);
+template <class T>
+StepBlock<T> jointed_step_kernel(std::string_view instruction_set);
 
 }  // namespace flappy::sim

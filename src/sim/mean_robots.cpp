@@ -104,13 +104,17 @@ std::vector<double> Batch<T>::Storage::inputs_of(std::size_t i) {
   const model::WingBeat<double> u = get<Drive<double>>(block.drive, lane).input;
   const double four[] = {u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle};
   std::vector<double> list;
-  const T* row = mean->row_of(i);
+  const auto stride = static_cast<std::size_t>(jointed ? model::kRows<JointedInput> : model::kRows<MeanInput>);
+  const std::size_t inputs = jointed ? static_cast<std::size_t>(jointed->program.shape.inputs) : mean->program.inputs;
+  const T* const first = jointed ? jointed->row_of(i) + jointed->program.shape.input_row * kLanes<T> : mean->row_of(i);
+  const T* row = first;
   const auto next = [&] {
     const T number = *row;
     row += kLanes<T>;
     return static_cast<double>(number);
   };
-  for (std::size_t k = 0; k < mean->program.inputs; ++k) {
+  for (std::size_t k = 0; k < inputs; ++k) {
+    row = first + k * stride * kLanes<T>;
     const double low = next(), high = next();
     double sum = next();
     for (const double says : four) sum += next() * says;

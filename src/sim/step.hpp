@@ -8,6 +8,10 @@
 
 namespace flappy::sim {
 
+/// Of vehicles with four angles a wing (jointed_block.hpp).
+template <class T>
+struct JointedRows;
+
 /// How a batch advances; the same for all of its blocks.
 struct StepPlan {
   double step_s;
@@ -53,6 +57,8 @@ struct BlockEffects {
   ContactBlock<T> contact;
   /// Of robots that are known by the beat.
   MeanRows<T> mean;
+  /// Of vehicles with four angles a wing.
+  const JointedRows<T>* jointed = nullptr;
 };
 
 /// Rows of a meter: the source's voltage as a share of its nominal one, currents of the left and of the right motor, A.

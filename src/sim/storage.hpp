@@ -7,6 +7,7 @@
 #include "flappy/batch.hpp"
 #include "model/contact.hpp"
 #include "model/effects/registry.hpp"
+#include "sim/jointed_block.hpp"
 #include "sim/step.hpp"
 
 namespace flappy::sim {
@@ -86,6 +87,31 @@ struct Mean {
   }
 };
 
+/// Rows of vehicles with four angles a wing.
+template <class T>
+struct JointedVehicles {
+  struct alignas(64) Row {
+    T lanes[kLanes<T>];
+  };
+  JointedProgram program;
+  std::vector<Row> rows, memory;  // [block][row]
+  std::vector<double> work_J;     // [block][positive, all][lane]
+
+  static constexpr std::size_t kMemoryRows = model::kRows<JointedMemory>;
+  std::size_t row_count() const { return static_cast<std::size_t>(program.shape.rows); }
+  /// Of one vehicle, a number each.
+  T* row_of(std::size_t i) { return rows[i / kLanes<T> * row_count()].lanes + i % kLanes<T>; }
+  T* memory_of(std::size_t i) { return memory[i / kLanes<T> * kMemoryRows].lanes + i % kLanes<T>; }
+  double* work_of(std::size_t i) { return &work_J[i / kLanes<T> * 2 * kLanes<T> + i % kLanes<T>]; }
+  std::vector<JointedRows<T>> blocks;
+
+  void point(std::size_t count) {
+    for (std::size_t b = 0; b < count; ++b)
+      blocks.push_back({&program.shape, program.modulations.data(), row_of(b * kLanes<T>), memory_of(b * kLanes<T>),
+                        work_of(b * kLanes<T>)});
+  }
+};
+
 template <class T>
 struct Batch<T>::Storage {
   std::size_t count = 0;
@@ -97,14 +123,15 @@ struct Batch<T>::Storage {
   std::int64_t steps = 0;
   StepBlock<T> kernel = nullptr;
   std::vector<Block<T>> blocks;
-  std::vector<std::uint64_t> lane_effects;   // set of each lane; empty while no flapper has an effect
-  std::vector<std::uint64_t> block_effects;  // their union
-  std::vector<T> effect_rows;                // [block][row][lane]
-  std::uint64_t effects_kept = 0;            // effects that some vehicle has named, whose memory is
-  std::vector<T> effect_states;              // [block][row][lane]
-  std::vector<MotorRows<T>> motors;          // of each block, where energy is metered
-  std::unique_ptr<Mean<T>> mean;             // where robots are known by the beat
-  std::vector<model::ContactPoint> points;   // of contact; their names and bodies are those of the whole batch
+  std::vector<std::uint64_t> lane_effects;      // set of each lane; empty while no flapper has an effect
+  std::vector<std::uint64_t> block_effects;     // their union
+  std::vector<T> effect_rows;                   // [block][row][lane]
+  std::uint64_t effects_kept = 0;               // effects that some vehicle has named, whose memory is
+  std::vector<T> effect_states;                 // [block][row][lane]
+  std::vector<MotorRows<T>> motors;             // of each block, where energy is metered
+  std::unique_ptr<Mean<T>> mean;                // where robots are known by the beat
+  std::unique_ptr<JointedVehicles<T>> jointed;  // where wings have four angles
+  std::vector<model::ContactPoint> points;      // of contact; their names and bodies are those of the whole batch
   std::vector<model::ContactPoint::Body> points_on;
   std::vector<T> contact_rows, contact_memory;  // [block][point][row][lane]
 
@@ -138,6 +165,7 @@ struct Batch<T>::Storage {
     if (!points.empty())
       all.contact = {static_cast<int>(points.size()), points_on.data(), row_of_contact(b * kLanes<T>),
                      memory_of_contact(b * kLanes<T>), kLanes<T>};
+    if (jointed) all.jointed = &jointed->blocks[b];
     return all;
   }
   static constexpr std::size_t kContactRows = model::kRows<model::ContactConstants>;
@@ -177,11 +205,15 @@ struct Batch<T>::Storage {
   /// std::invalid_argument where it shares not the batch's inputs, actuators and expressions.
   void put_mean(std::size_t i, const model::Vehicle& as_filed);
   void keep_inputs(std::size_t slots);
-  /// Inputs of a robot that is known by the beat, as its controller has set them.
+  /// Inputs of a vehicle without motors, as its controller has set them.
   std::vector<double> inputs_of(std::size_t i);
   /// Rows and memory of a robot that is known by the beat, to be put to one of any batch; none otherwise.
   std::pair<std::vector<T>, std::vector<T>> get_mean(std::size_t i) const;
   void put_mean(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
+  /// The same of a vehicle with four angles a wing; std::invalid_argument where it shares not the batch's modes and inputs.
+  void put_jointed(std::size_t i, const model::Vehicle& v);
+  std::pair<std::vector<T>, std::vector<T>> get_jointed(std::size_t i) const;
+  void put_jointed(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
   /// What a meter of flapper `i` needs to know of its motors, to be put to a flapper of any batch.
   std::vector<T> get_motors(std::size_t i) const;
   void put_motors(std::size_t i, const std::vector<T>& rows);

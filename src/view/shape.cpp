@@ -18,9 +18,11 @@ constexpr double kProfile_m[][2] = {{-0.04, 0},      {-0.03, 0.004},  {-0.016, 0
 /// To a micrometre, that pages stay small.
 double rounded(double x_m) { return std::round(x_m * 1e6) / 1e6; }
 
-Json wing_of(const model::Side& s) {
+/// `strips`: of a wing that is known by them.
+Json wing_of(const model::Side& s, const std::vector<model::Jointed::Strip>& strips) {
   Json outline = Json::array();
-  for (int k = 0; k <= kStations; ++k) {
+  for (const model::Jointed::Strip& strip : strips) outline.push_back({rounded(strip.span_m), rounded(strip.chord_m)});
+  for (int k = 0; k <= kStations && strips.empty(); ++k) {
     const double share = kRoot + (1 - kRoot) * k / kStations, beyond = std::max(0.0, (share - kTip) / (1 - kTip));
     const double chord_m = chord_at(s.planform, share) * s.planform.mean_chord_m * std::sqrt(1 - beyond * beyond);
     outline.push_back({rounded(share * s.planform.wing_length_m), rounded(chord_m)});
@@ -49,16 +51,19 @@ Json shape_of(const model::Vehicle& v) {
   if (v.beat_averaged) return {{"name", v.name}, {"mass_kg", v.torso.mass_kg}, {"body_m", ellipsoid_of(v.torso)}};
   double mass_kg = v.torso.mass_kg;
   for (const model::Side* s : {&v.left, &v.right}) mass_kg += s->leading_edge.mass_kg + s->wing.mass_kg;
+  const std::vector<model::Jointed::Strip> none, &left = v.jointed ? v.jointed->left.strips : none,
+                                                 &right = v.jointed ? v.jointed->right.strips : none;
+  const double wing_m = left.empty() ? v.left.planform.wing_length_m : left.back().span_m + left.back().width_m / 2;
   Json profile = Json::array();
   for (const auto& [height_m, radius_m] : kProfile_m) {
-    const double size = v.left.planform.wing_length_m / kProfileWing_m;
+    const double size = wing_m / kProfileWing_m;
     profile.push_back({rounded(height_m * size), rounded(radius_m * size)});
   }
   return {{"name", v.name},
           {"mass_kg", mass_kg},
           {"profile_m", profile},
-          {"left", wing_of(v.left)},
-          {"right", wing_of(v.right)}};
+          {"left", wing_of(v.left, left)},
+          {"right", wing_of(v.right, right)}};
 }
 
 }  // namespace flappy::view

@@ -20,7 +20,8 @@ struct Case {
 constexpr Case kCases[] = {{"pid", 0xc10ee1b178424d2a, 0xe75aa050a549d8be},
                            {"arc", 0xf5c1f353f7772075, 0x09d4e56cfd8d8bca},
                            {"actor", 0x54f8be77e5f165bc, 0xb59c7058671bf3b3},
-                           {"beat_averaged", 0x72d2f06ed6f723ff, 0x0b27535666c0d83e}};
+                           {"beat_averaged", 0x72d2f06ed6f723ff, 0x0b27535666c0d83e},
+                           {"jointed", 0x755c612c32d4936e, 0x23bb81cd6ae3d7e9}};
 
 constexpr std::size_t kFlappers = 272, kSmall = 17;
 constexpr int kPeriods = 10;
@@ -59,6 +60,40 @@ model::Vehicle beat_averaged(std::size_t id) {
   if (id % 5 == 0) v.effects["flapping_counter_force"] = {{"x_per_s", 3}, {"y_per_s", 2}, {"z_per_s", 1}};
   if (id % 7 == 0) v.effects["ground_effect"] = {{"gain", 0.2}, {"length_m", 0.05}};
   if (id % 3 == 0) v.effects["command_delay"] = {{"delay_s", 0.0017}};
+  if (id % 11 == 0) v.effects["marker_offset"] = {{"x_m", 0.01}, {"y_m", 0}, {"z_m", 0.02}};
+  return v;
+}
+
+/// Of four angles a wing: fixed, driven and free ones, strips on the left and a single point on the right.
+model::Vehicle jointed(std::size_t id) {
+  using model::Jointed;
+  using Mode = Jointed::Mode;
+  model::Vehicle v;
+  v.name = "jointed";
+  v.air_density_kg_m3 = 1.2;
+  v.torso = {
+      0.01 + 1e-4 * static_cast<double>(id % 17), {2e-4, -1e-4, -1e-3}, {4e-6, 3.8e-6, 2.4e-6, -7e-8, 1e-9, 2e-8}};
+  v.extent = {0.01, 0.02, 0.08};
+  v.left = v.right = {.leading_edge = {7e-4, {-3e-4, 3e-3, -6e-3}, {1.3e-7, 5e-8, 9e-8, 0, 1e-8, 0}},
+                      .wing = {6e-5, {0, 0.037, -0.01}, {2.1e-8, 2.2e-9, 1.9e-8, 0, 2e-10, 0}},
+                      .shoulder_m = {0, 0.014, 0.019},
+                      .planform = {0.07, 0.0212, 0.206, 0.284, 0.451, 0.999, 0.246, 0.416, 1.028, 1.175, 5}};
+  Jointed& j = v.jointed.emplace();
+  j.frequency_Hz = 34;
+  j.inputs = {{{"flap", -5, 5, 0, {0.3, 0.1, 0, 0}}, 0.004, 0.02, 0.01, 0, {0, 0.05, 0, 0.01}, {0, 0.02, 0, 0}},
+              {{"tilt", -1, 1, 0.1, {0, 0, 0.2, 0.5}}, 0.006, 0, 0, 0.1, {}, {}, {0.1, 0.05, 0, 0}, {0.05, 0, 0, 0}}};
+  const Jointed::Angle fixed{.mean_rad = 0.05};
+  const Jointed::Angle hinge{Mode::free, 0, {}, {}, 2e-3, 0.1, 1e-6, -0.9, 0.9, 1, 1e-5};
+  j.left.angles = {fixed, Jointed::Angle{Mode::driven, 0.02, {0.8, 0.05}, {0, 0.02}},
+                   Jointed::Angle{Mode::driven, 0, {0.05, 0.1}, {0, 0}}, hinge};
+  j.right.angles = {fixed, Jointed::Angle{Mode::driven, 0.02, {0.8, 0.05}, {0, 0.02}, 1e-3, 0, 1e-6},
+                    Jointed::Angle{Mode::free, 0, {}, {}, 0.02, 0, 1e-6}, Jointed::Angle{Mode::driven, 0, {0}, {0.8}}};
+  for (int i = 0; i < 5; ++i) j.left.strips.push_back({0.007 + 0.014 * i, 0.014, 0.024 - 0.002 * i, 0.004});
+  j.left.rotational_lift = 1, j.left.added_mass = 0.5, j.left.rotational_damping_coefficient = 2;
+  j.left.normal_sin = {3.4, 0.1}, j.left.tangential_cos = {0.2};
+  v.right.shoulder_m.y = -0.014;
+  for (model::RigidBody* b : {&v.right.leading_edge, &v.right.wing})
+    b->com_m.y = -b->com_m.y, b->inertia_kg_m2.yz = -b->inertia_kg_m2.yz;
   if (id % 11 == 0) v.effects["marker_offset"] = {{"x_m", 0.01}, {"y_m", 0}, {"z_m", 0.02}};
   return v;
 }
@@ -142,8 +177,15 @@ Fleet<T> fly(const FleetOptions& common, const std::string& name, std::size_t fi
   o.first_flapper = static_cast<std::uint32_t>(first);
   o.batch.threads = threads;
   o.batch.instruction_set = set;
-  const bool acting = name == "actor", winged = name != "beat_averaged";
-  Fleet<T> fleet(count, winged ? test::identified() : beat_averaged(), o);
+  const bool acting = name == "actor";
+  const auto of_kind = [&](std::size_t id) {
+    return name == "beat_averaged" ? beat_averaged(id) : name == "jointed" ? jointed(id) : vehicle(id);
+  };
+  Fleet<T> fleet(count,
+                 name == "beat_averaged" ? beat_averaged()
+                 : name == "jointed"     ? jointed(0)
+                                         : test::identified(),
+                 o);
   if (acting) fleet.set_actor(actor(o.task));
   fleet.set_exploration({0.3, 0.3, 0.4});
   const auto start = [&](std::size_t i, std::uint32_t episode) {
@@ -151,7 +193,7 @@ Fleet<T> fly(const FleetOptions& common, const std::string& name, std::size_t fi
     else fleet.start(i, episode);
   };
   for (std::size_t i = 0; i < count; ++i) {
-    fleet.set_vehicle(i, winged ? vehicle(first + i) : beat_averaged(first + i));
+    fleet.set_vehicle(i, of_kind(first + i));
     start(i, 0);
     if (!o.task.sets_voltages()) fleet.set_added(i, {0.1 * static_cast<double>((first + i) % 9), 0, 0, 0.001});
   }

@@ -182,8 +182,8 @@ TEST(Predicted, IsRefusedWhereForcesHaveAnotherSourceOrNothingCanFlyThem) {
   EXPECT_EQ(with("effects.thrust_axis_tilt.x_rad = 0.1\n"), "accepted");
   EXPECT_EQ(
       refused([] { read_flyable_vehicle(predicted()); }),
-      "model: a vehicle whose forces stand in files of recorded flights cannot be flown; accepted: \"multibody\" or "
-      "\"beat_averaged\"; flappy-gap diagnose takes all three");
+      "model: a vehicle whose forces stand in files of recorded flights cannot be flown; accepted: \"multibody\", "
+      "\"beat_averaged\" or \"jointed\"; flappy-gap diagnose takes it");
 }
 
 // ---- effects

@@ -173,7 +173,7 @@ TEST(FlyConfig, RefusesAVehicleWhoseForcesStandInFiles) {
   EXPECT_EQ(refusal({"vehicle=" + file}),
             file +
                 ":6:9: model: a vehicle whose forces stand in files of recorded flights cannot be flown; accepted: "
-                "\"multibody\" or \"beat_averaged\"; flappy-gap diagnose takes all three");
+                "\"multibody\", \"beat_averaged\" or \"jointed\"; flappy-gap diagnose takes it");
 }
 
 TEST(FlyConfig, TellsOfAMisspeltTableOfATaskBeforeAMissingOne) {

@@ -117,6 +117,32 @@ TEST(Fly, HoversAndDependsOnNothingButItsNumber) {
   EXPECT_EQ(one.summary.settled, two.summary.settled);
 }
 
+// Wings that a gait drives, mixed of the same controller's outputs; its log has what their muscles do.
+TEST(Fly, HoversWithDrivenWings) {
+  const Folder folder;
+  const auto config = test::source_path("configs/fly/hummingbird_driven.toml");
+  const rollout::FlyResult r =
+      fly(rollout::read_fly_config(config, {"flight.duration_s=5.0"}), {.count = 2, .log_folder = folder / "log"});
+  EXPECT_EQ(r.summary.crashed, 0u);
+  for (int k = 3; k < 6; ++k) EXPECT_LT(r.summary.settled[static_cast<std::size_t>(k)], 0.005) << k;  // m
+  const io::CsvTable joints = io::read_csv(folder / "log" / "0000" / "joints.csv"),
+                     truth = io::read_csv(folder / "log" / "0000" / "truth.csv"),
+                     command = io::read_csv(folder / "log" / "0000" / "command.csv");
+  EXPECT_EQ(joints.column("left_stroke_rad"), truth.column("left_stroke_rad"));
+  EXPECT_EQ(command.names.size(), 5u);
+  const double work_J = joints.column("positive_work_J").back();
+  EXPECT_GT(work_J, joints.column("work_J").back());
+  // a robot of 12 g on wings of 84 mm draws a few W; its wings take a share of them
+  EXPECT_GT(work_J / 5, 0.2);
+  EXPECT_LT(work_J / 5, 4);
+  const auto refused = [&](const std::vector<std::string>& overrides) {
+    const std::string what = message([&] { rollout::read_fly_config(config, overrides); });
+    return what.substr(what.find(": ") + 2);
+  };
+  EXPECT_EQ(refused({"log.power={ rate_hz = 1000.0, battery_nominal_V = 11.1 }"}).substr(0, 52),
+            "log.power: is asked for, but the wings of vehicle \"h");
+}
+
 TEST(Fly, StopsWhenAsked) {
   const rollout::FlyConfig c = rollout::read_fly_config(kHover);
   double last = 0;

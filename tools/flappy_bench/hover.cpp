@@ -32,8 +32,9 @@ Job read_job(const std::filesystem::path& path, const std::vector<std::string>& 
   root.accept({"schema", "vehicle", "precision", "count", "seed", "duration_s", "input", "randomisation", "step_s",
                "threads", "world"});
   const model::Vehicle vehicle = model::read_flyable_vehicle(root.file("vehicle"));
-  // a robot that is known by the beat mixes any numbers
-  const model::Driver d = vehicle.beat_averaged ? model::Driver{0, 0, 1e6, 1e6, 1e6, 1e6} : vehicle.driver;
+  // a vehicle without motors mixes any numbers
+  const bool undriven = vehicle.beat_averaged || vehicle.jointed;
+  const model::Driver d = undriven ? model::Driver{0, 0, 1e6, 1e6, 1e6, 1e6} : vehicle.driver;
   Job job{vehicle,
           root.choice("precision", {"float", "double"}),
           static_cast<std::size_t>(root.integer("count", 1, 1'000'000)),
@@ -54,7 +55,7 @@ Job read_job(const std::filesystem::path& path, const std::vector<std::string>& 
   job.options.world.ceiling_z_m = root.number_or("world.ceiling_z_m", 1e3);
   root.finish();
   const double steps = vehicle.driver.hold_s / job.options.step_s;
-  if (!vehicle.beat_averaged && std::abs(steps - std::round(steps)) > 1e-6) {
+  if (!undriven && std::abs(steps - std::round(steps)) > 1e-6) {
     char what[64];
     std::snprintf(what, sizeof what, "does not divide the driver's hold of %g s", vehicle.driver.hold_s);
     root.fail("step_s", what, "hold_s / n");

@@ -206,8 +206,15 @@ void print(const Request& request, const FlyConfig& config, const std::vector<Co
   print_quantiles("overshoot, mm", columns, 1, &Summary::overshoot_m, 1000);
   print_quantiles("final position error, mm", columns, 1, &Summary::position_error_m, 1000);
   print_quantiles("final heading error, deg", columns, 1, &Summary::heading_error_rad, kDegrees);
-  print_quantiles("energy of the manoeuvre, J", columns, 3, &Summary::energy_J);
-  print_quantiles("mean power, W", columns, 2, &Summary::power_W);
+  if (const auto& muscles = config.vehicle.jointed) {  // small, and of what moves wings
+    print_quantiles("muscles' work in the manoeuvre, mJ", columns, 3, &Summary::energy_J, 1e3);
+    print_quantiles("mean muscle power, mW", columns, 3, &Summary::power_W, 1e3);
+    if (muscles->muscle_mass_kg > 0)
+      print_quantiles("mean muscle power, W/kg", columns, 1, &Summary::power_W, 1 / muscles->muscle_mass_kg);
+  } else {
+    print_quantiles("energy of the manoeuvre, J", columns, 3, &Summary::energy_J);
+    print_quantiles("mean power, W", columns, 2, &Summary::power_W);
+  }
   print_failures(columns);
   std::printf("  nominal vehicle, %zu flights from the middle of the start\n", kNominalFlights);
   print_row("strict goal reached, %", columns, 0,
@@ -270,6 +277,8 @@ Json json_of(const Request& request, const FlyConfig& config, const std::vector<
                {"vehicles", request.stream},
                {"episodes_asked", request.episodes}};
   json.update(json_of(columns[0]));
+  if (const auto& muscles = config.vehicle.jointed; muscles && muscles->muscle_mass_kg > 0)
+    put_quantiles(json, "mean_muscle_power", "W_kg", columns[0].flights.power_W, 1 / muscles->muscle_mass_kg);
   json["pid_success_rate"] = json["arc_success_rate"] = nullptr;
   for (std::size_t i = 1; i < columns.size(); ++i) {
     const std::string name = i == 1 ? "pid" : "arc";
@@ -406,7 +415,7 @@ void evaluate(Request request, io::Program& program) {
   }
   std::vector<std::pair<const char*, Controller>> alone;
   // to voltages no controller can add, and those of the project are tuned to its own flappers
-  if (!request.no_baselines && !task.sets_voltages() && !config.vehicle.beat_averaged)
+  if (!request.no_baselines && !task.sets_voltages() && !config.vehicle.beat_averaged && !config.vehicle.jointed)
     alone = {{"PID alone", controller_named("pid", config)}, {"ARC alone", controller_named("arc", config)}};
 
   Evaluation evaluation(request, config);

@@ -23,5 +23,6 @@ Command add_calibrate(io::Program& program);
 Command add_compare_map(const io::Command& program);
 Command add_kinematics(const io::Command& program);
 Command add_transitions(const io::Command& program);
+Command add_gait(const io::Command& program);
 
 }  // namespace flappy::identify

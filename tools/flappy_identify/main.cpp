@@ -8,7 +8,8 @@ int main(int argc, char** argv) {
   const std::vector<identify::Command> commands = {
       identify::add_forces(program.app()),     identify::add_simulate_forces(program.app()),
       identify::add_calibrate(program),        identify::add_compare_map(program.app()),
-      identify::add_kinematics(program.app()), identify::add_transitions(program.app())};
+      identify::add_kinematics(program.app()), identify::add_transitions(program.app()),
+      identify::add_gait(program.app())};
   program.app().expect_commands(1, 1);
   program.takes_ranks();
   return program.run(argc, argv, [&] {

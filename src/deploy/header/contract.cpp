@@ -7,6 +7,7 @@
 #include "deploy/header/c_text.hpp"
 #include "io/files.hpp"
 #include "model/derive.hpp"
+#include "model/jointed.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -43,9 +44,9 @@ bool sets_voltages(const FlyConfig& config) { return config.fleet.task.sets_volt
 std::string meaning_of_action(const FlyConfig& config) {
   if (sets_voltages(config)) return "It is the voltage of the left and of the right motor.\n";
   std::string inputs;  // as the vehicle mixes them
-  if (const auto& robot = config.vehicle.beat_averaged) {
+  if (const auto mixed = model::mixed_inputs(config.vehicle); !mixed.empty()) {
     const auto actions = config.fleet.task.action();
-    for (const model::BeatAveraged::Input& i : robot->inputs) {
+    for (const model::BeatAveraged::Input& i : mixed) {
       inputs += i.name + " = " + io::shortest_digits(i.neutral);
       for (std::size_t k = 0; k < i.mix.size(); ++k)
         if (i.mix[k] != 0) inputs += " + " + io::shortest_digits(i.mix[k]) + " " + actions[k].name;
@@ -69,7 +70,8 @@ Periods periods_of(const FlyConfig& config) {
   const double control_s = 1 / config.fleet.control_hz;
   return {whole_us("a control period", control_s),
           whole_us("a policy's period", control_s * config.fleet.task.action_repeat),
-          whole_us("the driver's hold", config.vehicle.beat_averaged ? control_s : config.vehicle.driver.hold_s)};
+          whole_us("the driver's hold",
+                   config.vehicle.beat_averaged || config.vehicle.jointed ? control_s : config.vehicle.driver.hold_s)};
 }
 
 std::string contract_text(const FlyConfig& config, const policy::RunInfo& run) {

@@ -224,6 +224,7 @@ std::string no_controller(const rollout::FlyConfig& config) {
   const flight::Task& task = config.fleet.task;
   if (task.sets_voltages()) return "the policy sets the motors' voltages by itself";
   if (config.vehicle.beat_averaged) return "the vehicle is known by the beat, and has an autopilot of its own";
+  if (config.vehicle.jointed) return "the vehicle's wings have no motors to be set by it";
   if (config.fleet.controller.kind == flight::kNoController) return "the policy flies by itself";
   if (task.parts >> static_cast<int>(flight::Part::wings) & 1)
     return "the policy sees the wings, which it has no sensor for";

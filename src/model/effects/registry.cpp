@@ -106,7 +106,13 @@ const EffectEntry* entry_of(const std::string& id) {
 }  // namespace
 
 const std::vector<EffectEntry>& catalogue_of(const Vehicle& vehicle) {
-  return vehicle.beat_averaged ? means() : effects();
+  static const std::vector<EffectEntry> seen = [] {
+    std::vector<EffectEntry> of_sensors;
+    for (const EffectEntry& e : effects())
+      if (e.info.stage == Stage::sensor) of_sensors.push_back(e);
+    return of_sensors;
+  }();
+  return vehicle.beat_averaged ? means() : vehicle.jointed ? seen : effects();
 }
 
 const EffectEntry* find_effect(const Vehicle& vehicle, const std::string& id) {

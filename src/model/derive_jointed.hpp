@@ -1,0 +1,15 @@
+// From a vehicle with four angles a wing to the constants of its step.
+#pragma once
+
+#include "flappy/vehicle.hpp"
+#include "model/jointed_dynamics.hpp"
+#include "model/strip_aerodynamics.hpp"
+
+namespace flappy::model {
+
+/// In double precision; `side`: +1 left, -1 right.
+JointedParameters<double> derive_jointed(const Vehicle& vehicle);
+std::vector<Strip<double>> derive_strips(const Jointed::Wing& wing, double air_density_kg_m3, double side);
+SeriesOfForce<double> derive_series(const Jointed::Wing& wing);
+
+}  // namespace flappy::model
