@@ -453,16 +453,28 @@ LogAmbient read_ambient(const io::Table& ambient) {
     normalise(length, {&wall.normal_x, &wall.normal_y});
     a.walls.push_back(wall);
   }
-  const auto read = [&]<std::size_t n>(const char* key, std::vector<std::array<double, n>>& to) {
+  const auto read = [&]<std::size_t n>(const char* key, std::vector<std::array<double, n>>& to, auto possible,
+                                       const char* accepted) {
     if (!ambient.has(key)) return;
     for (const auto& row : ambient.rows(key, n, place)) {
       to.emplace_back();
       std::ranges::copy(row, to.back().begin());
+      if (!possible(to.back())) ambient.fail(key, "number " + std::to_string(to.size() - 1) + " is no solid", accepted);
     }
   };
-  read("spheres", a.spheres);
-  read("boxes", a.boxes);
-  read("cylinders", a.cylinders);
+  read(
+      "spheres", a.spheres, [](const auto& s) { return s[3] > 0; }, "[x_m, y_m, z_m, radius_m], the radius above 0");
+  read(
+      "boxes", a.boxes,
+      [](const auto& b) {
+        return std::min({b[3], b[4], b[5]}) > 0 &&
+               std::abs(std::hypot(std::hypot(b[6], b[7]), std::hypot(b[8], b[9])) - 1) <= kUnitTolerance;
+      },
+      "[x_m, y_m, z_m, three edges above 0, qw, qx, qy, qz], the quaternion of length 1");
+  read(
+      "cylinders", a.cylinders,
+      [](const auto& c) { return c[6] > 0 && !(c[0] == c[3] && c[1] == c[4] && c[2] == c[5]); },
+      "[two ends of the axis, radius_m], the radius above 0");
   return a;
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "flightlog/smoother.hpp"
+#include "flightlog/world.hpp"
 #include "identify/force_map.hpp"
 #include "io/csv.hpp"
 #include "io/statistics.hpp"
@@ -63,12 +64,6 @@ sim::FlapperState with_mean_rate(const sim::FlapperState& before, sim::FlapperSt
 std::string in_ms(const std::array<double, 2>& window_s) {
   const auto ms = [](double s) { return io::shortest_digits(std::round(1e4 * s) / 10); };
   return ms(window_s[0]) + " and " + ms(window_s[1]) + " ms";
-}
-
-sim::World world_of(const flightlog::FlightHeader& h) {
-  sim::World world{h.gravity_m_s2, h.ambient.ground_z_m, h.ambient.ceiling_z_m, {}};
-  for (const flightlog::LogWall& w : h.ambient.walls) world.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
-  return world;
 }
 
 /// Largest angle, rate and so on that a sensor's noise would add to the range of a state at rest.
@@ -141,7 +136,7 @@ struct Transitions::Flight {
 
   Flight(const std::filesystem::path& folder, const flightlog::FlightLog& log, const model::Vehicle& v, Source source)
       : vehicle(v),
-        world(world_of(log.header)),
+        world(flightlog::world_of(log.header)),
         noise(noise_of(log.header)),
         beat_s(1 / log.header.flapping_Hz),
         imu_interval_s(1 / log.header.imu.rate_hz),

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "flightlog/world.hpp"
 #include "io/csv.hpp"
 #include "model/derive.hpp"
 #include "model/jointed.hpp"
@@ -17,20 +18,6 @@ namespace flappy::rollout {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-
-/// A solid of the world as a log has it.
-void add_solid(const sim::Shape& s, flightlog::LogAmbient& ambient) {
-  const double *c = s.centre_m, *q = s.attitude, *half = s.half_m;
-  if (s.kind == sim::Shape::Kind::sphere) ambient.spheres.push_back({c[0], c[1], c[2], half[0]});
-  if (s.kind == sim::Shape::Kind::box)
-    ambient.boxes.push_back({c[0], c[1], c[2], 2 * half[0], 2 * half[1], 2 * half[2], q[0], q[1], q[2], q[3]});
-  if (s.kind == sim::Shape::Kind::cylinder) {
-    const auto z = model::rotation_matrix(model::Quaternion<double>{q[0], q[1], q[2], q[3]});
-    const double way[] = {half[2] * z.row_x.z, half[2] * z.row_y.z, half[2] * z.row_z.z};
-    ambient.cylinders.push_back(
-        {c[0] - way[0], c[1] - way[1], c[2] - way[2], c[0] + way[0], c[1] + way[1], c[2] + way[2], half[0]});
-  }
-}
 
 /// Without the last digits that sums of steps leave.
 double tidy(double t_s) { return std::round(t_s * 1e9) / 1e9; }
@@ -164,7 +151,7 @@ struct Recorder<T>::Storage {
     h.gravity_m_s2 = o.batch.world.gravity_m_s2;
     h.ambient = {config.vehicle.air_density_kg_m3, o.batch.world.ground_z_m, o.batch.world.ceiling_z_m, {}};
     for (const sim::Wall& w : o.batch.world.walls) h.ambient.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
-    for (const sim::Shape& s : o.batch.world.shapes) add_solid(s, h.ambient);
+    for (const sim::Shape& s : o.batch.world.shapes) flightlog::add_solid(s, h.ambient);
     const flight::MocapSensor& m = o.sensors.mocap;
     h.mocap = {m.rate_hz, m.latency_s, m.position_noise_m, m.attitude_noise_rad};
     h.imu = imu_header(o.sensors.imu);

@@ -12,6 +12,7 @@
 
 #include "flightlog/readings.hpp"
 #include "flightlog/some_log.hpp"
+#include "flightlog/world.hpp"
 #include "io/files.hpp"
 
 namespace flappy::flightlog {
@@ -197,6 +198,42 @@ TEST(FlightLog, TakesColumnsInAnyOrder) {
   files["power.csv"] = "right_current_A,battery_V,t_s,left_current_A\n1,2,0,3\n4,5,0.01,6\n";
   const flightlog::FlightLog log = flightlog::parse_flight_log(files, "log");
   EXPECT_EQ(*log.power, (flightlog::PowerStream{{0, 0.01}, {2, 5}, {3, 6}, {1, 4}}));
+}
+
+TEST(FlightLog, HasTheSolidsOfAWorld) {
+  const sim::Shape shapes[] = {sim::sphere({1, 2, 3}, 0.5), sim::box({0, 1, 0}, {1, 2, 0.5}, {0.1, -0.2, 2}),
+                               sim::cylinder({0, -1, 1}, {0.5, 1, 2}, 0.1), sim::cylinder({0, 0, 1}, {0, 0, 0}, 0.2)};
+  flightlog::FlightLog log = sample_log();
+  for (const sim::Shape& s : shapes) flightlog::add_solid(s, log.header.ambient);
+  const flightlog::FlightLog back = flightlog::parse_flight_log(flight_log_files(log), "log");
+  EXPECT_EQ(back, log);
+  const sim::World world = flightlog::world_of(back.header);
+  ASSERT_EQ(world.shapes.size(), 4u);
+  EXPECT_EQ(world.ground_z_m, log.header.ambient.ground_z_m);
+  EXPECT_EQ(world.walls.size(), log.header.ambient.walls.size());
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(world.shapes[i].kind, shapes[i].kind);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(world.shapes[i].centre_m[k], shapes[i].centre_m[k], 1e-15);
+      EXPECT_NEAR(world.shapes[i].half_m[k], shapes[i].half_m[k], 1e-15);
+    }
+    for (int k = 0; k < 4; ++k) EXPECT_NEAR(world.shapes[i].attitude[k], shapes[i].attitude[k], 1e-15);
+  }
+  const auto refused = [](const std::string& line) {
+    return edited("flight.toml", "ceiling_z_m = 2.5", "ceiling_z_m = 2.5\n" + line);
+  };
+  EXPECT_EQ(
+      refused("spheres = [[0, 0, 0, -1]]"),
+      "log/flight.toml:11:11: ambient.spheres: number 0 is no solid; accepted: [x_m, y_m, z_m, radius_m], the radius "
+      "above 0");
+  EXPECT_EQ(
+      refused("boxes = [[0, 0, 0, 1, 1, 1, 1, 1, 0, 0]]"),
+      "log/flight.toml:11:9: ambient.boxes: number 0 is no solid; accepted: [x_m, y_m, z_m, three edges above 0, qw, "
+      "qx, qy, qz], the quaternion of length 1");
+  EXPECT_EQ(
+      refused("cylinders = [[0, 0, 1, 0, 0, 1, 1]]"),
+      "log/flight.toml:11:13: ambient.cylinders: number 0 is no solid; accepted: [two ends of the axis, radius_m], "
+      "the radius above 0");
 }
 
 TEST(FlightLog, NormalisesQuaternionsAndNormals) {

@@ -101,6 +101,35 @@ TEST(Gap, CylinderHasDistanceSignAndNormal) {
   EXPECT_NEAR(gap_to_cylinder(Point{0, 1.0, 1.6}, kRadius_m, kHalf_m).distance_m, 0.5, 1e-15);
 }
 
+TEST(ContactForce, NeverPullsAndStaysWithinItsCone) {
+  const ContactConstants<double> q{{0, 0, 0}, 100, 0.75, 0.5, 80, 0.4, 300, 0};
+  const Gap<double> gap{-1e-3, {0, 0, 1}};
+  constexpr double kStep_s = 250e-6;
+  for (const double leaves_m_s : {1.0, 2.0, 50.0}) {
+    Pressed<double> pressed = not_pressed<double>();
+    EXPECT_TRUE(press(q, gap, false, Point{0.3, 0, leaves_m_s}, kStep_s, pressed));
+    if (leaves_m_s < 1 / 0.75) EXPECT_GT(pressed.force_N.z, 0);
+    else EXPECT_EQ(pressed.force_N.z, 0);
+  }
+  Pressed<double> apart = not_pressed<double>();
+  EXPECT_FALSE(press(q, Gap<double>{1e-9, {0, 0, 1}}, false, Point{0, 0, -1}, kStep_s, apart));
+  EXPECT_EQ(apart.force_N.z, 0);
+  // dragged along, it resists with no more than friction times the normal force, along the surface and against the way
+  Bristle<double> bristle{{0, 0, 0}, 0};
+  for (int i = 0; i < 400; ++i) {
+    const Point p{1e-6 * i, 2e-6 * i, -1e-3}, v{1e-6 / kStep_s, 2e-6 / kStep_s, 0};
+    Pressed<double> pressed = not_pressed<double>();
+    press(q, gap, false, v, kStep_s, pressed);
+    const Point force = contact_force(q, pressed, p, v, kStep_s, bristle);
+    EXPECT_LE(std::hypot(force.x, force.y), 0.5 * pressed.normal_N * (1 + 1e-12));
+    EXPECT_NEAR(force.y, 2 * force.x, 1e-12);
+    EXPECT_LE(force.x, 0);
+    EXPECT_EQ(force.z, pressed.force_N.z);
+    EXPECT_EQ(bristle.state, 1);
+    if (i == 399) EXPECT_NEAR(std::hypot(force.x, force.y), 0.5 * pressed.normal_N, 1e-12);
+  }
+}
+
 TEST(ContactFault, FindsThePointThatIsTooStiffForItsBody) {
   Vehicle v = test::nominal();
   constexpr double kStep_s = 250e-6;

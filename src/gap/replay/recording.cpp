@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "flightlog/readings.hpp"
+#include "flightlog/world.hpp"
 #include "io/statistics.hpp"
 #include "sim/replay.hpp"
 
@@ -61,9 +62,7 @@ Recording::Recording(const Recording& other, flightlog::FlightLog flight_log)
 }
 
 void Recording::prepare(const std::string& place) {
-  const flightlog::FlightHeader& h = log.header;
-  world = {h.gravity_m_s2, h.ambient.ground_z_m, h.ambient.ceiling_z_m, {}};
-  for (const flightlog::LogWall& w : h.ambient.walls) world.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
+  world = flightlog::world_of(log.header);
   lay_grid();
   if (steps.empty()) throw io::InputError(place + ": no interval of the IMU has motion capture around it");
   read_voltages();
