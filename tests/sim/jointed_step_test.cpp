@@ -92,7 +92,8 @@ Balance balance(const Vehicle& v, double step_s) {
   BatchOptions o = options(step_s);
   Batch<double> batch(1, v, o);
   batch.reset(0, tumbling());
-  batch.step(1);  // the state before the first step does not know the driven angles yet
+  batch.step(1);                     // the state before the first step does not know the driven angles yet
+  batch.set_input(0, {1, 0, 0, 0});  // so that everything is on its way meanwhile
   const Totals before = totals(v, batch.state(0), batch.joints(0));
   const double work_before = batch.joints(0).work_J;
   const int steps = static_cast<int>(std::lround(seconds / step_s));
@@ -119,6 +120,12 @@ Vehicle in_vacuum(Random& random) {
   test::put_plain_planform(v);
   for (Jointed::Wing* w : {&v.jointed->left, &v.jointed->right})
     for (Jointed::Angle& a : w->angles) a.damping_Nm_s = 0;
+  v.jointed->inputs.emplace_back();
+  Jointed::Input& u = v.jointed->inputs[0];
+  u.low = -1, u.high = 1, u.mix = {1, 0, 0, 0}, u.lag_s = 0.01;
+  u.frequency = 0.2, u.timing = 0.2, u.timing_opposed = 0.2;
+  u.scale = {0.1, 0.2, 0.3, 0.1}, u.scale_opposed = {0, 0.1, 0, 0};
+  u.offset_rad = {0.1, 0, 0.05, 0}, u.offset_opposed_rad = {0.02, 0.1, 0, 0.05};
   return v;
 }
 
