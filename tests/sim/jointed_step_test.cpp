@@ -351,7 +351,8 @@ TEST(JointedStep, StandsUntilItsWingsCarryItAndFreezesWhatComesApart) {
 TEST(JointedStep, FeelsTheAirOfADrivenWing) {
   const double h = 1e-5;
   Vehicle v = busy_gait();
-  for (model::Side* s : {&v.left, &v.right}) s->planform.rotational_damping_coefficient = 0;  // is of the real rate here
+  for (model::Side* s : {&v.left, &v.right})
+    s->planform.rotational_damping_coefficient = 0;  // is of the real rate here
   Batch<double> batch(1, v, options(h));
   batch.reset(0, {}, Start::welded);
   batch.set_input(0, {0.5, 0, 0, 0});
