@@ -161,7 +161,8 @@ namespace log_file {
 inline const std::string kHeader = "flight.toml", kCommand = "command.csv", kMocap = "mocap.csv", kImu = "imu.csv",
                          kPower = "power.csv", kWings = "wings.csv", kAttitude = "attitude.csv", kTruth = "truth.csv",
                          kJoints = "joints.csv";
-inline const std::vector<std::string> kAll = {kHeader, kCommand, kMocap, kImu, kPower, kWings, kAttitude, kTruth, kJoints};
+inline const std::vector<std::string> kAll = {kHeader, kCommand,  kMocap, kImu,   kPower,
+                                              kWings,  kAttitude, kTruth, kJoints};
 }  // namespace log_file
 
 /// Columns of truth.csv: pose, motion and wings, as the flapper has them, and its gyro's bias.

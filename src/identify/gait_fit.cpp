@@ -137,12 +137,13 @@ std::string gait_text(const std::vector<FittedAngle>& angles) {
   std::string text;
   const auto list = [](const std::vector<double>& numbers) {
     std::string all = "[";
-    for (const double x : numbers) all += (all.size() > 1 ? ", " : "") + io::toml_number(std::round(x * 1e7) / 1e7 + 0.0);
+    for (const double x : numbers)
+      all += (all.size() > 1 ? ", " : "") + io::toml_number(std::round(x * 1e7) / 1e7 + 0.0);
     return all + "]\n";
   };
   for (const FittedAngle& f : angles)
     text += "[" + f.side + "." + f.angle +
-            "]\nmode = \"driven\"\nmean_rad = " + io::toml_number(std::round(f.mean_rad * 1e7) / 1e7) +
+            "]\nmode = \"driven\"\nmean_rad = " + io::toml_number(std::round(f.mean_rad * 1e7) / 1e7 + 0.0) +
             "\ncos_rad = " + list(f.cos_rad) + "sin_rad = " + list(f.sin_rad) + "\n";
   return text;
 }

@@ -27,7 +27,7 @@ Jointed::Angle read_angle(const io::Table& side, const std::string& name) {
   a.mode = static_cast<Jointed::Mode>(std::ranges::find(kModes, mode) - std::begin(kModes));
   if (a.mode != Jointed::Mode::driven) return a;
   const auto series = [&](const char* key) {
-    const std::vector<double> list =
+    std::vector<double> list =
         t.has(key) ? t.numbers(key, {-kFullTurn_rad * 60, kFullTurn_rad * 60}) : std::vector<double>{};
     if (list.size() > kMostHarmonics)
       t.fail(key, std::to_string(list.size()) + " harmonics", "at most " + std::to_string(kMostHarmonics));

@@ -16,7 +16,7 @@
 // In a step h, angles lead rates by half of it (sim/jointed_step.cpp). Springs and stops of free angles act at q + h^2/4 q'', the weighted mean of the
 // angles of three steps, dampers at the mean of old and new rate: of second order, and stable however stiff (Newmark's method [3] with beta = 1/4); both
 // add to the mass matrix.
-// [1] Kane, Levinson, Dynamics: Theory and Applications, 1985. [2] Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 6 and 9.
+// [1] Kane, Levinson, Dynamics: Theory and Applications, 1985. [2] Featherstone, Rigid Body Dynamics Algorithms, 2008.
 // [3] Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. 85, 1959.
 // Assumes rigid bodies and a gait that muscles follow whatever it takes.
 #pragma once

@@ -335,7 +335,8 @@ void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   storage_->for_states(i, ~std::uint64_t{0}, [](T& number) { number = 0; });
   storage_->for_contact_memory(i, [](T& number) { number = 0; });
   if (storage_->mean) *storage_->mean->memory_of(i) = 0;
-  if (storage_->jointed) *storage_->jointed->memory_of(i) = 0;
+  for (std::size_t k = 0; storage_->jointed && k < JointedVehicles<T>::kMemoryRows; ++k)
+    storage_->jointed->memory_of(i)[k * kLanes<T>] = 0;
 }
 
 template <class T>

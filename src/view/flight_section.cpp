@@ -324,7 +324,8 @@ Section flight_section(std::vector<ShownFlight> flights, const FlightOptions& op
     const fs::path& folder = shown.folder;
     FlightLog& log = shown.log;
     const model::Vehicle vehicle = vehicle_of(folder, log, options.vehicle);
-    const bool winged = !vehicle.beat_averaged, derived = winged && !vehicle.jointed && !log.wings && log.command.declared.empty();
+    const bool winged = !vehicle.beat_averaged,
+               derived = winged && !vehicle.jointed && !log.wings && log.command.declared.empty();
     Json notes = Json::array();
     const flightlog::ImuStream path = winged ? flightlog::ImuStream() : force_of_path(log, vehicle, folder);
     const Json swapped = take_swapped(log, packing, notes);

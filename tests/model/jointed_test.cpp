@@ -187,7 +187,7 @@ TEST(JointedFile, RefusesWhatNoWingDoes) {
 // A wing that translates at constant speed across uniform strips: their sum in closed form.
 TEST(StripAerodynamics, SumsToTheClosedForm) {
   Jointed::Wing w;
-  const double span = 0.05, chord = 0.02, rho = 1.2, edge = 0.005;
+  const double span = 0.05, chord = 0.02, rho = 1.2, edge = 0.008;
   for (int i = 0; i < 10; ++i) w.strips.push_back({(i + 0.5) * span / 10, span / 10, chord, edge});
   w.rotational_lift = 1, w.normal_sin = {3}, w.tangential_cos = {0.4};
   const Vec3<double> v{-2, 0, 1.5}, turn{0, 30, 0};

@@ -7,7 +7,9 @@
 
 #include "flappy/batch.hpp"
 #include "jointed_vehicles.hpp"
+#include "model/derive.hpp"
 #include "model/jointed_kane.hpp"
+#include "model/wing_angles.hpp"
 #include "sim/storage.hpp"
 
 namespace flappy::sim {
@@ -92,7 +94,8 @@ Balance balance(const Vehicle& v, double step_s) {
   BatchOptions o = options(step_s);
   Batch<double> batch(1, v, o);
   batch.reset(0, tumbling());
-  batch.step(1);  // the state before the first step does not know the driven angles yet
+  batch.step(1);                     // the state before the first step does not know the driven angles yet
+  batch.set_input(0, {1, 0, 0, 0});  // so that everything is on its way meanwhile
   const Totals before = totals(v, batch.state(0), batch.joints(0));
   const double work_before = batch.joints(0).work_J;
   const int steps = static_cast<int>(std::lround(seconds / step_s));
@@ -119,6 +122,12 @@ Vehicle in_vacuum(Random& random) {
   test::put_plain_planform(v);
   for (Jointed::Wing* w : {&v.jointed->left, &v.jointed->right})
     for (Jointed::Angle& a : w->angles) a.damping_Nm_s = 0;
+  v.jointed->inputs.emplace_back();
+  Jointed::Input& u = v.jointed->inputs[0];
+  u.low = -1, u.high = 1, u.mix = {1, 0, 0, 0}, u.lag_s = 0.01;
+  u.frequency = 0.2, u.timing = 0.2, u.timing_opposed = 0.2;
+  u.scale = {0.1, 0.2, 0.3, 0.1}, u.scale_opposed = {0, 0.1, 0, 0};
+  u.offset_rad = {0.1, 0, 0.05, 0}, u.offset_opposed_rad = {0.02, 0.1, 0, 0.05};
   return v;
 }
 
@@ -336,6 +345,67 @@ TEST(JointedStep, StandsUntilItsWingsCarryItAndFreezesWhatComesApart) {
   EXPECT_TRUE(batch.status(1) & kFrozen);
   batch.step(10);
   EXPECT_EQ(batch.hash(1, 2), hash);
+}
+
+// The single point feels what the blade element says of a driven wing (wing_angles.hpp), whose Phi has another sign on the right.
+TEST(JointedStep, FeelsTheAirOfADrivenWing) {
+  const double h = 1e-5;
+  Vehicle v = busy_gait();
+  for (model::Side* s : {&v.left, &v.right})
+    s->planform.rotational_damping_coefficient = 0;  // is of the real rate here
+  Batch<double> batch(1, v, options(h));
+  batch.reset(0, {}, Start::welded);
+  batch.set_input(0, {0.5, 0, 0, 0});
+  batch.step(700);
+  const HeldImpulse before = batch.held_impulse(0);
+  batch.step(1);
+  const HeldImpulse after = batch.held_impulse(0);
+  const WingJoints q = batch.joints(0);
+  batch.step(1);
+  const WingJoints next = batch.joints(0);
+  Vector3d force(0, 0, 0), moment(0, 0, 0);
+  const auto p = model::derive(v, h);
+  const auto add = [&]<int side>() {
+    double angle[4], rate[4];
+    for (int k = 0; k < 4; ++k) {
+      const double sign = k == 0 && side < 0 ? -1 : 1;
+      const int s = side > 0 ? 0 : 1;
+      const double acceleration = (next.rate_rad_s[s][k] - q.rate_rad_s[s][k]) / h;
+      angle[k] = sign * (q.angle_rad[s][k] - h / 2 * q.rate_rad_s[s][k]);  // of the middle of the step before
+      rate[k] = sign * (q.rate_rad_s[s][k] - h / 2 * acceleration);
+    }
+    const auto air = model::air_on_driven_wing<side>(
+        side > 0 ? p.left : p.right, model::WingAngles<double>{angle[0], angle[1], angle[2], angle[3]},
+        model::WingAngles<double>{rate[0], rate[1], rate[2], rate[3]}, {0, 0, 0}, {0, 0, 0});
+    const model::Triple& at = (side > 0 ? v.left : v.right).shoulder_m;
+    const Vector3d f(air.force_N.x, air.force_N.y, air.force_N.z);
+    force += f;
+    moment += Vector3d(air.moment_Nm.x, air.moment_Nm.y, air.moment_Nm.z) + Vector3d(at.x, at.y, at.z).cross(f);
+  };
+  add.operator()<+1>();
+  add.operator()<-1>();
+  for (int k = 0; k < 3; ++k) {  // rates of the middle are those of two ends, of order h^2
+    EXPECT_NEAR((after.force_N_s[k] - before.force_N_s[k]) / h, force[k], 1e-3 * force.norm()) << k;
+    EXPECT_NEAR((after.moment_Nm_s[k] - before.moment_Nm_s[k]) / h, moment[k], 1e-3 * moment.norm()) << k;
+  }
+}
+
+// Put into a batch that has flown for another time, a snapshot flies on alike.
+TEST(JointedStep, FliesOnFromASnapshot) {
+  const Vehicle v = test::insect(true);
+  Batch<float> from(1, v, options(1e-4)), to(3, v, options(1e-4));
+  const auto fly = [](Batch<float>& batch, std::size_t i, int steps) {
+    for (int k = 0; k < steps; ++k) batch.set_input(i, {0.01 * (k % 17), 0.001 * (k % 5), 0, 0}), batch.step(1);
+  };
+  fly(from, 0, 240);
+  fly(to, 2, 37);
+  const auto [rows, memory] = storage_of(from).get_jointed(0);
+  storage_of(to).put_jointed(2, rows, memory);
+  Block<float>&a = storage_of(from).blocks[0], &b = storage_of(to).blocks[0];
+  for (std::size_t r = 0; r < kStateRows; ++r) b.state[r][2] = a.state[r][0];
+  fly(from, 0, 100);
+  fly(to, 2, 100);
+  EXPECT_EQ(to.hash(2, 3), from.hash(0, 1));
 }
 
 TEST(JointedStep, RefusesOthersInItsBatch) {

@@ -389,7 +389,7 @@ TEST(RandomisationTable, RefusesDrawsThatCouldLeaveTheAcceptedRange) {
                                    "1e-9")),
             "r.toml:7:14: randomise[1].parameters: left.wing.inertia_kg_m2.yy could become 0; accepted: "
             "draws between "
-            "1e-15 and 1");
+            "1e-18 and 1");
 }
 
 TEST(RandomisationTable, FollowsAParameterThroughAllItsDraws) {

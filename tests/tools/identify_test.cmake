@@ -148,3 +148,15 @@ foreach(left IN ITEMS out.toml out.csv none.csv)
 endforeach()
 
 # ---- transitions
+
+# ---- gait
+
+file(WRITE ${WORK}/gait.csv "t_s,stroke_deg\n0,60\n0.01,0\n0.02,-60\n0.03,0\n")
+run(gait ${WORK}/gait.csv --frequency-Hz 25 --harmonics 1)
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "^\\[left\\.stroke\\]\nmode = \"driven\"\nmean_rad = -?0\\.0\ncos_rad = \\[1\\.0471976\\]\nsin_rad = \\[-?0\\.0\\]\n")
+run(gait ${WORK}/gait.csv --frequency-Hz 25 --harmonics 1 --out ${WORK}/gait.toml --json ${WORK}/gait.json)
+expect_match("stdout" "${out}" "^left\\.stroke: mean -?0\\.00 deg, first harmonic 60\\.00 deg, 0\\.000 deg rms left\n$")
+expect_keys(${WORK}/gait.json angles.0.angle=STRING angles.0.cos_rad=ARRAY)
+expect_refused("${WORK}/gait.csv: a gap of 0.25 beats from 0 of the beat on; accepted: at most 0.0625 beats for 8 harmonics, or fewer of them"
+  gait ${WORK}/gait.csv --frequency-Hz 25)
