@@ -21,7 +21,7 @@ constexpr Case kCases[] = {{"pid", 0xc10ee1b178424d2a, 0xe75aa050a549d8be},
                            {"arc", 0xf5c1f353f7772075, 0x09d4e56cfd8d8bca},
                            {"actor", 0x54f8be77e5f165bc, 0xb59c7058671bf3b3},
                            {"beat_averaged", 0x72d2f06ed6f723ff, 0x0b27535666c0d83e},
-                           {"jointed", 0x755c612c32d4936e, 0x23bb81cd6ae3d7e9}};
+                           {"jointed", 0x62fe5c1d3fae5f04, 0x14833ce5fd84951f}};
 
 constexpr std::size_t kFlappers = 272, kSmall = 17;
 constexpr int kPeriods = 10;

@@ -10,7 +10,9 @@ bumblebee), hydei_hover.csv and hydei_wing.csv (kinematics and planform of D. hy
 import csv
 import math
 import pathlib
+import subprocess
 import sys
+import tempfile
 
 BIN, ROOT, FOLDER = (pathlib.Path(a) for a in sys.argv[1:4])
 sys.path.insert(0, str(ROOT / "tests/reference"))
@@ -260,8 +262,33 @@ def robots():
               f"{math.degrees(extremes[0]):.0f} to {math.degrees(extremes[1]):.0f} | {lift / v.mass / GRAVITY:.3f} | {1e3 * power:.3g} |")
 
 
+def closed_loop():
+    print("| vehicle | never farther than 0.3 m | flap at hover | work of air, W/kg of body | reference | positive work, W/kg of body | reference |\n|---|"
+          + "---|" * 6)
+    program = (BIN / "flappy-fly").resolve()
+    if not program.exists():
+        raise FileNotFoundError(2, "", str(program))
+    for v in animals():
+        with tempfile.TemporaryDirectory() as folder:
+            log = pathlib.Path(folder) / "log"
+            own = [word for key, path in (("vehicle", f"vehicles/{v.name}.toml"), ("controller", f"controllers/pid_{v.name}.toml"))
+                   for word in ("--set", f"{key}={(ROOT / 'configs' / path).resolve()}")]
+            said = subprocess.run([program, ROOT / "configs/fly/hover.toml", *own, "--log", log], check=True, capture_output=True, text=True).stdout
+            near = said.split("never farther than 0.3 m: ")[1].split(";")[0]
+            late = []
+            for name in ("command.csv", "joints.csv"):
+                with open(log / name, newline="", encoding="utf-8") as f:
+                    late.append([row for row in csv.DictReader(f) if float(row["t_s"]) >= 5])
+        commands, joints = late
+        flap = sum(float(row["flap"]) for row in commands) / len(commands)
+        time = float(joints[-1]["t_s"]) - float(joints[0]["t_s"])
+        work, positive = ((float(joints[-1][k]) - float(joints[0][k])) / time / v.mass for k in ("work_J", "positive_work_J"))
+        air, whole, _ = v.power()
+        print(f"| {v.name} | {near} | {flap:.3f} | {work:.1f} | {air / v.mass:.1f} | {positive:.1f} | {whole / v.mass:.1f} |")
+
+
 for title, table in (("Bumblebee, computed flow", bumblebee), ("D. hydei, hover", hydei), ("Hover", hover), ("Power", power), ("Stability", stability),
-                     ("Robots", robots)):
+                     ("Closed loop", closed_loop), ("Robots", robots)):
     print(f"\n## {title}\n")
     try:
         table()
