@@ -54,6 +54,10 @@ class Vehicle:
         self.air = {"strips": [(y, c, d, e) for y, c, d, e in air["strips_m"]], "density": table["air"]["density_kg_m3"],
                     "rotational_lift": air.get("rotational_lift", 0.0), "added_mass": air.get("added_mass", 0.0),
                     "pitching_drag": air.get("rotational_damping_coefficient", 0.0)}
+        if "normal_sin" in air:
+            self.air["normal"] = lambda s, c: sum(b * math.sin((k + 1) * math.atan2(s, c)) for k, b in enumerate(air["normal_sin"]))
+        if "tangential_cos" in air:
+            self.air["tangential"] = lambda c: sum(b * math.cos((k + 1) * math.acos(max(-1.0, min(1.0, c)))) for k, b in enumerate(air["tangential_cos"]))
         self.shoulder, torso, wing = vector(left["shoulder_m"]), table["torso"], left["wing"]
         self.wing_mass, self.wing_com = wing["mass_kg"], vector(wing["com_m"])
         self.wing_inertia = about(tensor(wing["inertia_kg_m2"]), wing["mass_kg"], self.wing_com)

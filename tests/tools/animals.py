@@ -166,12 +166,15 @@ def hydei():
     frequency, mass, width = 188.7, 1.8e-6, (plan["r_mm"][1] - plan["r_mm"][0]) * 1e-3
     strips = [(r * 1e-3, width, c * 1e-3, 0.25 * c * 1e-3) for r, c in zip(plan["r_mm"], plan["chord_mm"])]
     gaits = [Gait.fitted([math.radians(a) for a in beat[key]], 8) for key in ("stroke_deg", "deviation_deg", "rotation_deg")]
-    wing = Wing(strips, density=1.2, rotational_lift=1.0, added_mass=1.0, pitching_drag=1.0)
+    plate = Wing(strips, density=1.2, rotational_lift=1.0, added_mass=1.0, pitching_drag=1.0)
+    polar = flight.Vehicle(ROOT / "configs/vehicles/fruit_fly.toml").air
+    fly = Wing(strips, density=1.2, rotational_lift=1.0, added_mass=1.0, pitching_drag=1.0, normal=polar["normal"], tangential=polar["tangential"])
     print("| lift of both wings / weight | " + " | ".join(TERMS) + " | k_R 0.5, C_rd 2 | and k_A 0.35 |\n|---|" + "---|" * 6)
     stroke = [gaits[0].at(i / 200, 1)[0] for i in range(200)]
     induced = math.sqrt(mass * GRAVITY / (2 * 1.2 * (max(stroke) - min(stroke)) * (strips[-1][0] + width / 2) ** 2))
-    for label, up, sink in (("deviation measured", 1.0, 0.0), ("deviation neglected", 1e-9, 0.0), ("deviation of the other sign", -1.0, 0.0),
-                            (f"measured, induced flow {induced:.2f} m/s", 1.0, induced)):
+    for label, wing, up, sink in (("deviation measured", plate, 1.0, 0.0), ("deviation neglected", plate, 1e-9, 0.0),
+                                  ("deviation of the other sign", plate, -1.0, 0.0), (f"measured, induced flow {induced:.2f} m/s", plate, 1.0, induced),
+                                  ("measured, C_N and C_T of a model fly", fly, 1.0, 0.0)):
         lift = dict.fromkeys(TERMS, 0.0)
         for i in range(200):
             at = lambda x: motion(gaits, up, x, frequency)
