@@ -157,7 +157,8 @@ Json to_json(const Prediction& p) {
           {"where", p.where ? Json{{"channel", p.where->channel}, {"regime", p.where->regime}} : Json(nullptr)},
           {"after_next",
            p.after_next ? Json{{"kind", p.after_next->kind}, {"effects", p.after_next->effects}} : Json(nullptr)},
-          {"baselines", baselines}};
+          {"baselines", baselines},
+          {"features", p.features}};
 }
 
 Prediction prediction_from(const Json& json) {
@@ -187,6 +188,7 @@ Prediction prediction_from(const Json& json) {
   if (const Json& a = json.at("after_next"); !a.is_null()) p.after_next = {a.at("kind"), a.at("effects").get<Names>()};
   for (const auto& [name, b] : json.at("baselines").items())
     p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
+  p.features = json.at("features").get<std::vector<double>>();
   return p;
 }
 

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
+#include "benchmark/black_box.hpp"
 #include "benchmark/predict/baselines.hpp"
 
 namespace flappy::benchmark {
@@ -360,6 +362,39 @@ TEST(Stlsq, NeverThresholdsAParameter) {
   }
   EXPECT_EQ(stlsq({{"", "wind"}, {rows.transpose() * rows}, {4}}).named, Names{"wind"});
   EXPECT_EQ(stlsq({{"tether", "wind"}, {rows.transpose() * rows}, {4}}).named, Names{});
+}
+
+/// Robots of three kinds, of a family whose features all stand `higher`; the last feature is the same of all.
+std::vector<Example> robots_of_a_family(double higher, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<Example> list;
+  for (int i = 0; i < 60; ++i) {
+    const char* const kNames[] = {"", "wind", "tether"};
+    Example e{std::vector<double>(41, 7.0), kNames[i % 3]};
+    for (int k = 0; k < 40; ++k)
+      e.features[static_cast<std::size_t>(k)] = higher + normal(random) + (k % 4 == i % 3 ? 1.5 : 0);
+    list.push_back(std::move(e));
+  }
+  return list;
+}
+
+TEST(BlackBox, NamesWhatItLearntOnAnotherFamily) {
+  // ten features of 40 tell a kind by 1.5 sd each: 4.7 sd together
+  const BlackBox box(robots_of_a_family(0, 1));
+  int right = 0;
+  for (const Example& e : robots_of_a_family(0.3, 2)) right += box.ranked(e.features).front() == e.effect;
+  EXPECT_GE(right, 54);
+  EXPECT_EQ(box.ranked(robots_of_a_family(0, 3).front().features).size(), 3U);
+}
+
+TEST(BlackBox, LearnsNothingFromNothing) {
+  std::vector<Example> same = robots_of_a_family(0, 1);
+  for (Example& e : same) e.features.assign(41, 1.0);
+  const BlackBox box(same);
+  const std::vector<std::string> one = box.ranked(same.front().features),
+                                 other = box.ranked(std::vector<double>(41, 9.0));
+  EXPECT_EQ(one, other);
 }
 
 }  // namespace

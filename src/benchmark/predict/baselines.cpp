@@ -151,6 +151,42 @@ Baseline stlsq(const Regression& r) {
   return b;
 }
 
+std::vector<double> features(const std::vector<gap::PredictedFlight>& flights, const gap::Diagnosis& d) {
+  const gap::Residuals& residual = d.parameters.point.residual;
+  const Energy whole = energy(flights, d.noise_sd, residual);
+  std::vector<double> list;
+  for (std::size_t g = 0; g < gap::kGroups; ++g) list.push_back(std::log1p(whole.rms(g)));
+  std::vector<std::vector<gap::RegimeFunction>> functions;
+  for (const gap::PredictedFlight& f : flights) functions.push_back(f.functions());
+  const auto count = static_cast<Index>(functions.front().size());
+  // sums over beats of 1, r, r^2 and, of each function b, of b, b^2 and b r
+  MatrixXd own = MatrixXd::Zero(gap::kGroups, 3), sum = MatrixXd::Zero(gap::kGroups, count), square = sum,
+           product = sum;
+  for (std::size_t f = 0; f < flights.size(); ++f)
+    for_rows(flights, d.noise_sd, f, [&](std::size_t g, std::size_t row) {
+      if (g % gap::kCoefficients > 2) return;
+      const auto j = static_cast<Index>(row / gap::kRowsPerBeat), i = static_cast<Index>(g);
+      const double r = residual[f][row] / d.noise_sd[g];
+      own.row(i) += Eigen::RowVector3d(1, r, r * r);
+      for (Index k = 0; k < count; ++k) {
+        const double b = functions[f][static_cast<std::size_t>(k)].values[j];
+        sum(i, k) += b;
+        square(i, k) += b * b;
+        product(i, k) += b * r;
+      }
+    });
+  for (Index g = 0; g < gap::kGroups; ++g) {
+    if (g % gap::kCoefficients > 2) continue;
+    const double n = std::max(own(g, 0), 1.0), spread = own(g, 2) - own(g, 1) * own(g, 1) / n;
+    for (Index k = 0; k < count; ++k) {
+      const double together = product(g, k) - sum(g, k) * own(g, 1) / n,
+                   alone = (square(g, k) - sum(g, k) * sum(g, k) / n) * spread;
+      list.push_back(alone > 0 ? std::log1p(std::abs(together) * std::sqrt(n / alone)) : 0);
+    }
+  }
+  return list;
+}
+
 std::map<std::string, Baseline> baselines(const std::vector<gap::PredictedFlight>& flights,
                                           const sim::Randomisation& uncertain, const gap::Diagnosis& d,
                                           const std::vector<std::string>& withheld, int threads) {

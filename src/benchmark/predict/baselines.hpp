@@ -6,6 +6,7 @@
 //   stlsq             sequentially thresholded least squares of the residual on the columns of all effects and parameters (Brunton,
 //                     Proctor, Kutz, PNAS 113, 2016); parameters are never thresholded; the threshold is the one that
 //                     predicts flights left out best
+//   black_box         ridge regression on features(), learnt on scored robots of other families (benchmark/black_box.hpp)
 #pragma once
 
 #include <Eigen/Dense>
@@ -18,6 +19,10 @@ namespace flappy::benchmark {
 std::map<std::string, Baseline> baselines(const std::vector<gap::PredictedFlight>& flights,
                                           const sim::Randomisation& uncertain, const gap::Diagnosis& diagnosis,
                                           const std::vector<std::string>& withheld, int threads);
+
+/// What the parameters leave, in logarithms: the rms of every channel and harmonic in units of the noise, and, of mean and first harmonic, how
+/// much goes with each function of the regime, as correlation over what noise has.
+std::vector<double> features(const std::vector<gap::PredictedFlight>& flights, const gap::Diagnosis& diagnosis);
 
 /// A residual and what it may be a sum of.
 struct Regression {

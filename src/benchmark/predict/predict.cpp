@@ -60,7 +60,10 @@ Prediction predict(const Question& q) {
         rank_experiments(d, uncertain, gap::read_manoeuvres(q.experiments), {.threads = options.threads});
     if (!ranked.empty()) p.next = ranked.front().separates;
   }
-  if (q.baselines) p.baselines = baselines(flights, uncertain, d, q.withheld, options.threads);
+  if (q.baselines) {
+    p.baselines = baselines(flights, uncertain, d, q.withheld, options.threads);
+    p.features = features(flights, d);
+  }
   return p;
 }
 

@@ -58,6 +58,7 @@ struct Prediction {
   std::vector<Weight> weights;                  ///< of all hypotheses
   std::optional<double> nominal, refit, floor;  ///< E
   std::map<std::string, Baseline> baselines;    ///< by kBaselines
+  std::vector<double> features;                 ///< what the residuals look like, for the black box (baselines.hpp)
   /// Of a verdict that abstains: the two answers that the manoeuvre proposed tells apart, effects joined by +; or none.
   std::vector<std::string> next;
   std::optional<Where> where;         ///< of an unknown cause
