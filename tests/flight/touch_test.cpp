@@ -1,7 +1,7 @@
 // Robots that touch in the closed loop: what fleets keep, hand on and restore of it, and tasks that ask for a touch.
 #include <gtest/gtest.h>
 
-#include <cstring>
+#include <algorithm>
 
 #include "flight/fleet_storage.hpp"
 #include "flight/fleets.hpp"
@@ -58,7 +58,7 @@ TEST(Touch, IsPartOfHashAndMemory) {
   ASSERT_EQ(from.size(), to.size());
   for (std::size_t k = 0; k < from.size(); ++k) {
     ASSERT_EQ(from[k].size(), to[k].size());
-    std::memcpy(to[k].data(), from[k].data(), from[k].size());
+    std::ranges::copy(from[k], to[k].begin());
   }
   b.restored(a.periods());
   EXPECT_EQ(a.hash(), b.hash());

@@ -19,6 +19,16 @@ struct KaneState {
   std::array<double, 2> beta, theta, beta_rate, theta_rate;  // left, right
 };
 
+/// Of a flapper (flappy/batch.hpp), whose attitude is `R_WB`.
+KaneState kane_state_of(const auto& s, const Matrix3d& R_WB) {
+  return {R_WB.transpose() * Vector3d(s.velocity_m_s),
+          Vector3d(s.body_rate_rad_s),
+          {s.stroke_rad[0], -s.stroke_rad[1]},
+          {s.rotation_rad[0], s.rotation_rad[1]},
+          {s.stroke_rate_rad_s[0], -s.stroke_rate_rad_s[1]},
+          {s.rotation_rate_rad_s[0], s.rotation_rate_rad_s[1]}};
+}
+
 /// External wrench on each wing at its shoulder, hinge torques, wrench on the torso at its origin; all in B.
 struct KaneLoads {
   std::array<Vector3d, 2> force, moment;

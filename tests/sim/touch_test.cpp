@@ -264,12 +264,7 @@ Mechanics mechanics(const model::Vehicle& v, const FlapperState& s) {
   const Eigen::Quaterniond attitude(s.attitude[0], s.attitude[1], s.attitude[2], s.attitude[3]);
   const Matrix3d R = attitude.normalized().toRotationMatrix();
   const Vector3d zero = Vector3d::Zero();
-  const test::KaneState k{R.transpose() * Vector3d(s.velocity_m_s),
-                          Vector3d(s.body_rate_rad_s),
-                          {s.stroke_rad[0], -s.stroke_rad[1]},
-                          {s.rotation_rad[0], s.rotation_rad[1]},
-                          {s.stroke_rate_rad_s[0], -s.stroke_rate_rad_s[1]},
-                          {s.rotation_rate_rad_s[0], s.rotation_rate_rad_s[1]}};
+  const test::KaneState k = test::kane_state_of(s, R);
   const test::KaneSystem m = test::kane(v, k, {{zero, zero}, {zero, zero}, {0, 0}, {0, 0}, zero, zero, zero});
   test::Speeds u;
   u << k.velocity_B, k.body_rate, k.beta_rate[0], k.beta_rate[1], k.theta_rate[0], k.theta_rate[1];

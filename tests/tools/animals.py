@@ -53,16 +53,8 @@ def slopes(t, values):
 
 
 def least_squares(rows, right):
-    n = len(rows)
-    M = [[sum(a * b for a, b in zip(rows[i], rows[j])) for j in range(n)] + [sum(a * b for a, b in zip(rows[i], right))] for i in range(n)]
-    for i in range(n):
-        p = max(range(i, n), key=lambda k: abs(M[k][i]))
-        M[i], M[p] = M[p], M[i]
-        M[i] = [x / M[i][i] for x in M[i]]
-        for k in range(n):
-            if k != i:
-                M[k] = [x - M[k][i] * y for x, y in zip(M[k], M[i])]
-    return [row[n] for row in M]
+    product = lambda a, b: sum(x * y for x, y in zip(a, b))
+    return flight.solved([[product(a, b) for b in rows] for a in rows], [product(a, right) for a in rows])
 
 
 # --- bumblebee: normal force of the right wing against computed flow ---------------------------------------------------------------------------
