@@ -21,14 +21,14 @@ struct Touched {
 /// Of a point in W to a shape.
 template <class T>
 FLAPPY_INLINE Gap<T> gap_to(const Shape& shape, const Vec3<T>& p) {
-  const double* a = shape.attitude;
-  const auto m = rotation_matrix(Quaternion<double>{a[0], a[1], a[2], a[3]});
-  const auto row = [](const Vec3<double>& r) { return Vec3<T>{T(r.x), T(r.y), T(r.z)}; };
-  const Matrix3<T> R{row(m.row_x), row(m.row_y), row(m.row_z)};
   const Vec3<T> centre{T(shape.centre_m[0]), T(shape.centre_m[1]), T(shape.centre_m[2])};
   const Vec3<T> size{T(shape.half_m[0]), T(shape.half_m[1]), T(shape.half_m[2])};
   const Vec3<T> from_centre = p - centre;
   if (shape.kind == Shape::Kind::sphere) return gap_to_sphere(from_centre, size.x);
+  const double* a = shape.attitude;
+  const auto m = rotation_matrix(Quaternion<double>{a[0], a[1], a[2], a[3]});
+  const auto row = [](const Vec3<double>& r) { return Vec3<T>{T(r.x), T(r.y), T(r.z)}; };
+  const Matrix3<T> R{row(m.row_x), row(m.row_y), row(m.row_z)};
   const Vec3<T> at = transpose_times(R, from_centre);
   const Gap<T> gap = shape.kind == Shape::Kind::box ? gap_to_box(at, size) : gap_to_cylinder(at, size.x, size.z);
   return {gap.distance_m, R * gap.normal};

@@ -138,4 +138,18 @@ inline KaneSystem kane(const model::Vehicle& vehicle, const KaneState& x, const 
   return s;
 }
 
+/// A flapper on which nothing acts, as Kane has it, and its speeds.
+struct KaneUnloaded {
+  KaneState state;
+  KaneSystem system;
+  Speeds speeds;
+};
+KaneUnloaded kane_unloaded(const model::Vehicle& v, const auto& s, const Matrix3d& R_WB) {
+  const Vector3d zero = Vector3d::Zero();
+  const KaneState k = kane_state_of(s, R_WB);
+  Speeds u;
+  u << k.velocity_B, k.body_rate, k.beta_rate[0], k.beta_rate[1], k.theta_rate[0], k.theta_rate[1];
+  return {k, kane(v, k, {{zero, zero}, {zero, zero}, {0, 0}, {0, 0}, zero, zero, zero}), u};
+}
+
 }  // namespace flappy::test

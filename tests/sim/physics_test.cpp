@@ -99,11 +99,7 @@ struct Mechanics {
 Mechanics mechanics(const model::Vehicle& v, const FlapperState& s) {
   const Eigen::Quaterniond attitude(s.attitude[0], s.attitude[1], s.attitude[2], s.attitude[3]);
   const Matrix3d R = attitude.normalized().toRotationMatrix();
-  const Vector3d zero = Vector3d::Zero();
-  const test::KaneState k = test::kane_state_of(s, R);
-  const test::KaneSystem m = test::kane(v, k, {{zero, zero}, {zero, zero}, {0, 0}, {0, 0}, zero, zero, zero});
-  test::Speeds u;
-  u << k.velocity_B, k.body_rate, k.beta_rate[0], k.beta_rate[1], k.theta_rate[0], k.theta_rate[1];
+  const auto [k, m, u] = test::kane_unloaded(v, s, R);
   double energy = 0.5 * (u.dot(m.mass * u) - m.momentum.squaredNorm() / m.total_mass);
   for (std::size_t i = 0; i < 2; ++i) {
     const Oscillator o(side(v, i));

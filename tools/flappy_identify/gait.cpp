@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <numbers>
 
 #include "command.hpp"
 #include "identify/gait_fit.hpp"
@@ -9,6 +10,8 @@
 
 namespace flappy::identify {
 namespace {
+
+constexpr double kDegrees = 180 / std::numbers::pi;
 
 struct Settings {
   std::string measured, out;
@@ -32,8 +35,7 @@ Json run(const Settings& s) {
   for (const FittedAngle& f : angles) {
     if (!s.out.empty())
       std::printf("%s.%s: mean %.2f deg, first harmonic %.2f deg, %.3f deg rms left\n", f.side.c_str(), f.angle.c_str(),
-                  f.mean_rad * 57.29577951308232, std::hypot(f.cos_rad[0], f.sin_rad[0]) * 57.29577951308232,
-                  f.rms_rad * 57.29577951308232);
+                  f.mean_rad * kDegrees, std::hypot(f.cos_rad[0], f.sin_rad[0]) * kDegrees, f.rms_rad * kDegrees);
     all.push_back({{"side", f.side},
                    {"angle", f.angle},
                    {"mean_rad", f.mean_rad},
