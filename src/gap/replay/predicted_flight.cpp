@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "gap/replay/reset_kernel.hpp"
 #include "gap/replay/reset_prediction.hpp"
 #include "io/parallel.hpp"
 #include "sim/lanes.hpp"
@@ -10,7 +11,7 @@ namespace flappy::gap {
 namespace {
 
 /// Vehicles that a flight is predicted by at once: the lanes of a block.
-constexpr std::size_t kVehicles = sim::kLanes<double>;
+constexpr std::size_t kVehicles = sim::kLanes<Flown>;
 
 }  // namespace
 

@@ -9,25 +9,27 @@ namespace {
 
 using namespace model;
 using sim::kWidth;
-using V = Lanes<double, kWidth<double>>;
+using V = Lanes<Flown, kWidth<Flown>>;
 
-FLAPPY_INLINE Vec3<V> vector(const double (&v)[3]) { return {V(v[0]), V(v[1]), V(v[2])}; }
-FLAPPY_INLINE Quaternion<V> quaternion(const double (&q)[4]) { return {V(q[0]), V(q[1]), V(q[2]), V(q[3])}; }
+FLAPPY_INLINE V all(double x) { return V(static_cast<Flown>(x)); }
 
-FLAPPY_INLINE Vec3<V> load(double (*rows)[sim::kLanes<double>], int first) {
+FLAPPY_INLINE Vec3<V> vector(const double (&v)[3]) { return {all(v[0]), all(v[1]), all(v[2])}; }
+FLAPPY_INLINE Quaternion<V> quaternion(const double (&q)[4]) { return {all(q[0]), all(q[1]), all(q[2]), all(q[3])}; }
+
+FLAPPY_INLINE Vec3<V> load(Flown (*rows)[sim::kLanes<Flown>], int first) {
   return {V::load(rows[0] + first), V::load(rows[1] + first), V::load(rows[2] + first)};
 }
-FLAPPY_INLINE void store(const Vec3<V>& v, double (*rows)[sim::kLanes<double>], int first) {
+FLAPPY_INLINE void store(const Vec3<V>& v, Flown (*rows)[sim::kLanes<Flown>], int first) {
   v.x.store(rows[0] + first);
   v.y.store(rows[1] + first);
   v.z.store(rows[2] + first);
 }
 
-void reset_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
+void reset_block(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
                  const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept) {
   const V per_interval(1 / interval_s);
-  const Vec3<V> imu{V(imu_position_m[0]), V(imu_position_m[1]), V(imu_position_m[2])};
-  for (int first = 0; first < sim::kLanes<double>; first += kWidth<double>) {
+  const Vec3<V> imu{all(imu_position_m[0]), all(imu_position_m[1]), all(imu_position_m[2])};
+  for (int first = 0; first < sim::kLanes<Flown>; first += kWidth<Flown>) {
     const auto p = sim::load_rows<Parameters<V>>(block.parameters, first);
     auto x = sim::load_rows<State<V>>(block.state, first);
     if (from != nullptr) {
@@ -35,8 +37,8 @@ void reset_block(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& 
       const Quaternion<V> begin = quaternion(from->attitude);
       const Vec3<V> turn = flight::rotation_vector(flight::from_to(begin, flown.attitude));
       Vec3<V> force = per_interval * (flight::point_velocity(flown, imu) - load(kept.imu_velocity_m_s, first));
-      force.z += V(gravity_m_s2);
-      const Matrix3<V> halfway = rotation_matrix(rotated(begin, V(0.25) * turn));
+      force.z += all(gravity_m_s2);
+      const Matrix3<V> halfway = rotation_matrix(rotated(begin, all(0.25) * turn));
       const Vec3<V> missed =
           per_interval * flight::rotation_vector(flight::from_to(flown.attitude, quaternion(to.attitude)));
       store(missed, kept.rows + kTurnRate, first);

@@ -6,6 +6,9 @@
 
 namespace flappy::gap {
 
+/// What candidates fly in: rounding is far below any sensor's noise, and a block holds twice as many as in double.
+using Flown = float;
+
 /// The torso origin where an interval begins or ends; body to world, velocity in W.
 struct TorsoAt {
   double position_m[3] = {0, 0, 0}, attitude[4] = {1, 0, 0, 0}, velocity_m_s[3] = {0, 0, 0},
@@ -22,13 +25,13 @@ enum ResetRow : int {
 
 /// What a block keeps from one interval to the next.
 struct ResetBlockState {
-  alignas(64) double imu_velocity_m_s[3][sim::kLanes<double>];  ///< in W, where the interval began
-  alignas(64) double rows[kResetRows][sim::kLanes<double>];
+  alignas(64) Flown imu_velocity_m_s[3][sim::kLanes<Flown>];  ///< in W, where the interval began
+  alignas(64) Flown rows[kResetRows][sim::kLanes<Flown>];
 };
 
 /// Reads what the interval from `from` to `to` gave and puts every torso back onto the record at `to`, wings kept; with
 /// `from` null it only puts. The body rate becomes what makes the flown turn the recorded one.
-using ResetBlock = void (*)(sim::Block<double>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
+using ResetBlock = void (*)(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
                             const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept);
 
 }  // namespace flappy::gap

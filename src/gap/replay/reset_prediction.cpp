@@ -14,7 +14,7 @@ FLAPPY_KERNELS(ResetBlock, reset_block_kernel);
 
 namespace {
 
-constexpr std::size_t kVehicles = sim::kLanes<double>;
+constexpr std::size_t kVehicles = sim::kLanes<Flown>;
 /// Channels of which a vehicle predicts a sample at every interval, and those of the meter.
 constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
 static_assert(kPathX == kSignals + kMetered);
@@ -31,6 +31,7 @@ constexpr double kKernel[] = {1.0 / 9, 2.0 / 9, 3.0 / 9, 2.0 / 9, 1.0 / 9};
 /// Voltages of steps, some steps later.
 class ShiftedVoltage {
  public:
+  bool operator==(const ShiftedVoltage&) const = default;
   explicit ShiftedVoltage(double steps)
       : whole_(static_cast<std::ptrdiff_t>(std::floor(steps))), share_(steps - std::floor(steps)) {}
   double of(const std::vector<double>& voltage_V, std::size_t step) const {
@@ -231,7 +232,7 @@ bool ResetPrediction::covers(std::size_t beat, int channel) const {
 std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& candidates) const {
   const Recording& r = recording_;
   const ResetBlock reset = *reset_block_kernels[sim::place_of("")];
-  sim::Batch<double> batch(kVehicles, candidates.front()->vehicle, {kPredictionStep_s, 1, r.world, {}});
+  sim::Batch<Flown> batch(kVehicles, candidates.front()->vehicle, {kPredictionStep_s, 1, r.world, {}});
   if (r.log.power) sim::storage_of(batch).keep_effects(0);  // the meter needs their rows
   std::vector<ShiftedVoltage> shifted;
   for (std::size_t i = 0; i < kVehicles; ++i) {
@@ -243,7 +244,7 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
     shifted.emplace_back(c.lag_s / kPredictionStep_s);
   }
   auto& storage = sim::storage_of(batch);
-  sim::Block<double>& block = storage.blocks[0];
+  sim::Block<Flown>& block = storage.blocks[0];
   sim::StepPlan plan = storage.plan();
   plan.steps_per_update = 1;
   ResetBlockState kept;
@@ -251,22 +252,23 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
   reset(block, nullptr, r.torso[0], 1, imu_m, r.world.gravity_m_s2, kept);
 
   const int longest = *std::ranges::max_element(r.steps);
-  std::vector<double> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
+  std::vector<Flown> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
   std::vector<double> samples(r.intervals() * kSignals * kVehicles, 0);
   // of the last step before an interval, and its own
   constexpr std::size_t kMeter = kMetered * kVehicles;
-  std::vector<double> meter(r.log.power ? (static_cast<std::size_t>(longest) + 1) * kMeter : 0);
+  std::vector<Flown> meter(r.log.power ? (static_cast<std::size_t>(longest) + 1) * kMeter : 0);
   std::vector<double> power;
   std::size_t step = 0, metered = 0;
   for (std::size_t k = 0; k < r.intervals(); ++k) {
     for (int i = 0; i < r.steps[k]; ++i, ++step) {
-      double* to = &voltages_V[static_cast<std::size_t>(i) * 2 * kVehicles];
+      Flown* to = &voltages_V[static_cast<std::size_t>(i) * 2 * kVehicles];
       for (std::size_t lane = 0; lane < kVehicles; ++lane) {
-        to[lane] = shifted[lane].of(r.left_V, step);
-        to[kVehicles + lane] = shifted[lane].of(r.right_V, step);
+        const bool again = lane > 0 && shifted[lane] == shifted[lane - 1];
+        to[lane] = again ? to[lane - 1] : static_cast<Flown>(shifted[lane].of(r.left_V, step));
+        to[kVehicles + lane] = again ? to[kVehicles + lane - 1] : static_cast<Flown>(shifted[lane].of(r.right_V, step));
       }
     }
-    sim::BlockEffects<double> in_force = storage.effects_of(0);
+    sim::BlockEffects<Flown> in_force = storage.effects_of(0);
     in_force.voltages_V = voltages_V.data();
     if (r.log.power) in_force.meter = meter.data() + kMeter;
     storage.kernel(block, in_force, plan, 0, r.steps[k], {});
@@ -275,7 +277,7 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
     const double per_interval = 1 / r.interval_s(k);
     for (std::size_t lane = 0; lane < kVehicles; ++lane) {
       for (std::size_t i = 0; i < 3; ++i) {
-        to[(kTorqueX + i) * kVehicles + lane] = -per_interval * kept.rows[kTurnRate + i][lane];
+        to[(kTorqueX + i) * kVehicles + lane] = -per_interval * double{kept.rows[kTurnRate + i][lane]};
         to[(kForceX + i) * kVehicles + lane] = kept.rows[kForce + i][lane];
       }
       to[kStrokeLeft * kVehicles + lane] = kept.rows[kStroke][lane];
@@ -283,9 +285,9 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
     }
     for (; metered < power_step_.size() && power_step_[metered] + 1 < step; ++metered) {
       const double late = power_late_[metered];
-      const double* now = &meter[(power_step_[metered] + 1 + static_cast<std::size_t>(r.steps[k]) - step) * kMeter];
+      const Flown* now = &meter[(power_step_[metered] + 1 + static_cast<std::size_t>(r.steps[k]) - step) * kMeter];
       for (std::size_t i = 0; i < kMeter; ++i) {
-        const double sample = now[i] + late * (now[i] - now[i + kMeter]);
+        const double here = now[i], sample = here + late * (here - double{now[i + kMeter]});
         power.push_back(i < kVehicles ? r.full * r.log.header.power->battery_nominal_V * sample : sample);
       }
     }
