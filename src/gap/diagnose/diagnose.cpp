@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -21,6 +22,8 @@ using Eigen::VectorXd;
 
 /// Sets of effects of which it is asked whether something is left beside them.
 constexpr std::size_t kMostRemainders = 3;
+/// Fits of an effect from whose parameters these are fitted alone once more.
+constexpr std::size_t kRestarts = 2;
 /// Less than this share of what parameters leave may be chance; and the log evidence of what is refuted.
 constexpr double kLeastExplainable = 0.15, kRefuted = -1e9;
 /// A size that changes no row by so much, in its unit, cannot be told from none.
@@ -43,18 +46,11 @@ class Diagnoser {
     progress(0.3, "screening effects");
     robot_.refit_beside_background();
     const Hypothesis& plain = robot_.plain();
-    d.parameters = parameters_;
     around_ = row_context_of(flights_, noise_sd());
     loss_ = losses_of(around_, parameters_.point.residual);
-    d.hypotheses.push_back(weigh(ScoredHypothesis::Kind::none, plain, robot_.nominal(), std::log(rule_.prior.none)));
-    d.hypotheses.push_back(
-        weigh(ScoredHypothesis::Kind::parameters, plain, parameters_.point, std::log(rule_.prior.parameters)));
-    const double parameters = d.hypotheses[1].log_evidence;
-    plain_ = parameters - d.hypotheses[1].log_prior;
-    d.hypotheses.push_back(explain_freely(plain, parameters_.point, std::log(rule_.prior.unknown)));
-
     std::vector<ScoredHypothesis> singles;
-    const std::vector<Screened> screened = screen(evidence_, fitter_, parameters_, robot_.sizes());
+    std::vector<Screened> open;
+    const std::vector<Screened> screened = screen(evidence_, fitter_, parameters_, {}, robot_.sizes());
     if (!flights_.front().within_the_beat()) d.untestable = untestable();
     for (std::size_t i = 0; i < screened.size(); ++i) {
       const Screened& s = screened[i];
@@ -63,8 +59,23 @@ class Diagnoser {
       if (static_cast<int>(i) < options_.finalists && s.gain > 0 &&
           progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + s.effect))
         a = fit_effects({s});
-      singles.push_back(vanished(a) ? leave_open(s) : std::move(a));
+      if (vanished(a)) open.push_back(s);
+      else singles.push_back(std::move(a));
     }
+    // what a fit found besides its effect, the parameters alone may have missed
+    std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::log_evidence);
+    for (std::size_t i = 0; i < std::min(singles.size(), kRestarts); ++i)
+      robot_.fit_parameters_from(singles[i].fit.point.at,
+                                 robot_.weigh(Hypothesis(uncertain_, singles[i].effects), singles[i].fit.point).scales);
+    d.parameters = parameters_;
+    loss_ = losses_of(around_, parameters_.point.residual);
+    d.hypotheses.push_back(weigh(ScoredHypothesis::Kind::none, plain, robot_.nominal(), std::log(rule_.prior.none)));
+    d.hypotheses.push_back(
+        weigh(ScoredHypothesis::Kind::parameters, plain, parameters_.point, std::log(rule_.prior.parameters)));
+    const double parameters = d.hypotheses[1].log_evidence;
+    plain_ = parameters - d.hypotheses[1].log_prior;
+    d.hypotheses.push_back(explain_freely(plain, parameters_.point, std::log(rule_.prior.unknown)));
+    for (const Screened& s : open) singles.push_back(leave_open(s));
     const auto counts = [&](const ScoredHypothesis& a) { return beyond_chance(a, plain_, rule_); };
     std::ranges::sort(singles, std::greater{}, counts);
     // further effects jointly with the best
@@ -76,7 +87,7 @@ class Diagnoser {
           break;
         // what is missing besides hides behind what models are off by with the best in force, not without it
         robot_.take_scales(Hypothesis(uncertain_, best.effects), best.fit.point);
-        const auto further = screen(evidence_, fitter_, best.fit, beside(best.effects, robot_.sizes()));
+        const auto further = screen(evidence_, fitter_, best.fit, best.effects, beside(best.effects, robot_.sizes()));
         if (further.empty() || further.front().gain < rule_.gain.further_screened_nats) break;
         std::vector<Screened> set = screened_of(best);
         set.push_back(further.front());
@@ -109,6 +120,7 @@ class Diagnoser {
     d.nominal = robot_.nominal().residual;
     hold_out(d);
     if (rule_.refutation.least_share > 0) refute(d);
+    if (!robot_.evidence().discrepancy().spread.beside_all) share_backgrounds(d.hypotheses);
     set_probabilities(d.hypotheses, rule_);
     d.conclusion = conclude(d.hypotheses, rule_);
     const ScoredHypothesis& concluded = d.hypotheses[d.conclusion.hypothesis];
@@ -307,6 +319,43 @@ class Diagnoser {
       const double share = a.fitted() ? (plain - mean_square(robot_, flights_, a.left)) / explainable : 0;
       if (share < rule_.refutation.least_share) a.log_evidence = kRefuted;
     }
+  }
+
+  /// What every vehicle has of an entry is a line beside the parameters, and an effect was flown: where that explains more than the line does, a
+  /// hypothesis without the effect has it, too, as its background, if it is a term that some models have.
+  void share_backgrounds(std::vector<ScoredHypothesis>& all) const {
+    const auto parameters = [&] {
+      return std::ranges::find(all, ScoredHypothesis::Kind::parameters, &ScoredHypothesis::kind)->log_evidence;
+    };
+    const double before = parameters();
+    for (const ScoredHypothesis& a : all) {
+      if (!a.fitted()) continue;
+      const Hypothesis h(uncertain_, a.effects);
+      const VectorXd mean = a.fit.mean();
+      std::map<std::string, double> beyond;
+      for (const std::string& e : a.effects) {
+        std::vector<double> sizes;
+        for (Index i = h.shared(); i < h.size(); ++i) {
+          const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+          if (u.effect == e && u.size) sizes.push_back(mean[i]);
+        }
+        beyond[e] = robot_.beyond_background(e, Eigen::Map<VectorXd>(sizes.data(), static_cast<Index>(sizes.size())));
+      }
+      for (ScoredHypothesis& b : all) {
+        if (b.kind == ScoredHypothesis::Kind::none || b.terms.empty() != a.terms.empty()) continue;
+        if (b.effects.size() >= a.effects.size()) continue;
+        double explained = a.log_evidence - a.log_prior;
+        std::size_t shared = 0;
+        for (const std::string& e : a.effects)
+          if (std::ranges::count(b.effects, e) > 0) ++shared;
+          else if (std::ranges::count(rule_.gain.of_some_models, e) > 0) explained -= std::max(beyond[e], 0.0);
+          else explained = kRefuted;
+        if (shared == b.effects.size()) b.log_evidence = std::max(b.log_evidence, b.log_prior + explained);
+      }
+    }
+    // of what the flights tell nothing, that changes nothing
+    for (ScoredHypothesis& b : all)
+      if (b.kind == ScoredHypothesis::Kind::effect && !b.fitted()) b.log_evidence += parameters() - before;
   }
 
   /// Whether to go on.

@@ -17,6 +17,8 @@ struct VerdictRule {
   struct Gain {
     double by_chance_nats, by_model_nats, further_screened_nats, vanished_size;
     std::vector<std::string> of_models;  ///< entries that by_model_nats are of
+    /// Those that published models of wings have or lack: what one explains, hypotheses without it have, too, at the price of its sizes.
+    std::vector<std::string> of_some_models;
   } gain;
   struct UnknownCause {
     double freeing_nats;

@@ -39,6 +39,17 @@ struct WithoutDiscrepancy {
 
 }  // namespace
 
+VectorXd Columns::mean() const {
+  return Eigen::Map<const VectorXd>(prior_mean.data(), static_cast<Index>(prior_mean.size()));
+}
+
+void Columns::add(const BasisCoefficients& column, double mean, int of_entry) {
+  chosen.push_back(static_cast<int>(columns.size()));
+  columns.push_back(&column);
+  prior_mean.push_back(mean);
+  entry.push_back(of_entry);
+}
+
 Evidence::Evidence(const std::vector<PredictedFlight>& flights, ModelDiscrepancy discrepancy, int threads)
     : flights_(flights), discrepancy_(std::move(discrepancy)), threads_(threads), basis_(flights), groups_(kGroups) {
   for (const PredictedFlight& f : flights) weights_.emplace_back(f.beats() * kRowsPerBeat, 1.0);
@@ -91,7 +102,7 @@ void Evidence::learn_noise(const Residuals& residual) {
 void Evidence::learn_remainder(const Residuals& residual) {
   find_noise(residual, Find::remainder);
   sum_basis();
-  scales_ = {1, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
+  scales_ = {1, {}, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
   held_ = true;
 }
 

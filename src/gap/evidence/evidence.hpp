@@ -13,6 +13,7 @@
 
 #include <Eigen/Dense>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -44,6 +45,17 @@ class RegimeBasis {
 /// The part of rows that is a smooth function of the regime, as coefficients of its basis: [group][basis].
 using BasisCoefficients = Eigen::MatrixXd;
 
+/// Columns beside each other, and what is thought of their coefficients: normal about these means, of sd 1.
+struct Columns {
+  std::vector<const BasisCoefficients*> columns;
+  std::vector<int> chosen;  ///< all of them
+  std::vector<double> prior_mean;
+  std::vector<int>
+      entry;  ///< of what every vehicle has of an entry: which of Scales::entries it grows with; -1: of none
+  Eigen::VectorXd mean() const;
+  void add(const BasisCoefficients& column, double mean, int of_entry = -1);
+};
+
 /// All that the rows of flights say of smooth residuals: sums over the whitened rows of a group, basis x
 /// residual, [flight][group].
 struct SufficientStatistics {
@@ -59,8 +71,9 @@ struct Reduced {
 /// How far models of this robot are off, beside what is usual: factors of its discrepancy.
 struct Scales {
   double robot = 1;
-  std::vector<double> blocks;  ///< [kBlocks]
-  std::vector<char> free;      ///< [kBlocks] whether it is larger than models are, by whatever it takes
+  std::vector<double> entries;  ///< of what it has of each entry, as every vehicle does; empty: 1
+  std::vector<double> blocks;   ///< [kBlocks]
+  std::vector<char> free;       ///< [kBlocks] whether it is larger than models are, by whatever it takes
 };
 inline constexpr int kClasses = static_cast<int>(Regimes::count), kBlocks = kChannels * (kHarmonics + 1) * kClasses;
 
@@ -100,11 +113,12 @@ class Evidence {
   Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
                  const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const;
   /// Expectation-maximisation over the scales of the discrepancy, from `start` on. `own_sd`: what equations of effects get wrong of
-  /// themselves, which no scale changes; `with_robot`: columns from which on coefficients scale with the robot. `freeing_nats`: the price at which a block may be larger than any model is off; none: no block.
-  Weighed weigh(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
-                const Eigen::VectorXd& prior_mean, std::size_t with_robot, const std::vector<char>& use,
+  /// themselves, which no scale changes. `freeing_nats`: the price at which a block may be larger than any model is off; none: no block.
+  Weighed weigh(const SufficientStatistics& residual, const Columns& columns, const std::vector<char>& use,
                 const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats = {},
                 int iterations = kMostIterations) const;
+  /// Nats that it costs a hypothesis that this robot has so many times what is usual of an entry.
+  double price_of(double times) const;
   static constexpr int kMostIterations = 40;
   void set_discrepancy(ModelDiscrepancy discrepancy) { discrepancy_ = std::move(discrepancy); }
   /// Those that every model of this robot has from now on.
@@ -149,7 +163,7 @@ class Evidence {
   RegimeBasis basis_;
   std::vector<Group> groups_;
   bool held_ = false;
-  Scales scales_{1, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
+  Scales scales_{1, {}, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
   Residuals weights_;
   std::vector<Eigen::MatrixXd> plain_inverse_;        ///< of basis x basis, by channel
   std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< basis x basis of the whitened rows, [flight][group]

@@ -31,16 +31,6 @@ constexpr double kFar = 2;
 
 }  // namespace
 
-VectorXd Columns::mean() const {
-  return Eigen::Map<const VectorXd>(prior_mean.data(), static_cast<Index>(prior_mean.size()));
-}
-
-void Columns::add(const BasisCoefficients& column, double mean) {
-  chosen.push_back(static_cast<int>(columns.size()));
-  columns.push_back(&column);
-  prior_mean.push_back(mean);
-}
-
 std::vector<Residuals> residuals(const std::vector<PredictedFlight>& flights, const std::vector<Candidate>& candidates,
                                  int threads) {
   // candidates whose sensors agree share a log
@@ -96,6 +86,7 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
     candidates.push_back(hypothesis.candidate(up));
     candidates.push_back(hypothesis.candidate(down));
   }
+  const std::vector<VectorXd> shifts = around(hypothesis, at, directions, known, candidates);
   std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
   Linearised l{at, std::move(directions), std::move(rows[0]), {}, known};
   l.columns.resize(known.size() + spans.size());
@@ -108,39 +99,44 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
   });
   if (l.residual.empty()) return l;
   l.statistics = evidence_.statistics(l.residual);
-  average(hypothesis, l);
+  average({rows.begin() + static_cast<std::ptrdiff_t>(rows.size() - shifts.size()), rows.end()}, shifts, l);
   return l;
 }
 
-/// The residual at a point is as rough as the columns were: its mean over points around, each brought back by the columns,
-/// is less so.
-void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
-  const Index k = std::min(l.directions.reach.size(), hypothesis.shared());
-  if (k == 0) return;
+/// Points around another, as the steps to them along the directions.
+std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorXd& at, const Directions& directions,
+                                     const std::vector<BasisCoefficients>& known,
+                                     std::vector<Candidate>& candidates) const {
   std::vector<VectorXd> shifts;
-  std::vector<Candidate> candidates;
-  for (int i = 0; i < kAround; ++i) {
+  const Index k = std::min(directions.reach.size(), hypothesis.shared());
+  for (int i = 0; k > 0 && i < kAround; ++i) {
     VectorXd shift = VectorXd::Zero(k);
     for (Index d = 0; d < k; ++d) {
-      if (l.columns[static_cast<std::size_t>(d)].size() == 0) continue;
+      if (static_cast<std::size_t>(d) < known.size() && known[static_cast<std::size_t>(d)].size() == 0) continue;
       // columns of a Hadamard matrix but its first: every direction goes as often up as down, and of any seven that follow one
       // another no two together
       const int sign = __builtin_popcount(static_cast<unsigned>((d % (kAround - 1) + 1) & i)) % 2 ? -1 : 1;
-      shift[d] = kAroundReach * sign * l.directions.reach[d];
+      shift[d] = kAroundReach * sign * directions.reach[d];
     }
-    const VectorXd there = hypothesis.bounded(l.at + l.directions.axes.leftCols(k) * shift);
-    shifts.push_back(l.directions.axes.leftCols(k).transpose() * (there - l.at));
+    const VectorXd there = hypothesis.bounded(at + directions.axes.leftCols(k) * shift);
+    shifts.push_back(directions.axes.leftCols(k).transpose() * (there - at));
     candidates.push_back(hypothesis.candidate(there));
   }
-  const std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
+  return shifts;
+}
+
+/// The residual at a point is as rough as the columns were: its mean over points around, each brought back by the columns,
+/// is less so. Where a column is missing, nothing would bring it back.
+void Fitter::average(const std::vector<Residuals>& rows, const std::vector<VectorXd>& shifts, Linearised& l) const {
+  for (Index d = 0; !shifts.empty() && d < shifts[0].size(); ++d)
+    if (shifts[0][d] != 0 && l.columns[static_cast<std::size_t>(d)].size() == 0) return;
   std::vector<SufficientStatistics> around(rows.size());
   io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
     if (rows[i].empty()) return;
     around[i] = evidence_.statistics(rows[i]);
     BasisCoefficients back = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
-    for (Index d = 0; d < k; ++d)
-      if (shifts[i][d] != 0 && l.columns[static_cast<std::size_t>(d)].size() > 0)
-        back += shifts[i][d] * l.columns[static_cast<std::size_t>(d)];
+    for (Index d = 0; d < shifts[i].size(); ++d)
+      if (shifts[i][d] != 0) back += shifts[i][d] * l.columns[static_cast<std::size_t>(d)];
     evidence_.add(1, back, around[i]);
   });
   double n = 1;
@@ -154,40 +150,57 @@ void Fitter::average(const Hypothesis& hypothesis, Linearised& l) const {
     for (VectorXd& sum : flight) sum /= n;
 }
 
-void Fitter::set_background(const Columns& same, const std::vector<BasisCoefficients>& with_robot, const Fit& beside) {
+void Fitter::set_background(const Columns& same, std::vector<Background> of_entries, const Fit& beside) {
   background_.clear();
   means_.clear();
+  entry_.clear();
   places_.clear();
   Columns all = own_columns_of(beside.point);
   const std::size_t first = all.columns.size(), scaled = first + same.columns.size();
   for (std::size_t k = 0; k < same.columns.size(); ++k) all.add(*same.columns[k], same.prior_mean[k]);
-  for (const BasisCoefficients& c : with_robot) all.add(c, 0);
+  for (const Background& b : of_entries) {
+    int entry = entry_of(b.entry);
+    if (entry < 0) {  // scales that were found stay with their entries
+      entry = static_cast<int>(entries_.size());
+      entries_.push_back(b.entry);
+    }
+    all.add(b.column, 0, entry);
+  }
   const Reduced reduced = reduce(beside.point, all);
   for (std::size_t i = first; i < all.columns.size(); ++i) {
     const auto diagonal = static_cast<Index>(i);
     if (!(reduced.sums(diagonal, diagonal) > kTelling)) continue;
     background_.push_back(*all.columns[i]);
     means_.push_back(all.prior_mean[i]);
+    entry_.push_back(all.entry[i]);
     if (i < scaled) places_.push_back(i - first);
   }
-  with_robot_ = places_.size();
-  take_scale();
+  take_scales();
+}
+
+int Fitter::entry_of(const std::string& effect) const {
+  const auto at = std::ranges::find(entries_, effect);
+  return at == entries_.end() ? -1 : static_cast<int>(at - entries_.begin());
 }
 
 std::vector<Fitter::Beside> Fitter::beside(const Linearised& point) const {
-  const Columns c = columns_of(point);
+  const Columns c = columns_of(point, {});
   const Posterior p = Evidence::posterior(reduce(point, c), c.chosen, c.mean());
   std::vector<Beside> list;
-  for (std::size_t k = 0; k < with_robot_; ++k) {
+  for (std::size_t k = 0; k < places_.size(); ++k) {
     const Index i = static_cast<Index>(c.columns.size() - scaled_.size() + k);
     list.push_back({places_[k], p.mean[i], std::sqrt(p.covariance(i, i))});
   }
   return list;
 }
 
-void Fitter::take_scale() {
+void Fitter::take_scales() {
+  const Scales& s = evidence_.scales();
   scaled_ = background_;
-  for (std::size_t k = with_robot_; k < scaled_.size(); ++k) scaled_[k] *= evidence_.scales().robot;
+  for (std::size_t k = places_.size(); k < scaled_.size(); ++k) {
+    const auto entry = static_cast<std::size_t>(entry_[k]);
+    scaled_[k] *= entry < s.entries.size() ? s.entries[entry] : s.robot;
+  }
 }
 
 Columns Fitter::own_columns_of(const Linearised& point) {
@@ -198,20 +211,22 @@ Columns Fitter::own_columns_of(const Linearised& point) {
   return c;
 }
 
-void Fitter::add_background(const std::vector<BasisCoefficients>& list, Columns& to) const {
-  for (std::size_t k = 0; k < list.size(); ++k) to.add(list[k], means_[k]);
+void Fitter::add_background(const std::vector<BasisCoefficients>& list, const std::vector<std::string>& without,
+                            Columns& to) const {
+  for (std::size_t k = 0; k < list.size(); ++k)
+    if (entry_[k] < 0 || std::ranges::count(without, entries_[static_cast<std::size_t>(entry_[k])]) == 0)
+      to.add(list[k], means_[k], entry_[k]);
 }
 
-Columns Fitter::columns_of(const Linearised& point) const {
+Columns Fitter::columns_of(const Linearised& point, const std::vector<std::string>& effects) const {
   Columns c = own_columns_of(point);
-  add_background(scaled_, c);
+  add_background(scaled_, effects, c);
   return c;
 }
 
-Columns Fitter::unscaled_columns_of(const Linearised& point) const {
+Columns Fitter::unscaled_columns_of(const Linearised& point, const std::vector<std::string>& effects) const {
   Columns c = own_columns_of(point);
-  c.with_robot = c.columns.size() + with_robot_;
-  add_background(background_, c);
+  add_background(background_, effects, c);
   return c;
 }
 
@@ -231,7 +246,7 @@ BasisCoefficients Fitter::form_error(const Hypothesis& hypothesis, const Lineari
 }
 
 Posterior Fitter::posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const {
-  const Columns columns = columns_of(point);
+  const Columns columns = columns_of(point, hypothesis.effects());
   const BasisCoefficients sd =
       (evidence_.discrepancy_sd().cwiseAbs2() + form_error(hypothesis, point).cwiseAbs2()).cwiseSqrt();
   return solve(point, columns, evidence_.reduce(point.statistics, columns.columns, use, sd));
@@ -259,9 +274,9 @@ MatrixXd Fit::covariance() const {
   return point.directions.axes * posterior.covariance * point.directions.axes.transpose();
 }
 
-double Fitter::cost(const SufficientStatistics& residual, const VectorXd& at) const {
+double Fitter::cost(const Hypothesis& hypothesis, const SufficientStatistics& residual, const VectorXd& at) const {
   Columns c;
-  add_background(scaled_, c);
+  add_background(scaled_, hypothesis.effects(), c);
   const Reduced reduced = evidence_.reduce(residual, c.columns, all_flights(), evidence_.discrepancy_sd());
   return 0.5 * at.squaredNorm() - Evidence::posterior(reduced, c.chosen, c.mean()).log_evidence;
 }
@@ -317,7 +332,7 @@ Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters,
   l.at.head(hypothesis.shared()) = parameters.point.at;
   l.directions = joint_directions(hypothesis, parameters);
   l.columns.insert(l.columns.end(), own.begin(), own.end());
-  const Columns columns = columns_of(l);
+  const Columns columns = columns_of(l, hypothesis.effects());
   result.posterior = solve(l, columns, reduce(l, columns));
   return result;
 }
@@ -344,14 +359,15 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
   };
   for (int n = 1;; ++n) {
     const Linearised& l = fit.point;
-    const Columns columns = columns_of(l);
+    const Columns columns = columns_of(l, hypothesis.effects());
     const Reduced reduced = reduce(l, columns);
     fit.posterior = solve(l, columns, reduced);
     const VectorXd step = l.directions.axes * fit.posterior.mean;
     bool improved = n < iterations && step.cwiseAbs().maxCoeff() >= kConverged;
     if (improved) {
       // shares of the step, and steps that go less far where little is known; all tried at once
-      constexpr double kShares[] = {1, 0.5, 0.25, 0.1, 0.03}, kDampings[] = {1, 10, 100};
+      constexpr double kShares[] = {1.4, 1, 0.7, 0.5, 0.35, 0.25, 0.1, 0.03},
+                       kDampings[] = {0.3, 1, 3, 10, 30, 100, 300, 1000};
       std::vector<VectorXd> tries;
       for (const double share : kShares) tries.push_back(hypothesis.bounded(l.at + share * step));
       for (const double damping : kDampings)
@@ -366,7 +382,7 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
       io::parallel_for(left.size(), threads_, [&](std::size_t i) {
         if (left[i].empty()) return;
         statistics[i] = evidence_.statistics(left[i]);
-        costs[i] = cost(statistics[i], tries[i]);
+        costs[i] = cost(hypothesis, statistics[i], tries[i]);
       });
       const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
       improved = costs.back() - costs[best] >= kWorthwhile;

@@ -2,8 +2,6 @@
 // differences between vehicles that fly side by side as lanes.
 #pragma once
 
-#include <limits>
-
 #include "gap/evidence/evidence.hpp"
 #include "gap/evidence/hypothesis.hpp"
 
@@ -33,14 +31,10 @@ struct Fit {
   Eigen::MatrixXd covariance() const;
 };
 
-/// Columns beside each other, and the prior means of their coefficients.
-struct Columns {
-  std::vector<const BasisCoefficients*> columns;
-  std::vector<int> chosen;  ///< all of them
-  std::vector<double> prior_mean;
-  std::size_t with_robot = std::numeric_limits<std::size_t>::max();  ///< from which on they scale with the robot
-  Eigen::VectorXd mean() const;
-  void add(const BasisCoefficients& column, double mean);
+/// What every vehicle has of an entry, or of what looks like it: a column of standard normal coefficient.
+struct Background {
+  std::string entry;
+  BasisCoefficients column;
 };
 
 /// Residuals under many candidates; empty residuals for vehicles that come apart.
@@ -52,10 +46,9 @@ class Fitter {
   Fitter(const std::vector<PredictedFlight>& flights, const Evidence& evidence, int threads)
       : flights_(flights), evidence_(evidence), threads_(threads) {}
 
-  /// Columns that may take what they can beside every hypothesis, with standard normal coefficients: first those that are the same for
-  /// every robot, then those that are larger the more models of it are off. Of which the flights tell nothing, beside a fit's, are left
-  /// out.
-  void set_background(const Columns& same, const std::vector<BasisCoefficients>& with_robot, const Fit& beside);
+  /// Columns that may take what they can beside every hypothesis: first those that are the same for every robot, then what every vehicle
+  /// has of the entries, which hypotheses that name the entry do without. Of which the flights tell nothing, beside a fit's, are left out.
+  void set_background(const Columns& same, std::vector<Background> of_entries, const Fit& beside);
   /// What a point leaves for a column of those that are the same for every robot: its place among them, and its coefficient.
   struct Beside {
     std::size_t place;
@@ -63,15 +56,17 @@ class Fitter {
   };
   /// Those of which the flights tell.
   std::vector<Beside> beside(const Linearised& point) const;
-  /// From now on the background is that of a robot of the evidence's scale.
-  void take_scale();
+  /// From now on the background is that of a robot of the evidence's scales.
+  void take_scales();
+  /// Its place in Scales::entries; -1: none.
+  int entry_of(const std::string& effect) const;
   std::vector<char> all_flights() const { return std::vector<char>(flights_.size(), 1); }
   /// The columns of a point that do not come apart.
   static Columns own_columns_of(const Linearised& point);
-  /// Those, then the background's, as this robot has it.
-  Columns columns_of(const Linearised& point) const;
-  /// The same with the background of a robot whose scale is 1.
-  Columns unscaled_columns_of(const Linearised& point) const;
+  /// Those, then the background's, as this robot has it, but for what it has of these effects.
+  Columns columns_of(const Linearised& point, const std::vector<std::string>& effects) const;
+  /// The same with the background of a robot whose scales are 1.
+  Columns unscaled_columns_of(const Linearised& point, const std::vector<std::string>& effects) const;
   /// What some of the flights say alone, along all directions of a point.
   Posterior posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const;
   /// What the equations of its effects get wrong of themselves: shares of all that the sizes of each change.
@@ -98,20 +93,25 @@ class Fitter {
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
   /// `own`: whether the columns are those of the point itself.
   Fit improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters, bool own) const;
-  void average(const Hypothesis& hypothesis, Linearised& l) const;
+  std::vector<Eigen::VectorXd> around(const Hypothesis& hypothesis, const Eigen::VectorXd& at,
+                                      const Directions& directions, const std::vector<BasisCoefficients>& known,
+                                      std::vector<Candidate>& candidates) const;
+  void average(const std::vector<Residuals>& rows, const std::vector<Eigen::VectorXd>& shifts, Linearised& l) const;
   Reduced reduce(const Linearised& point, const Columns& columns) const;
   /// Along all directions. `damping`: of the steps, as so much more precision around the point itself (Levenberg).
   Posterior solve(const Linearised& point, const Columns& columns, Reduced reduced, double damping = 0) const;
-  double cost(const SufficientStatistics& residual, const Eigen::VectorXd& at) const;
+  double cost(const Hypothesis& hypothesis, const SufficientStatistics& residual, const Eigen::VectorXd& at) const;
 
   const std::vector<PredictedFlight>& flights_;
   const Evidence& evidence_;
   int threads_;
-  void add_background(const std::vector<BasisCoefficients>& list, Columns& to) const;
+  void add_background(const std::vector<BasisCoefficients>& list, const std::vector<std::string>& without,
+                      Columns& to) const;
   std::vector<BasisCoefficients> background_, scaled_;
-  std::vector<double> means_;        ///< of background_
-  std::size_t with_robot_ = 0;       ///< of the background, from which on it scales with the robot
-  std::vector<std::size_t> places_;  ///< of the columns before that, as they were given
+  std::vector<double> means_;         ///< of background_
+  std::vector<int> entry_;            ///< of background_: in entries_, or -1
+  std::vector<std::string> entries_;  ///< as in Scales::entries
+  std::vector<std::size_t> places_;   ///< of the columns that are of no entry, as they were given
 };
 
 }  // namespace flappy::gap

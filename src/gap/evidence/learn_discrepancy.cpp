@@ -25,10 +25,16 @@ struct Moment {
 };
 using Shares = std::array<std::array<std::array<Moment, kKinds>, kHarmonics + 1>, kChannels>;
 
+/// What a robot has of each entry, in units of what is usual: heavy-tailed.
+using Factors = std::map<std::string, double>;
+
 /// What every robot says of the variances, given those that are thought.
 void expect(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDiscrepancy& now, Shares& shares,
-            std::map<std::string, Moment>& sizes) {
-  for (const std::unique_ptr<RobotFit>& robot : robots) {
+            std::map<std::string, Moment>& sizes, std::vector<Factors>& factors) {
+  const double nu = now.spread.entry_freedom;
+  factors.resize(robots.size());
+  for (std::size_t r = 0; r < robots.size(); ++r) {
+    const std::unique_ptr<RobotFit>& robot = robots[r];
     robot->set_discrepancy(now);
     const Evidence& evidence = robot->evidence();
     const Linearised& at = robot->parameters().point;
@@ -36,18 +42,25 @@ void expect(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDis
     const Columns lines = robot->lines();
     for (std::size_t k = 0; k < lines.columns.size(); ++k) c.add(*lines.columns[k], lines.prior_mean[k]);
     const std::size_t first = c.columns.size();
-    std::vector<BasisCoefficients> scaled;
-    for (const SizeColumn& s : robot->sizes()) scaled.push_back(now.background_sd(s.effect) * s.change);
-    for (const BasisCoefficients& s : scaled) c.add(s, 0);
-    const Weighed w = evidence.weigh(at.statistics, c.columns, c.mean(), c.columns.size(),
-                                     robot->fitter().all_flights(), {}, Scales{}, {}, 1);
-    for (std::size_t k = 0; k < scaled.size(); ++k) {
+    std::vector<Background> background = robot->background(false);
+    for (Background& b : background) {
+      b.column *= factors[r].try_emplace(b.entry, 1).first->second;
+      c.add(b.column, 0);
+    }
+    const Weighed w = evidence.weigh(at.statistics, c, robot->fitter().all_flights(), {}, Scales{}, {}, 1);
+    std::map<std::string, Moment> own;
+    for (std::size_t k = 0; k < background.size(); ++k) {
       const auto i = static_cast<Index>(first + k);
-      const std::string& effect = robot->sizes()[k].effect;
-      Moment& m = sizes[effect];
-      m.sum += std::pow(now.background_sd(effect), 2) *
+      Moment& m = own[background[k].entry];
+      m.sum += std::pow(factors[r].at(background[k].entry), 2) *
                (w.posterior.mean[i] * w.posterior.mean[i] + w.posterior.covariance(i, i));
       m.count += 1;
+    }
+    for (const auto& [entry, m] : own) {
+      const double factor2 = (m.sum + nu) / (m.count + nu);
+      factors[r][entry] = std::sqrt(factor2);
+      sizes[entry].sum += std::pow(now.background_sd(entry), 2) * m.sum / factor2;
+      sizes[entry].count += m.count;
     }
     for (int g = 0; g < kGroups; ++g)
       for (int i = 0; i < evidence.basis().size(); ++i) {
@@ -95,12 +108,12 @@ std::map<std::string, std::size_t> classes_of(const std::vector<std::unique_ptr<
   for (const std::unique_ptr<RobotFit>& robot : robots) {
     const Evidence& evidence = robot->evidence();
     const BasisCoefficients sd = evidence.discrepancy_sd();
-    for (const SizeColumn& s : robot->sizes())
+    for (const Background& b : robot->background(false))
       for (int g = 0; g < kGroups; ++g)
         for (int i = 0; i < evidence.basis().size(); ++i)
           if (sd(g, i) > 0)
-            sums[s.effect][static_cast<std::size_t>(regimes_of(evidence.basis().kind(i)))] +=
-                std::pow(s.change(g, i) / sd(g, i), 2);
+            sums[b.entry][static_cast<std::size_t>(regimes_of(evidence.basis().kind(i)))] +=
+                std::pow(b.column(g, i) / sd(g, i), 2);
   }
   std::map<std::string, std::size_t> classes;
   for (const auto& [effect, of] : sums)
@@ -136,10 +149,11 @@ ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>&
     robots[i]->refit_beside_background();
   }
   if (io::interrupted()) throw io::InputError("stopped: nothing was learnt; accepted: all robots");
+  std::vector<Factors> factors;
   for (int n = 1; n <= kIterations; ++n) {
     Shares shares{};
     std::map<std::string, Moment> sizes;
-    expect(robots, now, shares, sizes);
+    expect(robots, now, shares, sizes, factors);
     if (n == kIterations) {
       shrink(shares);
       shrink(classes_of(robots), sizes);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstring>
 
 #include "io/config.hpp"
 #include "model/effects/registry.hpp"
@@ -33,8 +34,8 @@ constexpr const char* kShares =
 )";
 constexpr const char* kSpread =
     R"(# How much more or less than usual models of a robot are off: standard deviation of the log of its own factor, wide, for a robot may be
-# nearly the model; and how far its blocks (a kind of regime in a channel and harmonic) go their own ways about it, as degrees of
-# freedom of an inverse gamma law. Choices.
+# nearly the model; and how far its blocks (a kind of regime in a channel and harmonic), and what it has of each entry, go their own ways
+# about it, as degrees of freedom of an inverse gamma law. Choices.
 )";
 constexpr const char* kSensors =
     R"(# What laboratories declare of sensors is right to so much, whatever else is so: standard deviations. Choices.
@@ -63,7 +64,9 @@ Regimes regimes_of(BasisFunction function) {
 
 double ModelDiscrepancy::background_sd(const std::string& effect) const {
   const auto at = background.find(effect);
-  return at != background.end() ? at->second : background.at("other");
+  if (at != background.end()) return at->second;
+  if (effect.ends_with(kOfBoth)) return background_sd(effect.substr(0, effect.size() - std::strlen(kOfBoth)));
+  return background.at("other");
 }
 
 std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learnt) {
@@ -86,6 +89,7 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
   }
   text += std::string(kSpread) + "[spread]\nrobot_sd = " + number(d.spread.robot_sd) +
           "\nblock_freedom = " + number(d.spread.block_freedom) +
+          "\nentry_freedom = " + number(d.spread.entry_freedom) +
           (d.spread.beside_all ? "\nbeside_all = true\n\n" : "\n\n") + kSensors +
           "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") + "  # as it is mounted, about each axis\n" +
           "imu_place_m = " + sensor("imu_place") + "  # along each axis\npower_latency_s = " + sensor("power_delay") +
@@ -101,7 +105,7 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   ModelDiscrepancy d;
   const io::Table spread = root.table("spread");
   d.spread = {spread.number("robot_sd", io::positive()), spread.number("block_freedom", io::positive()),
-              spread.boolean_or("beside_all", false)};
+              spread.number("entry_freedom", io::positive()), spread.boolean_or("beside_all", false)};
   d.form_error = root.number("form_error", io::non_negative());
 
   for (int channel = 0; channel < kChannels; ++channel) {
@@ -127,7 +131,9 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   const io::Table background = root.table("background_sd");
   d.background["other"] = background.number("other", io::positive());
   for (const std::string& key : background.keys())
-    if (key == "other" || model::is_effect(key)) d.background[key] = background.number(key, io::positive());
+    if (key == "other" ||
+        model::is_effect(key.ends_with(kOfBoth) ? key.substr(0, key.size() - std::strlen(kOfBoth)) : key))
+      d.background[key] = background.number(key, io::positive());
   root.finish();
   return d;
 }

@@ -20,11 +20,12 @@ Regimes regimes_of(BasisFunction function);
 struct ModelDiscrepancy {
   /// Of one robot models are off by more or less than usual, and so is each kind of regime in each channel and harmonic of it (a
   /// block): log robot ~ N(0, robot_sd^2), and block^2 / robot^2 ~ inverse gamma of so many degrees of freedom, so that what is
-  /// left has heavy tails. What every vehicle has of an entry is the more, too, the more models of it are off.
+  /// left has heavy tails. So has what every vehicle has of an entry, and it is the more, too, the more models of it are off.
   struct Spread {
     double robot_sd, block_freedom;
-    bool
-        beside_all;  ///< what models are off by is what is left beside every entry together, and the same for every hypothesis
+    double entry_freedom;  ///< the same of what a vehicle has of an entry
+    /// What models are off by is what is left beside every entry together, and the same for every hypothesis.
+    bool beside_all;
   } spread{};
   /// How well an entry's equation describes the effect of its name: sd of every coefficient as a share of its own.
   double form_error = 0;
@@ -46,6 +47,9 @@ struct ModelDiscrepancy {
       shares{};
   std::map<std::string, double> background;  ///< by effect, and of "other"
 };
+
+/// After an entry with a size for each wing: what both wings have of it alike.
+inline constexpr const char* kOfBoth = "_of_both";
 
 /// As such a file; `learnt`: from what, for its head.
 std::string discrepancy_text(const ModelDiscrepancy& discrepancy, const std::string& learnt);

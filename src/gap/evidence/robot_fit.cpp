@@ -1,8 +1,11 @@
 #include "gap/evidence/robot_fit.hpp"
 
 #include <cmath>
+#include <numbers>
+#include <string_view>
 
 #include "io/parallel.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 
@@ -11,11 +14,19 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kMostRounds = 5;
+constexpr int kMostRounds = 5, kIterations = 6;
+/// So many times what is usual of an entry.
+constexpr double kWide = 5;
 /// Noise and what it lets the catalogue explain, by turns.
 constexpr int kRemainderRounds = 3;
 /// Nats that another round has to bring; and that a round may lose, as lines are no curves.
 constexpr double kWorthwhile = 2;
+
+/// Whether an entry has a size for each wing, and no other.
+bool of_sides(const model::EffectEntry& entry) {
+  return entry.info.sizes == 2 && std::string_view(entry.parameters[0].name).starts_with("left_") &&
+         std::string_view(entry.parameters[1].name).starts_with("right_");
+}
 
 }  // namespace
 
@@ -46,15 +57,57 @@ void RobotFit::refit_beside_background() {
   find_lines();
   set_background();
   if (evidence_.discrepancy().spread.beside_all) learn_remainder();
+  widen_entries();
+  parameters_ = fitter_.refit(plain_, parameters_, kIterations);
   take_scales(plain_, parameters_.point);
-  parameters_ = fitter_.refit(plain_, parameters_, 4);
-  take_scales(plain_, parameters_.point);
-  for (int round = 0; round < kMostRounds && fly_minors(); ++round) continue;
+  for (int round = 0; round < kMostRounds && refit_with_minors(); ++round) continue;
+}
+
+/// Parameters that were fitted where a robot may have little of an entry make up for what it has much of, and then nothing tells it: so the
+/// first fit is one where it may have much of each.
+void RobotFit::widen_entries() {
+  if (evidence_.discrepancy().spread.beside_all) return;
+  Scales wide = weigh(plain_, parameters_.point).scales;
+  for (double& times : wide.entries) times = kWide * wide.robot;
+  evidence_.set_scales(wide);
+  fitter_.take_scales();
+}
+
+void RobotFit::fit_parameters_from(const VectorXd& at, const Scales& scales) {
+  Weighed best = weigh(plain_, parameters_.point);
+  if (Weighed w = weigh(plain_, parameters_.point, scales); w.posterior.log_evidence > best.posterior.log_evidence)
+    best = std::move(w);
+  evidence_.set_scales(best.scales);
+  fitter_.take_scales();
+  double most = best.posterior.log_evidence;
+  for (const VectorXd& from : {VectorXd(parameters_.point.at), VectorXd(at.head(plain_.size()))}) {
+    Fit other = fitter_.fit(plain_, from, kIterations);
+    if (other.point.residual.empty()) continue;
+    const Weighed w = weigh(plain_, other.point);
+    if (!(w.posterior.log_evidence > most)) continue;
+    most = w.posterior.log_evidence;
+    parameters_ = std::move(other);
+    take_scales(plain_, parameters_.point);
+  }
+}
+
+double RobotFit::beyond_background(const std::string& effect, const VectorXd& sizes) const {
+  const double nu = evidence_.discrepancy().spread.entry_freedom, f = evidence_.scales().robot;
+  const auto improbable = [&](const std::string& entry, const VectorXd& own) {
+    const double sd = evidence_.discrepancy().background_sd(entry), n = static_cast<double>(own.size());
+    const double times = std::sqrt((own.squaredNorm() / (sd * sd) + nu * f * f) / (n + nu));
+    return 0.5 * own.squaredNorm() / std::pow(times * sd, 2) + n * std::log(times * sd) + evidence_.price_of(times);
+  };
+  const double usual = -0.5 * sizes.squaredNorm();
+  if (!of_sides(*model::find_effect(uncertain_.nominal(), effect))) return usual + improbable(effect, sizes);
+  const double half = std::numbers::sqrt2 / 2;
+  return usual + improbable(effect, VectorXd::Constant(1, half * (sizes[0] - sizes[1]))) +
+         improbable(effect + kOfBoth, VectorXd::Constant(1, half * (sizes[0] + sizes[1])));
 }
 
 /// From now on what the flights say of the minor figures is flown, and parameters are fitted beside it. False where that brought next to
 /// nothing, or so much less than nothing that it is taken back.
-bool RobotFit::fly_minors() {
+bool RobotFit::refit_with_minors() {
   const auto log_evidence = [&] { return weigh(plain_, parameters_.point).posterior.log_evidence; };
   const std::vector<double> minors = uncertain_.minors();
   const Fit parameters = parameters_;
@@ -68,7 +121,8 @@ bool RobotFit::fly_minors() {
     parameters_ = std::move(fit);
   };
   take(there, parameters_);
-  parameters_ = fitter_.fit(plain_, parameters_.mean(), parameters_, 6);
+  // with columns of its own: beside those of another point a fit may stay where it is, a hundred nats below what is near
+  parameters_ = fitter_.fit(plain_, parameters_.mean(), kIterations);
   take_scales(plain_, parameters_.point);
   const double gain = log_evidence() - before;
   if (gain < -kWorthwhile) {
@@ -85,12 +139,28 @@ Columns RobotFit::lines() const {
   return c;
 }
 
-void RobotFit::set_background() {
-  std::vector<BasisCoefficients> background;
-  for (const auto* list : {&sizes_, &shapes_})
-    for (const SizeColumn& c : *list) background.push_back(evidence_.discrepancy().background_sd(c.effect) * c.change);
-  fitter_.set_background(lines(), background, parameters_);
+std::vector<Background> RobotFit::background(bool shapes) const {
+  std::vector<Background> list;
+  for (std::size_t i = 0; i < sizes_.size(); ++i) {
+    const std::string& effect = sizes_[i].effect;
+    const double sd = evidence_.discrepancy().background_sd(effect);
+    if (!of_sides(*model::find_effect(uncertain_.nominal(), effect))) {
+      list.push_back({effect, sd * sizes_[i].change});
+      continue;
+    }
+    if (i + 1 == sizes_.size() || sizes_[i + 1].effect != effect) continue;
+    const std::string both = effect + kOfBoth;
+    const BasisCoefficients &left = sizes_[i].change, &right = sizes_[i + 1].change;
+    list.push_back({effect, sd * std::numbers::sqrt2 / 2 * (left - right)});
+    list.push_back({both, evidence_.discrepancy().background_sd(both) * std::numbers::sqrt2 / 2 * (left + right)});
+    ++i;
+  }
+  for (std::size_t i = 0; shapes && i < shapes_.size(); ++i)
+    list.push_back({shapes_[i].effect, evidence_.discrepancy().background_sd(shapes_[i].effect) * shapes_[i].change});
+  return list;
 }
+
+void RobotFit::set_background() { fitter_.set_background(lines(), background(true), parameters_); }
 
 /// What is left beside every size of the catalogue together is noise to every hypothesis.
 void RobotFit::learn_remainder() {
@@ -107,18 +177,66 @@ void RobotFit::learn_remainder() {
   }
   parameters_.point.statistics = evidence_.statistics(parameters_.point.residual);
   nominal_.statistics = evidence_.statistics(nominal_.residual);
-  fitter_.take_scale();
+  fitter_.take_scales();
 }
 
 void RobotFit::take_scales(const Hypothesis& hypothesis, const Linearised& at) {
-  evidence_.set_scales(weigh(hypothesis, at).scales);
-  fitter_.take_scale();
+  Weighed best = weigh(hypothesis, at);
+  // expectation-maximisation leaves to the blocks what they took first: one entry after another may have it instead
+  for (bool better = true; better;) {
+    evidence_.set_scales(best.scales);
+    fitter_.take_scales();
+    better = false;
+    if (evidence_.discrepancy().spread.beside_all) break;
+    if (const auto larger = larger_entry(hypothesis, at)) {
+      Weighed other = weigh(hypothesis, at, *larger);
+      better = other.posterior.log_evidence > best.posterior.log_evidence + kWorthwhile;
+      if (better) best = std::move(other);
+    }
+  }
+}
+
+/// The scales at hand, but for that entry which gains most where this robot has more of it; none where none gains. Given all else, what the
+/// flights say of its coefficients is normal with precision C^-1 - 1 and sum C^-1 m, m and C being their posterior.
+std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const Linearised& at) const {
+  const Scales& now = evidence_.scales();
+  const Columns c = fitter_.columns_of(at, hypothesis.effects());
+  const BasisCoefficients own = fitter_.form_error(hypothesis, at);
+  const Posterior p =
+      Evidence::posterior(evidence_.reduce(at.statistics, c.columns, fitter_.all_flights(),
+                                           (evidence_.discrepancy_sd().cwiseAbs2() + own.cwiseAbs2()).cwiseSqrt()),
+                          c.chosen, c.mean());
+  std::optional<Scales> best;
+  double most = kWorthwhile;
+  for (std::size_t e = 0; e < now.entries.size(); ++e) {
+    std::vector<Eigen::Index> columns;
+    for (std::size_t k = 0; k < c.entry.size(); ++k)
+      if (c.entry[k] == static_cast<int>(e)) columns.push_back(static_cast<Eigen::Index>(k));
+    if (columns.empty()) continue;
+    const auto n = static_cast<Eigen::Index>(columns.size());
+    const MatrixXd inverse = MatrixXd(p.covariance(columns, columns)).inverse();
+    const VectorXd sum = inverse * VectorXd(p.mean(columns));
+    const MatrixXd precision = inverse - MatrixXd::Identity(n, n);
+    const auto log_evidence = [&](double factor) {
+      const Eigen::LLT<MatrixXd> llt(factor * factor * precision + MatrixXd::Identity(n, n));
+      return 0.5 * factor * factor * sum.dot(llt.solve(sum)) - llt.matrixLLT().diagonal().array().log().sum() -
+             evidence_.price_of(factor * now.entries[e]);
+    };
+    const double before = log_evidence(1);
+    for (const double factor : {2.0, 4.0, 8.0, 16.0, 32.0, 64.0}) {
+      const double gain = log_evidence(factor) - before;
+      if (!(gain > most)) continue;
+      most = gain;
+      best = now;
+      best->entries[e] *= factor;
+    }
+  }
+  return best;
 }
 
 Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, const Scales& start,
                         std::optional<double> freeing_nats) const {
-  const Columns c = fitter_.unscaled_columns_of(at);
-  return evidence_.weigh(at.statistics, c.columns, c.mean(), c.with_robot, fitter_.all_flights(),
+  return evidence_.weigh(at.statistics, fitter_.unscaled_columns_of(at, hypothesis.effects()), fitter_.all_flights(),
                          fitter_.form_error(hypothesis, at), start, freeing_nats);
 }
 

@@ -24,6 +24,9 @@ class RobotFit {
   /// The same beside what sensors may have and every vehicle has a little of, which is found first.
   void refit_beside_background();
 
+  /// The parameters once more, from where a fit of more than them ended, and from the scales found there: kept where that is more probable.
+  void fit_parameters_from(const Eigen::VectorXd& at, const Scales& scales);
+
   void set_discrepancy(const ModelDiscrepancy& discrepancy) { evidence_.set_discrepancy(discrepancy); }
   const Evidence& evidence() const { return evidence_; }
   const Fitter& fitter() const { return fitter_; }
@@ -37,9 +40,14 @@ class RobotFit {
   const std::vector<SizeColumn>& sizes() const { return sizes_; }
   /// What it makes of that to have another shape, by a standard deviation of each.
   const std::vector<SizeColumn>& shapes() const { return shapes_; }
+  /// What every vehicle has of each entry. Of one that has a size for each wing, what the wings have apart, and what both have: there a
+  /// model of a wing is off for both alike. `shapes`: with what other shapes make of it.
+  std::vector<Background> background(bool shapes) const;
   /// What each number that a header may have wrong, and each minor figure of the vehicle, changes for one standard deviation, and what is
   /// thought of its coefficient, from what is flown on.
   Columns lines() const;
+  /// Nats by which coordinates of an entry's sizes are more probable of an effect than of what every vehicle has of it.
+  double beyond_background(const std::string& effect, const Eigen::VectorXd& sizes) const;
   /// What sensors are off by beyond their headers, given a fit.
   std::vector<SensorFinding> sensors(const Hypothesis& hypothesis, const Fit& fit) const;
 
@@ -57,7 +65,9 @@ class RobotFit {
   void find_sizes();
   void find_lines();
   void set_background();
-  bool fly_minors();
+  void widen_entries();
+  bool refit_with_minors();
+  std::optional<Scales> larger_entry(const Hypothesis& hypothesis, const Linearised& at) const;
   BasisCoefficients change(Residuals there, double steps) const;
 
   const std::vector<PredictedFlight>& flights_;

@@ -20,10 +20,12 @@ double log_twice_positive(double mean, double sd) {
 /// One effect at a time, beside the columns of a fit.
 class Screening {
  public:
-  Screening(const Evidence& evidence, const Fitter& fitter, const Fit& fit, const std::vector<SizeColumn>& columns)
-      : columns_(columns) {
-    Columns c = fitter.columns_of(fit.point);
+  Screening(const Evidence& evidence, const Fitter& fitter, const Fit& fit, const std::vector<std::string>& beside,
+            const std::vector<SizeColumn>& columns)
+      : evidence_(evidence), fitter_(fitter), columns_(columns) {
+    Columns c = fitter.columns_of(fit.point, beside);
     base_ = c.chosen;
+    entry_ = c.entry;
     for (const SizeColumn& column : columns) {
       at_.push_back(static_cast<int>(c.columns.size()));
       c.add(column.change, -column.from);
@@ -78,14 +80,22 @@ class Screening {
     const auto one_sided = [&](const Size& s) { return columns_[s.column].one_sided; };
     Screened s{effect, 0, VectorXd::Zero(columns_[own.front().column].unknowns)};
     for (const Size& size : own) s.coordinates[columns_[size.column].unknown] = columns_[size.column].from;
+    // without what every vehicle has of it
+    const int entry = fitter_.entry_of(effect);
+    std::vector<int> others;
+    for (const int i : base_)
+      if (entry < 0 || entry_[static_cast<std::size_t>(i)] != entry) others.push_back(i);
     for (bool whole = true; !own.empty(); whole = false) {
-      std::vector<int> chosen = base_;
+      std::vector<int> chosen = others;
       for (const Size& size : own) chosen.push_back(size.at);
       const Posterior p = Evidence::posterior(reduced, chosen, mean_(chosen));
-      const auto at = [&](std::size_t k) { return static_cast<Index>(base_.size() + k); };
+      const auto at = [&](std::size_t k) { return static_cast<Index>(others.size() + k); };
       const auto coordinate = [&](std::size_t k) { return columns_[own[k].column].from + own[k].from + p.mean[at(k)]; };
       if (whole) {
         s.gain = p.log_evidence - without_;
+        if (const std::vector<double>& have = evidence_.scales().entries;
+            others.size() < base_.size() && static_cast<std::size_t>(entry) < have.size())
+          s.gain += evidence_.price_of(have[static_cast<std::size_t>(entry)]);
         for (std::size_t k = 0; k < own.size(); ++k)
           if (one_sided(own[k])) s.gain += log_twice_positive(coordinate(k), std::sqrt(p.covariance(at(k), at(k))));
       }
@@ -102,7 +112,10 @@ class Screening {
     return s;
   }
 
+  const Evidence& evidence_;
+  const Fitter& fitter_;
   const std::vector<SizeColumn>& columns_;
+  std::vector<int> entry_;      ///< of the base, that it is background of
   std::vector<int> base_, at_;  ///< in the reduced sums: what stands beside every effect; each size
   Reduced reduced_;
   VectorXd mean_;
@@ -146,8 +159,8 @@ std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Vect
 }
 
 std::vector<Screened> screen(const Evidence& evidence, const Fitter& fitter, const Fit& fit,
-                             const std::vector<SizeColumn>& columns) {
-  const Screening screening(evidence, fitter, fit, columns);
+                             const std::vector<std::string>& beside, const std::vector<SizeColumn>& columns) {
+  const Screening screening(evidence, fitter, fit, beside, columns);
   std::vector<Screened> ranking;
   for (const SizeColumn& c : columns)
     if (ranking.empty() || ranking.back().effect != c.effect) ranking.push_back(screening.of(c.effect));

@@ -4,9 +4,9 @@
 //   z | theta ~ N(H^-1 d (right - normal change theta), H^-1)      H = 1 + d normal d
 // so that the expected squares of delta in a block follow, and with n coefficients in it the scale that makes them most probable,
 //   s^2 = (sum E[delta^2] / D^2 + nu f^2) / (n + nu),
-// f being the robot's own; the
-// coefficients of the background are of it, too (Dempster, Laird, Rubin 1977: the log evidence, with what is thought of the scales, never falls). The
-// evidence is taken where it is largest: the width of that maximum is the same for every hypothesis, to first order.
+// f being the robot's own. What every vehicle has of an entry has a scale alike, with tails of its own: a robot, or a maker's, may have much
+// of what looks like one entry, and a hypothesis pays for that what log_prior says (Dempster, Laird, Rubin 1977: the log evidence, with what is
+// thought of the scales, never falls). The evidence is taken where it is largest: the width of that maximum is the same for every hypothesis, to first order.
 #include <cmath>
 #include <limits>
 
@@ -46,15 +46,12 @@ double log_prior(double scale, double robot, double freedom) {
   return freedom / 2 * (2 * std::log(ratio) + 1 - ratio * ratio);
 }
 
-/// The most probable factor f of a robot: of blocks whose 1 / s^2 add up to `inverses`, and of coefficients ~ N(0, f^2) whose squares
-/// add up to `squares`.
-double robot_of(double freedom, double blocks, double inverses, double coefficients, double squares, double sd) {
+/// The most probable factor f of a robot: of scales s of nu degrees of freedom, whose nu add up to `freedom` and nu / s^2 to `inverses`.
+double robot_of(double freedom, double inverses, double sd) {
   constexpr double kFinest = 0.02;
   double best = 1, most = -std::numeric_limits<double>::infinity();
   for (double log_f = -5; log_f <= 3; log_f += kFinest) {
-    const double f2 = std::exp(2 * log_f);
-    const double value = freedom / 2 * (blocks * 2 * log_f - f2 * inverses) - coefficients * log_f -
-                         squares / (2 * f2) - 0.5 * std::pow(log_f / sd, 2);
+    const double value = freedom * log_f - std::exp(2 * log_f) * inverses / 2 - 0.5 * std::pow(log_f / sd, 2);
     if (value > most) most = value, best = std::exp(log_f);
   }
   return best;
@@ -65,6 +62,7 @@ Scales strided(const Scales& from, const Scales& to, double stride) {
   const auto go = [&](double a, double b) { return a * std::pow(b / a, stride); };
   Scales s = to;
   s.robot = go(from.robot, to.robot);
+  for (std::size_t e = 0; e < s.entries.size(); ++e) s.entries[e] = go(from.entries[e], to.entries[e]);
   for (std::size_t b = 0; b < s.blocks.size(); ++b)
     if (!from.free[b] && !to.free[b]) s.blocks[b] = go(from.blocks[b], to.blocks[b]);
   return s;
@@ -77,12 +75,16 @@ int Evidence::block_of(int group, BasisFunction function) {
   return (group / kCoefficients * (kHarmonics + 1) + harmonic) * kClasses + static_cast<int>(regimes_of(function));
 }
 
-Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
-                        const VectorXd& prior_mean, std::size_t with_robot, const std::vector<char>& use,
+double Evidence::price_of(double times) const {
+  return -log_prior(times, scales_.robot, discrepancy_.spread.entry_freedom);
+}
+
+Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& columns, const std::vector<char>& use,
                         const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats,
                         int iterations) const {
-  const Index q = basis_.size(), k = static_cast<Index>(columns.size());
-  const double nu = discrepancy_.spread.block_freedom;
+  const Index q = basis_.size(), k = static_cast<Index>(columns.columns.size());
+  const double nu = discrepancy_.spread.block_freedom, entry_nu = discrepancy_.spread.entry_freedom;
+  const VectorXd prior_mean = columns.mean();
   std::vector<int> seen;
   for (int g = 0; g < kGroups; ++g)
     for (std::size_t f = 0; f < use.size(); ++f)
@@ -99,7 +101,8 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
     auto [normal, right] = sums_of(residual, use, seen[n]);
     s.normal = std::move(normal);
     s.change.resize(q, k);
-    for (Index i = 0; i < k; ++i) s.change.col(i) = columns[static_cast<std::size_t>(i)]->row(seen[n]).transpose();
+    for (Index i = 0; i < k; ++i)
+      s.change.col(i) = columns.columns[static_cast<std::size_t>(i)]->row(seen[n]).transpose();
     s.all.resize(q, k + 1);
     s.all.leftCols(k).noalias() = s.normal * s.change;
     s.all.col(k) = right;
@@ -118,7 +121,14 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
   if (best.scales.blocks.empty()) best.scales.blocks.assign(kBlocks, 1);
   if (best.scales.free.empty()) best.scales.free.assign(kBlocks, 0);
   best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
-  const auto first_scaled = static_cast<Index>(std::min(with_robot, static_cast<std::size_t>(k)));
+  std::vector<int> of_entry;  // how many columns
+  for (const int e : columns.entry)
+    if (e >= 0) {
+      of_entry.resize(std::max(of_entry.size(), static_cast<std::size_t>(e) + 1));
+      ++of_entry[static_cast<std::size_t>(e)];
+    }
+  best.scales.entries.resize(std::max(best.scales.entries.size(), of_entry.size()), 1);
+  of_entry.resize(best.scales.entries.size());
   Scales now = best.scales, next = best.scales;
   double stride = 1;
   std::vector<Half> halves(seen.size());
@@ -141,7 +151,9 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
     });
     // columns in units of what is thought of their coefficients
     VectorXd unit = VectorXd::Ones(k + 1);
-    unit.segment(first_scaled, k - first_scaled).setConstant(now.robot);
+    for (Index i = 0; i < k; ++i)
+      if (const int e = columns.entry[static_cast<std::size_t>(i)]; e >= 0)
+        unit[i] = now.entries[static_cast<std::size_t>(e)];
     io::parallel_for(seen.size(), threads_, [&](std::size_t n) { halves[n].half *= unit.asDiagonal(); });
     Reduced reduced{unit.asDiagonal() * whole * unit.asDiagonal(), 0};
     for (const Half& h : halves) {
@@ -154,6 +166,8 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
     double thought = -0.5 * std::pow(std::log(now.robot) / discrepancy_.spread.robot_sd, 2);
     for (std::size_t b = 0; b < kBlocks; ++b)
       if (counts[b] > 0) thought += now.free[b] ? -*freeing_nats : held_ ? 0 : log_prior(now.blocks[b], now.robot, nu);
+    for (std::size_t e = 0; e < of_entry.size(); ++e)
+      if (of_entry[e] > 0 && !held_) thought += log_prior(now.entries[e], now.robot, entry_nu);
     w.posterior.log_evidence += thought;
     const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
     if (!(gain > 0)) {  // too far: from the best on, by a step that cannot fail
@@ -169,7 +183,7 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
       const Half& h = halves[n];
       const VectorXd z = h.llt.matrixU().solve(h.half.col(k) - h.half.leftCols(k) * w.posterior.mean);
       const MatrixXd inverse = h.llt.matrixU().solve(MatrixXd::Identity(q, q));
-      const MatrixXd moved = h.llt.matrixU().solve(h.half.leftCols(k) * spread);
+      const MatrixXd moved = h.llt.matrixU().solve(h.half.leftCols(k) * spread.triangularView<Eigen::Lower>());
       for (Index i = 0; i < q; ++i) {
         const double d = h.sd[i], shared = d > 0 ? 1 - std::pow(h.own[i] / d, 2) : 0;  // of the discrepancy's own
         const double square = d * d * (z[i] * z[i] + inverse.row(i).squaredNorm() + moved.row(i).squaredNorm());
@@ -187,9 +201,19 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
     for (const int g : seen)
       for (Index i = 0; i < q; ++i)
         total[static_cast<std::size_t>(block_of(g, basis_.kind(static_cast<int>(i))))] += best.squares(g, i);
-    double blocks = 0, inverses = 0, scaled = 0;
-    for (Index i = first_scaled; i < k; ++i)
-      scaled += (w_mean[i] * w_mean[i] + w_variance[i]) * next.robot * next.robot;
+    double freedom = 0, inverses = 0;
+    if (!held_) {
+      std::vector<double> squares(of_entry.size(), 0);
+      for (Index i = 0; i < k; ++i)
+        if (const int e = columns.entry[static_cast<std::size_t>(i)]; e >= 0)
+          squares[static_cast<std::size_t>(e)] += w_mean[i] * w_mean[i] + w_variance[i];
+      for (std::size_t e = 0; e < of_entry.size(); ++e) {
+        if (of_entry[e] == 0) continue;
+        const double f2 = next.robot * next.robot, scale2 = next.entries[e] * next.entries[e];
+        next.entries[e] = std::sqrt((squares[e] * scale2 + entry_nu * f2) / (of_entry[e] + entry_nu));
+        freedom += entry_nu, inverses += entry_nu / (next.entries[e] * next.entries[e]);
+      }
+    }
     for (std::size_t b = 0; b < kBlocks; ++b) {
       if (counts[b] == 0) continue;
       const double n = counts[b], f2 = next.robot * next.robot;
@@ -205,11 +229,9 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const std::vector<
           next.free[b] = 1;
         }
       }
-      if (!next.free[b]) blocks += 1, inverses += 1 / (next.blocks[b] * next.blocks[b]);
+      if (!next.free[b]) freedom += nu, inverses += nu / (next.blocks[b] * next.blocks[b]);
     }
-    if (!held_)
-      next.robot =
-          robot_of(nu, blocks, inverses, static_cast<double>(k - first_scaled), scaled, discrepancy_.spread.robot_sd);
+    if (!held_) next.robot = robot_of(freedom, inverses, discrepancy_.spread.robot_sd);
     now = strided(best.scales, next, stride);
   }
   return best;

@@ -323,6 +323,32 @@ TEST(RobotFit, FliesMinorFigures) {
   EXPECT_NEAR(minors.at("left.wing.com_m.x"), 0.0006 / 0.0003, 1) << "in units of what is believed";
 }
 
+// The same by looking for the factor t that makes sizes most probable as background: -log N(0, (t sd)^2), and what t costs.
+TEST(RobotFit, SaysHowMuchMoreProbableSizesAreOfAnEffect) {
+  const std::vector<PredictedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
+  const ModelDiscrepancy discrepancy = read_model_discrepancy();
+  const RobotFit robot(flights, uncertain(), discrepancy, {}, 2);
+  const auto background = [&](const std::string& entry, const Eigen::VectorXd& sizes) {
+    double least = 1e300;
+    for (double log_t = -3; log_t < 6; log_t += 1e-3) {
+      const double sd = std::exp(log_t) * discrepancy.background_sd(entry);
+      least = std::min(least, 0.5 * sizes.squaredNorm() / (sd * sd) + static_cast<double>(sizes.size()) * std::log(sd) +
+                                  robot.evidence().price_of(std::exp(log_t)));
+    }
+    return least;
+  };
+  const Eigen::Vector3d offset(0.4, -0.1, 1.2);
+  EXPECT_NEAR(robot.beyond_background("com_offset", offset),
+              background("com_offset", offset) - 0.5 * offset.squaredNorm(), 1e-5);
+  const Eigen::Vector2d one(0.5, 0), both(0.5, 0.5);
+  const auto sides = [&](double apart, double alike) {
+    return background("wing_damage", Eigen::VectorXd::Constant(1, apart)) +
+           background("wing_damage_of_both", Eigen::VectorXd::Constant(1, alike));
+  };
+  EXPECT_NEAR(robot.beyond_background("wing_damage", one), sides(0.5 / std::sqrt(2), 0.5 / std::sqrt(2)) - 0.125, 1e-5);
+  EXPECT_NEAR(robot.beyond_background("wing_damage", both), sides(0, std::sqrt(0.5)) - 0.25, 1e-5);
+}
+
 // A third of a beat and more: near 0 its derivative shows nothing of it.
 TEST(Screening, FindsALongDelay) {
   const std::vector<PredictedFlight> flights =
@@ -331,7 +357,7 @@ TEST(Screening, FindsALongDelay) {
   RobotFit robot(flights, prior, read_model_discrepancy(), {}, 2);
   robot.fit_parameters();
   robot.refit_beside_background();
-  const Screened first = screen(robot.evidence(), robot.fitter(), robot.parameters(), robot.sizes()).front();
+  const Screened first = screen(robot.evidence(), robot.fitter(), robot.parameters(), {}, robot.sizes()).front();
   EXPECT_EQ(first.effect, "command_delay");
   EXPECT_GT(first.gain, 50);
   const Unknown delay = unknowns_of("command_delay").front();
@@ -371,7 +397,9 @@ TEST(Evidence, IntegratesOutInClosedForm) {
   EXPECT_NEAR(log_p(none, true) - plain, by_column, error);
   // with all scales 1 nothing else is weighed, and what is thought of them costs nothing
   const BasisCoefficients usual = evidence.discrepancy_sd();
-  const Weighed once = evidence.weigh(s, {&unit}, Eigen::VectorXd::Constant(1, m), 1, {1}, {}, Scales{}, {}, 1);
+  Columns one;
+  one.add(unit, m);
+  const Weighed once = evidence.weigh(s, one, {1}, {}, Scales{}, {}, 1);
   EXPECT_NEAR(once.posterior.log_evidence, log_p(usual, true), error);
   EXPECT_EQ(evidence.reduce(s, {&unit}, {0}, none).sums.norm(), 0) << "a flight that is left out";
 }
@@ -398,7 +426,7 @@ TEST(Evidence, FindsHowFarModelsOfARobotAreOff) {
       delta(g, i) *= (Evidence::block_of(g, evidence.basis().kind(i)) == freed ? 30 : 3) * normal(random);
   const SufficientStatistics s = sums_of(evidence, flights[0], delta);
   const auto weigh = [&](std::optional<double> nats, int iterations) {
-    return evidence.weigh(s, {}, Eigen::VectorXd(), 0, {1}, {}, Scales{}, nats, iterations);
+    return evidence.weigh(s, {}, {1}, {}, Scales{}, nats, iterations);
   };
   const Weighed w = weigh({}, Evidence::kMostIterations);
   EXPECT_NEAR(std::log(w.scales.robot), std::log(3), 0.25);
@@ -414,6 +442,41 @@ TEST(Evidence, FindsHowFarModelsOfARobotAreOff) {
   EXPECT_EQ(std::count(freer.scales.free.begin(), freer.scales.free.end(), 1), 1);
   EXPECT_TRUE(freer.scales.free[static_cast<std::size_t>(freed)]);
   EXPECT_GT(freer.posterior.log_evidence, w.posterior.log_evidence);
+}
+
+// A robot that has twenty times what is usual of an entry, and rows that say so to a hundredth of that: its factor t has most of
+// log N(20; 0, t^2) + nu / 2 (2 log(f / t) + 1 - f^2 / t^2) at t^2 = (20^2 + nu f^2) / (1 + nu), and costs the last of these.
+TEST(Evidence, FindsHowMuchARobotHasOfAnEntry) {
+  const std::vector<PredictedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
+  const ModelDiscrepancy discrepancy = read_model_discrepancy();
+  const Evidence evidence(flights, discrepancy, 2);
+  BasisCoefficients column = BasisCoefficients::Zero(kGroups, evidence.basis().size());
+  constexpr int kGroup = kForceX * kCoefficients, kFunction = 0;
+  SufficientStatistics of_unit =
+      sums_of(evidence, flights[0], BasisCoefficients::Zero(kGroups, evidence.basis().size()));
+  column(kGroup, kFunction) = 1;
+  evidence.add(1, column, of_unit);
+  // large beside noise and discrepancy
+  column *=
+      100 * std::hypot(evidence.discrepancy_sd()(kGroup, kFunction), 1 / std::sqrt(of_unit.sums[0][kGroup][kFunction]));
+  constexpr double kTimes = 20;
+  const SufficientStatistics s = sums_of(evidence, flights[0], kTimes * column);
+  Columns usual, alone;
+  usual.add(column, 0, 0);
+  alone.add(column, 0);
+  const Weighed w = evidence.weigh(s, usual, {1}, {}, Scales{});
+  const double nu = discrepancy.spread.entry_freedom, f = w.scales.robot;
+  ASSERT_EQ(w.scales.entries.size(), 1u);
+  const double t2 = (kTimes * kTimes + nu * f * f) / (1 + nu);
+  EXPECT_NEAR(w.scales.entries[0] / std::sqrt(t2), 1, 0.03);
+  // a column of no entry has sd 1, whatever the robot: twenty of these are improbable by 200 nats, twenty of what is usual by some
+  const Weighed fixed = evidence.weigh(s, alone, {1}, {}, Scales{});
+  const double by_entry =
+      -0.5 * kTimes * kTimes / t2 - 0.5 * std::log(t2) + nu / 2 * (std::log(f * f / t2) + 1 - f * f / t2);
+  EXPECT_NEAR(w.posterior.log_evidence - fixed.posterior.log_evidence, by_entry + 0.5 * kTimes * kTimes, 4)
+      << "2 % for the robot's own factor, which moves along";
+  EXPECT_EQ(evidence.price_of(evidence.scales().robot), 0);
+  EXPECT_NEAR(evidence.price_of(10), nu / 2 * (2 * std::log(10) - 1 + 0.01), 1e-12);
 }
 
 }  // namespace
