@@ -13,7 +13,6 @@
 
 #include <Eigen/Dense>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 

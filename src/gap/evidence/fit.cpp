@@ -150,7 +150,7 @@ void Fitter::average(const std::vector<Residuals>& rows, const std::vector<Vecto
     for (VectorXd& sum : flight) sum /= n;
 }
 
-void Fitter::set_background(const Columns& same, std::vector<Background> of_entries, const Fit& beside) {
+void Fitter::set_background(const Columns& same, const std::vector<Background>& of_entries, const Fit& beside) {
   background_.clear();
   means_.clear();
   entry_.clear();

@@ -48,7 +48,7 @@ class Fitter {
 
   /// Columns that may take what they can beside every hypothesis: first those that are the same for every robot, then what every vehicle
   /// has of the entries, which hypotheses that name the entry do without. Of which the flights tell nothing, beside a fit's, are left out.
-  void set_background(const Columns& same, std::vector<Background> of_entries, const Fit& beside);
+  void set_background(const Columns& same, const std::vector<Background>& of_entries, const Fit& beside);
   /// What a point leaves for a column of those that are the same for every robot: its place among them, and its coefficient.
   struct Beside {
     std::size_t place;

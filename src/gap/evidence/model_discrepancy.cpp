@@ -45,6 +45,11 @@ constexpr const char* kBackground =
 # (1: the catalogue's prior). Only more than that is an effect. `other`: of every entry that is not named.
 )";
 
+/// What a name of a background is of: what both wings have of an entry is of that entry.
+std::string entry_of(const std::string& background) {
+  return background.ends_with(kOfBoth) ? background.substr(0, background.size() - std::strlen(kOfBoth)) : background;
+}
+
 }  // namespace
 
 Regimes regimes_of(BasisFunction function) {
@@ -65,8 +70,8 @@ Regimes regimes_of(BasisFunction function) {
 double ModelDiscrepancy::background_sd(const std::string& effect) const {
   const auto at = background.find(effect);
   if (at != background.end()) return at->second;
-  if (effect.ends_with(kOfBoth)) return background_sd(effect.substr(0, effect.size() - std::strlen(kOfBoth)));
-  return background.at("other");
+  const std::string entry = entry_of(effect);
+  return entry != effect ? background_sd(entry) : background.at("other");
 }
 
 std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learnt) {
@@ -131,9 +136,7 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   const io::Table background = root.table("background_sd");
   d.background["other"] = background.number("other", io::positive());
   for (const std::string& key : background.keys())
-    if (key == "other" ||
-        model::is_effect(key.ends_with(kOfBoth) ? key.substr(0, key.size() - std::strlen(kOfBoth)) : key))
-      d.background[key] = background.number(key, io::positive());
+    if (key == "other" || model::is_effect(entry_of(key))) d.background[key] = background.number(key, io::positive());
   root.finish();
   return d;
 }

@@ -69,16 +69,14 @@ void RobotFit::widen_entries() {
   if (evidence_.discrepancy().spread.beside_all) return;
   Scales wide = weigh(plain_, parameters_.point).scales;
   for (double& times : wide.entries) times = kWide * wide.robot;
-  evidence_.set_scales(wide);
-  fitter_.take_scales();
+  set_scales(wide);
 }
 
 void RobotFit::fit_parameters_from(const VectorXd& at, const Scales& scales) {
   Weighed best = weigh(plain_, parameters_.point);
   if (Weighed w = weigh(plain_, parameters_.point, scales); w.posterior.log_evidence > best.posterior.log_evidence)
     best = std::move(w);
-  evidence_.set_scales(best.scales);
-  fitter_.take_scales();
+  set_scales(best.scales);
   double most = best.posterior.log_evidence;
   for (const VectorXd& from : {VectorXd(parameters_.point.at), VectorXd(at.head(plain_.size()))}) {
     Fit other = fitter_.fit(plain_, from, kIterations);
@@ -180,12 +178,16 @@ void RobotFit::learn_remainder() {
   fitter_.take_scales();
 }
 
+void RobotFit::set_scales(const Scales& scales) {
+  evidence_.set_scales(scales);
+  fitter_.take_scales();
+}
+
 void RobotFit::take_scales(const Hypothesis& hypothesis, const Linearised& at) {
   Weighed best = weigh(hypothesis, at);
   // expectation-maximisation leaves to the blocks what they took first: one entry after another may have it instead
   for (bool better = true; better;) {
-    evidence_.set_scales(best.scales);
-    fitter_.take_scales();
+    set_scales(best.scales);
     better = false;
     if (evidence_.discrepancy().spread.beside_all) break;
     if (const auto larger = larger_entry(hypothesis, at)) {

@@ -65,6 +65,7 @@ class RobotFit {
   void find_sizes();
   void find_lines();
   void set_background();
+  void set_scales(const Scales& scales);
   void widen_entries();
   bool refit_with_minors();
   std::optional<Scales> larger_entry(const Hypothesis& hypothesis, const Linearised& at) const;
