@@ -186,20 +186,47 @@ auto Smoother::moved(const State& x, const Reading& r) const -> State {
   return y;
 }
 
-auto Smoother::transition(const State& x, const Reading& r) const -> Covariance {
+/// How an error goes on: F = 1 but for blocks of three. Errors are of angle (0), position (3), velocity (6), gyro bias (9),
+/// accelerometer bias (12).
+struct Smoother::Transition {
+  double dt;
+  Matrix3d turn, half;
+  Matrix3d leans;  ///< velocity for an angle
+
+  /// F times a matrix.
+  template <class M>
+  M of(M m) const {
+    const auto gained = (leans * m.template topRows<3>() - dt * half * m.template bottomRows<3>()).eval();
+    m.template middleRows<3>(3) += dt * m.template middleRows<3>(6) + dt / 2 * gained;
+    m.template middleRows<3>(6) += gained;
+    m.template topRows<3>() = (turn * m.template topRows<3>() - dt * m.template middleRows<3>(9)).eval();
+    return m;
+  }
+  /// Its transpose times a matrix.
+  template <class M>
+  M transposed_of(M m) const {
+    const auto gained = (m.template middleRows<3>(6) + dt / 2 * m.template middleRows<3>(3)).eval();
+    m.template middleRows<3>(6) += dt * m.template middleRows<3>(3);
+    m.template middleRows<3>(9) -= dt * m.template topRows<3>();
+    m.template bottomRows<3>() -= dt * half.transpose() * gained;
+    m.template topRows<3>() = (turn.transpose() * m.template topRows<3>() + leans.transpose() * gained).eval();
+    return m;
+  }
+};
+
+/// A pose's word about the errors: S^-1 of its innovation, and the gain.
+struct Smoother::Correction {
+  Eigen::Matrix<double, 6, 15> h;
+  Eigen::Matrix<double, 15, 6> gain;
+  Eigen::Matrix<double, 6, 6> inverse;
+  Eigen::Matrix<double, 6, 1> off;
+};
+
+auto Smoother::transition(const State& x, const Reading& r) const -> Transition {
   const double dt = r.duration_s;
-  const Vector3d turn = r.rotation_rad - dt * x.gyro_bias;
   const Matrix3d half = to_middle(x, r).toRotationMatrix();
-  const Matrix3d leans = -half * cross_matrix(r.gained_m_s - dt * x.accel_bias);  // velocity for an angle
-  Covariance f = Covariance::Identity();
-  f.block<3, 3>(0, 0) = exponential(-turn).toRotationMatrix();
-  f.block<3, 3>(0, 9).diagonal().setConstant(-dt);
-  f.block<3, 3>(3, 6).diagonal().setConstant(dt);
-  f.block<3, 3>(6, 0) = leans;
-  f.block<3, 3>(6, 12) = -dt * half;
-  f.block<3, 3>(3, 0) = dt / 2 * leans;
-  f.block<3, 3>(3, 12) = -dt * dt / 2 * half;
-  return f;
+  return {dt, exponential(dt * x.gyro_bias - r.rotation_rad).toRotationMatrix(), half,
+          -half * cross_matrix(r.gained_m_s - dt * x.accel_bias)};
 }
 
 void Smoother::add_noise(Covariance& p, const Reading& r, const Noise& noise) const {
@@ -226,27 +253,30 @@ void Smoother::displace(State& x, const Eigen::Matrix<double, 15, 1>& error) {
   x.accel_bias += error.segment<3>(12);
 }
 
-void Smoother::correct(State& x, Covariance& p, const Pose& z, const Noise& noise) {
+auto Smoother::correct(State& x, Covariance& p, const Pose& z, const Noise& noise) -> Correction {
   const Matrix3d R = x.attitude.toRotationMatrix();
-  Eigen::Matrix<double, 6, 15> h = Eigen::Matrix<double, 6, 15>::Zero();
-  h.block<3, 3>(0, 0).setIdentity();
-  h.block<3, 3>(3, 0) = R * cross_matrix(arm_m_);
-  h.block<3, 3>(3, 3).setIdentity();
-  Eigen::Matrix<double, 6, 1> off, variance;
-  off << logarithm(x.attitude.conjugate() * z.attitude), z.position_m - (x.position_m - R * arm_m_);
+  Correction c;
+  c.h.setZero();
+  c.h.block<3, 3>(0, 0).setIdentity();
+  c.h.block<3, 3>(3, 0) = R * cross_matrix(arm_m_);
+  c.h.block<3, 3>(3, 3).setIdentity();
+  Eigen::Matrix<double, 6, 1> variance;
+  c.off << logarithm(x.attitude.conjugate() * z.attitude), z.position_m - (x.position_m - R * arm_m_);
   variance << Vector3d::Constant(noise.pose_angle_rad2), Vector3d::Constant(noise.pose_position_m2);
-  const Eigen::Matrix<double, 15, 6> ph = p * h.transpose();
-  Eigen::Matrix<double, 6, 6> s = h * ph;
+  const Eigen::Matrix<double, 15, 6> ph = p * c.h.transpose();
+  Eigen::Matrix<double, 6, 6> s = c.h * ph;
   s.diagonal() += variance;
-  normalised_innovation_[0] += off.head<3>().dot(s.topLeftCorner<3, 3>().llt().solve(off.head<3>())) / 3;
-  normalised_innovation_[1] += off.tail<3>().dot(s.bottomRightCorner<3, 3>().llt().solve(off.tail<3>())) / 3;
-  const Eigen::Matrix<double, 15, 6> gain = s.llt().solve(ph.transpose()).transpose();
-  displace(x, gain * off);
-  p -= gain * ph.transpose();
+  normalised_innovation_[0] += c.off.head<3>().dot(s.topLeftCorner<3, 3>().llt().solve(c.off.head<3>())) / 3;
+  normalised_innovation_[1] += c.off.tail<3>().dot(s.bottomRightCorner<3, 3>().llt().solve(c.off.tail<3>())) / 3;
+  c.inverse = s.llt().solve(Eigen::Matrix<double, 6, 6>::Identity());
+  c.gain = ph * c.inverse;
+  displace(x, c.gain * c.off);
+  p -= c.gain * ph.transpose();
   p = (0.5 * (p + p.transpose())).eval();
+  return c;
 }
 
-auto Smoother::filter(const std::vector<Pose>& poses, const Noise& noise) -> std::vector<Covariance> {
+auto Smoother::filter(const std::vector<Pose>& poses, const Noise& noise) -> Filtered {
   Covariance p = Covariance::Zero();
   p.diagonal() << Vector3d::Constant(noise.pose_angle_rad2), Vector3d::Constant(noise.pose_position_m2),
       Vector3d::Constant(kVelocitySd_m_s * kVelocitySd_m_s), noise.gyro_bias_rad2_s2,
@@ -258,49 +288,53 @@ auto Smoother::filter(const std::vector<Pose>& poses, const Noise& noise) -> std
   p = (from_pose * p * from_pose.transpose()).eval();
   State x{first.attitude, first.position_m + first.attitude * arm_m_, Vector3d::Zero(), Vector3d::Zero(),
           Vector3d::Zero()};
-  std::vector<Covariance> list;
-  list.reserve(nodes_.size());
+  Filtered list;
+  list.covariance.reserve(nodes_.size());
+  list.transition.reserve(nodes_.size());
   std::size_t next_pose = 1;  // the first is the start
-  double corrections = 0;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     if (i > 0) {
       const Reading r = reading(nodes_[i - 1].interval, nodes_[i - 1].t_s, nodes_[i].t_s);
-      const Covariance f = transition(x, r);
-      p = (f * p * f.transpose()).eval();
+      const Transition f = transition(x, r);
+      p = f.of(Covariance(f.of(p).transpose()));
       add_noise(p, r, noise);
       x = moved(x, r);
+      list.transition.push_back(f);
     }
-    for (; next_pose < poses.size() && pose_node_[next_pose] == i; ++next_pose, ++corrections)
-      correct(x, p, poses[next_pose], noise);
+    for (; next_pose < poses.size() && pose_node_[next_pose] == i; ++next_pose)
+      list.correction.push_back(correct(x, p, poses[next_pose], noise));
     nodes_[i].state = x;
-    list.push_back(p);
+    list.covariance.push_back(p);
   }
-  for (int k = 0; k < 2; ++k) normalised_innovation_[k] /= std::max(corrections, 1.0);
+  for (int k = 0; k < 2; ++k) normalised_innovation_[k] /= std::max(static_cast<double>(list.correction.size()), 1.0);
   return list;
 }
 
-void Smoother::smooth(std::vector<Covariance> covariance, const Noise& noise) {
-  std::vector<Covariance>& p = covariance;
-  for (std::size_t i = nodes_.size() - 1; i-- > 0;) {
-    const Reading r = reading(nodes_[i].interval, nodes_[i].t_s, nodes_[i + 1].t_s);
-    State& x = nodes_[i].state;
-    const State after = moved(x, r), &better = nodes_[i + 1].state;
-    const Covariance f = transition(x, r);
-    const Covariance fp = f * p[i];
-    Covariance ahead = fp * f.transpose();
-    add_noise(ahead, r, noise);
-    const Covariance gain = ahead.llt().solve(fp).transpose();
-    Eigen::Matrix<double, 15, 1> off;
-    off << logarithm(after.attitude.conjugate() * better.attitude), better.position_m - after.position_m,
-        better.velocity_m_s - after.velocity_m_s, better.gyro_bias - after.gyro_bias,
-        better.accel_bias - after.accel_bias;
-    displace(x, gain * off);
-    p[i] += gain * (p[i + 1] - ahead) * gain.transpose();
+/// Backwards by the adjoint of the errors, lambda, and its covariance: what is smoothed is the filtered state + P lambda, of covariance
+/// P - P Lambda P.
+void Smoother::smooth(const Filtered& filtered, const Noise& noise) {
+  Eigen::Matrix<double, 15, 1> lambda = Eigen::Matrix<double, 15, 1>::Zero();
+  Covariance of_lambda = Covariance::Zero();
+  covariance_.resize(pose_node_.size());
+  std::size_t pose = pose_node_.size();
+  for (std::size_t i = nodes_.size(); i-- > 0;) {
+    const Covariance& p = filtered.covariance[i];
+    displace(nodes_[i].state, p * lambda);
+    for (std::size_t k = pose; k-- > 0 && pose_node_[k] == i;) covariance_[k] = p - p * of_lambda * p;
+    for (; pose > 1 && pose_node_[pose - 1] == i; --pose) {
+      const Correction& c = filtered.correction[pose - 2];
+      lambda += c.h.transpose() * (c.inverse * c.off - c.gain.transpose() * lambda);
+      const Covariance kept = Covariance::Identity() - c.gain * c.h;
+      of_lambda = kept.transpose() * of_lambda * kept + c.h.transpose() * c.inverse * c.h;
+    }
+    if (i == 0) break;
+    const Transition& f = filtered.transition[i - 1];
+    lambda = f.transposed_of(lambda);
+    of_lambda = f.transposed_of(Covariance(f.transposed_of(of_lambda).transpose()));
   }
   const State& first = nodes_.front().state;
   normalised_innovation_[2] = std::max((first.gyro_bias.array().square() / noise.gyro_bias_rad2_s2.array()).mean(),
                                        first.accel_bias.squaredNorm() / (3 * kAccelBiasSd_m_s2 * kAccelBiasSd_m_s2));
-  for (const std::size_t node : pose_node_) covariance_.push_back(p[node]);
 }
 
 std::size_t Smoother::node_before(double t_s) const {

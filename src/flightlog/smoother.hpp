@@ -1,8 +1,9 @@
 // The motion of a recorded flight: motion capture and IMU through a fixed-interval smoother.
 //
 // Forward, an error-state Kalman filter carries the pose of the IMU by its own samples and corrects it where motion
-// capture saw the torso; backward, the smoother of Rauch, Tung and Striebel (AIAA J. 3, 1965) gives every instant what
-// was learnt after it. Errors, true = estimate + error, 15 in this order, 3 each:
+// capture saw the torso; backward, the modified smoother of Bryson and Frazier (Bierman, Factorization Methods for Discrete Sequential
+// Estimation, 1977), which inverts nothing as large as the state, gives every instant what was learnt after it. Errors, true = estimate +
+// error, 15 in this order, 3 each:
 //   angle (in B: R_true = R exp(angle)), position, velocity (both of the IMU, in W), gyro bias, accelerometer bias
 //
 // The IMU is taken as flight.toml declares it: a sample is the mean over its interval, centred latency + 1/(2 pi
@@ -87,21 +88,29 @@ class Smoother {
   struct Noise;
   struct Reading;
   struct Pose;
+  struct Transition;
+  struct Correction;
+  /// What the filter leaves: of every node, from every node to the next, of every pose but the first.
+  struct Filtered {
+    std::vector<Covariance> covariance;
+    std::vector<Transition> transition;
+    std::vector<Correction> correction;
+  };
 
   void read_imu(const FlightLog& log);
   std::vector<Pose> read_poses(const FlightLog& log) const;
   void lay_nodes(const std::vector<Pose>& poses);
-  std::vector<Covariance> filter(const std::vector<Pose>& poses, const Noise& noise);
-  void smooth(std::vector<Covariance> covariance, const Noise& noise);
+  Filtered filter(const std::vector<Pose>& poses, const Noise& noise);
+  void smooth(const Filtered& filtered, const Noise& noise);
 
   Eigen::Vector3d mean(const MeanSpline& signal, double from_s, double to_s) const;
   std::size_t node_before(double t_s) const;
   Reading reading(std::size_t interval, double from_s, double to_s) const;
   static Eigen::Quaterniond to_middle(const State& x, const Reading& r);
   State moved(const State& x, const Reading& r) const;
-  Covariance transition(const State& x, const Reading& r) const;
+  Transition transition(const State& x, const Reading& r) const;
   void add_noise(Covariance& p, const Reading& r, const Noise& noise) const;
-  void correct(State& x, Covariance& p, const Pose& z, const Noise& noise);
+  Correction correct(State& x, Covariance& p, const Pose& z, const Noise& noise);
   static void displace(State& x, const Eigen::Matrix<double, 15, 1>& error);
 
   double gravity_m_s2_, longest_unseen_s_;
