@@ -41,13 +41,12 @@ BeatProjection::BeatProjection(const std::vector<double>& beat, const std::vecto
 }
 
 void BeatProjection::project(const double* samples, std::size_t width, double* rows) const {
-  for (const Weight& w : weights_) {
-    if (!covered_[w.beat]) continue;
-    const double* from = samples + w.sample * width;
-    double* to = rows + w.beat * kCoefficients * width;
+  for_each([&](std::size_t sample, std::size_t beat, const double(&f)[kCoefficients]) {
+    const double* from = samples + sample * width;
+    double* to = rows + beat * kCoefficients * width;
     for (int c = 0; c < kCoefficients; ++c, to += width)
-      for (std::size_t i = 0; i < width; ++i) to[i] += w.f[c] * from[i];
-  }
+      for (std::size_t i = 0; i < width; ++i) to[i] += f[c] * from[i];
+  });
 }
 
 }  // namespace flappy::gap

@@ -25,6 +25,12 @@ class BeatProjection {
   bool covers(std::size_t beat) const { return covered_[beat] != 0; }
   /// Adds `samples` of `width` signals side by side, [sample][width], as [beat][coefficient][width].
   void project(const double* samples, std::size_t width, double* rows) const;
+  /// Calls use(sample, beat, weights[kCoefficients]) wherever a sample counts.
+  template <class Use>
+  void for_each(const Use& use) const {
+    for (const Weight& w : weights_)
+      if (covered_[w.beat]) use(w.sample, w.beat, w.f);
+  }
 
  private:
   struct Weight {

@@ -41,7 +41,7 @@ void reset_block(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& t
       const Matrix3<V> halfway = rotation_matrix(rotated(begin, all(0.25) * turn));
       const Vec3<V> missed =
           per_interval * flight::rotation_vector(flight::from_to(flown.attitude, quaternion(to.attitude)));
-      store(missed, kept.rows + kTurnRate, first);
+      store(all(-1) * per_interval * missed, kept.rows + kTurning, first);
       store(transpose_times(halfway, force), kept.rows + kForce, first);
       x.left.stroke_rad.store(kept.rows[kStroke] + first);
       x.right.stroke_rad.store(kept.rows[kStroke + 1] + first);
@@ -61,10 +61,21 @@ void reset_block(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& t
   }
 }
 
+void project_block(const Flown* sample, const double* weights, int count, std::size_t width, Flown* rows) {
+  const std::size_t n = width * sim::kLanes<Flown>;
+  for (int c = 0; c < count; ++c, rows += n) {
+    const V weight = all(weights[c]);
+    for (std::size_t i = 0; i < n; i += kWidth<Flown>)
+      (V::load(rows + i) + weight * V::load(sample + i)).store(rows + i);
+  }
+}
+
 }  // namespace
 
 extern const ResetBlock reset_block_kernel;
 const ResetBlock reset_block_kernel = reset_block;
+extern const ProjectBlock project_block_kernel;
+const ProjectBlock project_block_kernel = project_block;
 
 }  // namespace FLAPPY_ISA
 }  // namespace flappy::gap

@@ -17,9 +17,9 @@ struct TorsoAt {
 
 /// What a vehicle's sensors would have shown over an interval, as rows of lanes.
 enum ResetRow : int {
-  kTurnRate = 0,  ///< mean over the interval, recorded less flown, rad/s, B: 3 rows
-  kForce = 3,     ///< mean specific force at the IMU, m/s^2, B as half-way: 3 rows
-  kStroke = 6,    ///< at the end, left and right
+  kTurning = 0,  ///< mean change of rate over the interval, flown less recorded, rad/s^2, B: 3 rows
+  kForce = 3,    ///< mean specific force at the IMU, m/s^2, B as half-way: 3 rows
+  kStroke = 6,   ///< at the end, left and right
   kResetRows = 8
 };
 
@@ -33,5 +33,8 @@ struct ResetBlockState {
 /// `from` null it only puts. The body rate becomes what makes the flown turn the recorded one.
 using ResetBlock = void (*)(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
                             const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept);
+
+/// Adds a sample of `width` signals of all lanes to the rows of a beat, each of `weights` times: rows [weight][signal][lane].
+using ProjectBlock = void (*)(const Flown* sample, const double* weights, int count, std::size_t width, Flown* rows);
 
 }  // namespace flappy::gap

@@ -11,6 +11,7 @@
 
 namespace flappy::gap {
 FLAPPY_KERNELS(ResetBlock, reset_block_kernel);
+FLAPPY_KERNELS(ProjectBlock, project_block_kernel);
 
 namespace {
 
@@ -18,6 +19,8 @@ constexpr std::size_t kVehicles = sim::kLanes<Flown>;
 /// Channels of which a vehicle predicts a sample at every interval, and those of the meter.
 constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
 static_assert(kPathX == kSignals + kMetered);
+static_assert(kTorqueX == int{kTurning} && kForceX == int{kForce} && kStrokeLeft == int{kStroke} &&
+              kSignals == kResetRows);
 
 /// Steps by which rounding may put an instant off.
 constexpr double kSameStep = 1e-3;
@@ -31,16 +34,17 @@ constexpr double kKernel[] = {1.0 / 9, 2.0 / 9, 3.0 / 9, 2.0 / 9, 1.0 / 9};
 /// Voltages of steps, some steps later.
 class ShiftedVoltage {
  public:
-  bool operator==(const ShiftedVoltage&) const = default;
   explicit ShiftedVoltage(double steps)
       : whole_(static_cast<std::ptrdiff_t>(std::floor(steps))), share_(steps - std::floor(steps)) {}
-  double of(const std::vector<double>& voltage_V, std::size_t step) const {
-    const auto at = [&](std::ptrdiff_t i) {
-      return voltage_V[static_cast<std::size_t>(
-          std::clamp<std::ptrdiff_t>(i, 0, static_cast<std::ptrdiff_t>(voltage_V.size()) - 1))];
-    };
-    const auto i = static_cast<std::ptrdiff_t>(step) - whole_;
-    return share_ == 0 ? at(i) : (1 - share_) * at(i) + share_ * at(i - 1);
+  /// Of `count` steps from `step` on, one for every `stride`.
+  void put(const std::vector<double>& voltage_V, std::size_t step, int count, std::size_t stride, Flown* to) const {
+    const auto size = static_cast<std::ptrdiff_t>(voltage_V.size()), first = static_cast<std::ptrdiff_t>(step) - whole_;
+    const bool inside = first >= 1 && first + count <= size;
+    for (std::ptrdiff_t i = first; i < first + count; ++i, to += stride) {
+      const auto now = static_cast<std::size_t>(inside ? i : std::clamp<std::ptrdiff_t>(i, 0, size - 1));
+      const auto before = static_cast<std::size_t>(inside ? i - 1 : std::clamp<std::ptrdiff_t>(i - 1, 0, size - 1));
+      *to = static_cast<Flown>((1 - share_) * voltage_V[now] + share_ * voltage_V[before]);
+    }
   }
 
  private:
@@ -112,8 +116,9 @@ void ResetPrediction::lay_power(std::size_t first_beat) {
 namespace {
 
 /// Of signals side by side, [beat][coefficient][width], those of one lane of `stride`.
-void put_channels(const Rows& together, std::size_t beats, std::size_t signals, std::size_t stride, std::size_t lane,
-                  std::size_t first_channel, Rows& rows) {
+template <class Value>
+void put_channels(const std::vector<Value>& together, std::size_t beats, std::size_t signals, std::size_t stride,
+                  std::size_t lane, std::size_t first_channel, Rows& rows) {
   for (std::size_t j = 0; j < beats; ++j)
     for (std::size_t c = 0; c < kCoefficients; ++c)
       for (std::size_t s = 0; s < signals; ++s)
@@ -232,6 +237,7 @@ bool ResetPrediction::covers(std::size_t beat, int channel) const {
 std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& candidates) const {
   const Recording& r = recording_;
   const ResetBlock reset = *reset_block_kernels[sim::place_of("")];
+  const ProjectBlock project = *project_block_kernels[sim::place_of("")];
   sim::Batch<Flown> batch(kVehicles, candidates.front()->vehicle, {kPredictionStep_s, 1, r.world, {}});
   if (r.log.power) sim::storage_of(batch).keep_effects(0);  // the meter needs their rows
   std::vector<ShiftedVoltage> shifted;
@@ -253,36 +259,25 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
 
   const int longest = *std::ranges::max_element(r.steps);
   std::vector<Flown> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
-  std::vector<double> samples(r.intervals() * kSignals * kVehicles, 0);
+  constexpr std::size_t kSample = kSignals * kVehicles;
+  std::vector<Flown> samples(r.intervals() * kSample);
   // of the last step before an interval, and its own
   constexpr std::size_t kMeter = kMetered * kVehicles;
   std::vector<Flown> meter(r.log.power ? (static_cast<std::size_t>(longest) + 1) * kMeter : 0);
   std::vector<double> power;
   std::size_t step = 0, metered = 0;
   for (std::size_t k = 0; k < r.intervals(); ++k) {
-    for (int i = 0; i < r.steps[k]; ++i, ++step) {
-      Flown* to = &voltages_V[static_cast<std::size_t>(i) * 2 * kVehicles];
-      for (std::size_t lane = 0; lane < kVehicles; ++lane) {
-        const bool again = lane > 0 && shifted[lane] == shifted[lane - 1];
-        to[lane] = again ? to[lane - 1] : static_cast<Flown>(shifted[lane].of(r.left_V, step));
-        to[kVehicles + lane] = again ? to[kVehicles + lane - 1] : static_cast<Flown>(shifted[lane].of(r.right_V, step));
-      }
+    for (std::size_t lane = 0; lane < kVehicles; ++lane) {
+      shifted[lane].put(r.left_V, step, r.steps[k], 2 * kVehicles, &voltages_V[lane]);
+      shifted[lane].put(r.right_V, step, r.steps[k], 2 * kVehicles, &voltages_V[kVehicles + lane]);
     }
+    step += static_cast<std::size_t>(r.steps[k]);
     sim::BlockEffects<Flown> in_force = storage.effects_of(0);
     in_force.voltages_V = voltages_V.data();
     if (r.log.power) in_force.meter = meter.data() + kMeter;
     storage.kernel(block, in_force, plan, 0, r.steps[k], {});
     reset(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
-    double* to = &samples[k * kSignals * kVehicles];
-    const double per_interval = 1 / r.interval_s(k);
-    for (std::size_t lane = 0; lane < kVehicles; ++lane) {
-      for (std::size_t i = 0; i < 3; ++i) {
-        to[(kTorqueX + i) * kVehicles + lane] = -per_interval * double{kept.rows[kTurnRate + i][lane]};
-        to[(kForceX + i) * kVehicles + lane] = kept.rows[kForce + i][lane];
-      }
-      to[kStrokeLeft * kVehicles + lane] = kept.rows[kStroke][lane];
-      to[kStrokeRight * kVehicles + lane] = kept.rows[kStroke + 1][lane];
-    }
+    std::copy_n(&kept.rows[0][0], kSample, &samples[k * kSample]);
     for (; metered < power_step_.size() && power_step_[metered] + 1 < step; ++metered) {
       const double late = power_late_[metered];
       const Flown* now = &meter[(power_step_[metered] + 1 + static_cast<std::size_t>(r.steps[k]) - step) * kMeter];
@@ -294,8 +289,10 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
     if (r.log.power) std::copy_n(&meter[static_cast<std::size_t>(r.steps[k]) * kMeter], kMeter, meter.data());
   }
 
-  Rows together(r.beats * kCoefficients * kSignals * kVehicles, 0);
-  imu_.project(samples.data(), kSignals * kVehicles, together.data());
+  std::vector<Flown> together(r.beats * kCoefficients * kSample, 0);
+  imu_.for_each([&](std::size_t sample, std::size_t beat, const double(&weights)[kCoefficients]) {
+    project(&samples[sample * kSample], weights, kCoefficients, kSignals, &together[beat * kCoefficients * kSample]);
+  });
   Rows metered_together(r.log.power ? r.beats * kCoefficients * kMetered * kVehicles : 0, 0);
   if (r.log.power) power_.project(power.data(), kMetered * kVehicles, metered_together.data());
   std::vector<Rows> result(candidates.size());
