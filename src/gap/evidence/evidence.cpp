@@ -27,14 +27,12 @@ struct WithoutDiscrepancy {
     MatrixXd precision = sd.asDiagonal() * normal * sd.asDiagonal();
     precision.diagonal().array() += 1;
     llt.compute(precision);
-    half = of(normal);
   }
   /// Of sums basis x a.
   MatrixXd of(const MatrixXd& sums) const { return llt.matrixL().solve(sd.asDiagonal() * sums); }
 
   VectorXd sd;
   Eigen::LLT<MatrixXd> llt;  ///< of delta's precision given the rest, in units of its prior's sd
-  MatrixXd half;             ///< of the basis
 };
 
 }  // namespace
@@ -221,11 +219,14 @@ BasisCoefficients Evidence::basis_coefficients(const Residuals& rows) const {
   BasisCoefficients result = BasisCoefficients::Zero(kGroups, q);
   for (int channel = 0; channel < kChannels; ++channel) {
     MatrixXd right = MatrixXd::Zero(q, kCoefficients);
-    for (std::size_t f = 0; f < flights_.size(); ++f)
+    for (std::size_t f = 0; f < flights_.size(); ++f) {
+      MatrixXd counted = MatrixXd::Zero(basis_.values(f).rows(), kCoefficients);
       for_rows(f, channel, [&](std::size_t j, bool) {
-        const Eigen::Map<const Eigen::RowVectorXd> y(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
-        right.noalias() += basis_.values(f).row(static_cast<Index>(j)).transpose() * y;
+        counted.row(static_cast<Index>(j)) =
+            Eigen::Map<const Eigen::RowVectorXd>(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
       });
+      right.noalias() += basis_.values(f).transpose() * counted;
+    }
     result.middleRows(Index{channel} * kCoefficients, kCoefficients) =
         (plain_inverse_[static_cast<std::size_t>(channel)] * right).transpose();
   }
@@ -239,13 +240,14 @@ SufficientStatistics Evidence::statistics(const Residuals& residual) const {
     const MatrixXd& basis = basis_.values(f);
     for (int g = 0; g < kGroups; ++g) {
       if (!has_rows(g)) continue;
-      VectorXd& sum = s.sums[f][static_cast<std::size_t>(g)];
+      VectorXd counted = VectorXd::Zero(basis.rows());
       for_whitened(f, g, [&](std::size_t j, double now, double past) {
         const auto i = static_cast<Index>(j);
         const double y = now * residual[f][row_of(j, g)] - (past != 0 ? past * residual[f][row_of(j - 1, g)] : 0);
-        sum += (now * y) * basis.row(i).transpose();
-        if (past != 0) sum -= (past * y) * basis.row(i - 1).transpose();
+        counted[i] += now * y;
+        if (past != 0) counted[i - 1] -= past * y;
       });
+      s.sums[f][static_cast<std::size_t>(g)].noalias() = basis.transpose() * counted;
     }
   }
   return s;
@@ -299,21 +301,25 @@ std::pair<MatrixXd, VectorXd> Evidence::sums_of(const SufficientStatistics& resi
 }
 
 Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
-                         const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const {
+                         const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
+                         const MatrixXd* same) const {
   const Index q = basis_.size(), k = static_cast<Index>(columns.size());
   Reduced result{MatrixXd::Zero(k + 1, k + 1), 0};
+  if (same != nullptr) result.sums.topLeftCorner(k, k) = *same;
   MatrixXd change(q, k), weighed(q, k);
   for (int g = 0; g < kGroups; ++g) {
     const auto [normal, right] = sums_of(residual, use, g);
     if (normal(0, 0) == 0) continue;  // nothing was seen
     for (Index i = 0; i < k; ++i) change.col(i) = columns[static_cast<std::size_t>(i)]->row(g).transpose();
     const WithoutDiscrepancy without(normal, discrepancy_sd.row(g).transpose());
-    if (k > 0) {  // Eigen's product of half a matrix reads the first number of none
-      weighed.noalias() = (normal - without.half.transpose() * without.half) * change;
+    if (k > 0 && same == nullptr) {  // Eigen's product of half a matrix reads the first number of none
+      const MatrixXd half = without.of(normal);
+      weighed.noalias() = (normal - half.transpose() * half) * change;
       result.sums.topLeftCorner(k, k).triangularView<Eigen::Lower>() += change.transpose() * weighed;
     }
     const VectorXd half_right = without.of(right);
-    result.sums.row(k).head(k) += (right - without.half.transpose() * half_right).transpose() * change;
+    const VectorXd delta = without.sd.cwiseProduct(without.llt.matrixU().solve(half_right));
+    result.sums.row(k).head(k) += (right - normal * delta).transpose() * change;
     result.sums(k, k) += squares_of(normal, right) - half_right.squaredNorm();
     result.log_scale -= without.llt.matrixLLT().diagonal().array().log().sum();
   }
@@ -321,7 +327,8 @@ Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector
   return result;
 }
 
-Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& columns, const VectorXd& prior_mean) {
+Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& columns, const VectorXd& prior_mean,
+                              bool covariance) {
   const Index k = static_cast<Index>(columns.size()), last = reduced.sums.rows() - 1;
   MatrixXd precision = reduced.sums(columns, columns);
   VectorXd right = reduced.sums(columns, last);
@@ -330,7 +337,7 @@ Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& co
   const Eigen::LLT<MatrixXd> llt(precision);
   Posterior p;
   p.mean = llt.solve(right);
-  p.covariance = llt.solve(MatrixXd::Identity(k, k));
+  if (covariance) p.covariance = llt.solve(MatrixXd::Identity(k, k));
   p.log_evidence = reduced.log_scale - 0.5 * (reduced.sums(last, last) + prior_mean.squaredNorm() - right.dot(p.mean)) -
                    llt.matrixLLT().diagonal().array().log().sum();
   return p;

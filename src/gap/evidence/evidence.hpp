@@ -108,9 +108,10 @@ class Evidence {
   void add(double share, const BasisCoefficients& change, SufficientStatistics& to) const;
   /// Sd of delta that every model of this robot has.
   BasisCoefficients discrepancy_sd() const;
-  /// `use`: which flights. `discrepancy_sd`: of delta's coefficients.
+  /// `use`: which flights. `discrepancy_sd`: of delta's coefficients. `same`: sums of the columns alone, where they are known already.
   Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
-                 const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const;
+                 const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
+                 const Eigen::MatrixXd* same = nullptr) const;
   /// Expectation-maximisation over the scales of the discrepancy, from `start` on. `own_sd`: what equations of effects get wrong of
   /// themselves, which no scale changes. `freeing_nats`: the price at which a block may be larger than any model is off; none: no block.
   Weighed weigh(const SufficientStatistics& residual, const Columns& columns, const std::vector<char>& use,
@@ -128,9 +129,9 @@ class Evidence {
   Residuals without(Residuals residual, const BasisCoefficients& change) const;
   const Scales& scales() const { return scales_; }
   static int block_of(int group, BasisFunction function);
-  /// Of the chosen columns, whose theta has the given prior means and sd 1.
-  static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns,
-                             const Eigen::VectorXd& prior_mean);
+  /// Of the chosen columns, whose theta has the given prior means and sd 1; without `covariance` that is empty.
+  static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns, const Eigen::VectorXd& prior_mean,
+                             bool covariance = true);
 
   /// Sd of a row of noise alone.
   double noise_sd(int group) const;

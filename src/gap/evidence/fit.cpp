@@ -262,10 +262,10 @@ Posterior Fitter::solve(const Linearised& point, const Columns& columns, Reduced
     if (point.columns[d].size() > 0) seen.push_back(static_cast<Index>(d));
   const auto own = static_cast<Index>(seen.size()), k = static_cast<Index>(point.columns.size());
   reduced.sums.diagonal().head(own).array() += damping;
-  const Posterior p = Evidence::posterior(reduced, columns.chosen, columns.mean());
+  const Posterior p = Evidence::posterior(reduced, columns.chosen, columns.mean(), damping == 0);
   Posterior all{p.log_evidence, VectorXd::Zero(k), MatrixXd::Identity(k, k)};
   all.mean(seen) = p.mean.head(own);
-  all.covariance(seen, seen) = p.covariance.topLeftCorner(own, own);
+  if (damping == 0) all.covariance(seen, seen) = p.covariance.topLeftCorner(own, own);
   return all;
 }
 
@@ -274,11 +274,12 @@ MatrixXd Fit::covariance() const {
   return point.directions.axes * posterior.covariance * point.directions.axes.transpose();
 }
 
-double Fitter::cost(const Hypothesis& hypothesis, const SufficientStatistics& residual, const VectorXd& at) const {
-  Columns c;
-  add_background(scaled_, hypothesis.effects(), c);
-  const Reduced reduced = evidence_.reduce(residual, c.columns, all_flights(), evidence_.discrepancy_sd());
-  return 0.5 * at.squaredNorm() - Evidence::posterior(reduced, c.chosen, c.mean()).log_evidence;
+double Fitter::cost(const Columns& background, const MatrixXd& sums, const SufficientStatistics& residual,
+                    const VectorXd& at) const {
+  const Reduced reduced =
+      evidence_.reduce(residual, background.columns, all_flights(), evidence_.discrepancy_sd(), &sums);
+  return 0.5 * at.squaredNorm() -
+         Evidence::posterior(reduced, background.chosen, background.mean(), false).log_evidence;
 }
 
 /// Those of the parameters' fit, and the effects' own.
@@ -379,10 +380,15 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
       tries.push_back(l.at);
       std::vector<SufficientStatistics> statistics(left.size());
       std::vector<double> costs(left.size(), std::numeric_limits<double>::infinity());
+      Columns background;
+      add_background(scaled_, hypothesis.effects(), background);
+      const Index others = static_cast<Index>(background.columns.size()),
+                  first = static_cast<Index>(columns.columns.size()) - others;
+      const MatrixXd sums = reduced.sums.block(first, first, others, others);
       io::parallel_for(left.size(), threads_, [&](std::size_t i) {
         if (left[i].empty()) return;
         statistics[i] = evidence_.statistics(left[i]);
-        costs[i] = cost(hypothesis, statistics[i], tries[i]);
+        costs[i] = cost(background, sums, statistics[i], tries[i]);
       });
       const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
       improved = costs.back() - costs[best] >= kWorthwhile;

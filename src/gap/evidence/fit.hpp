@@ -100,7 +100,8 @@ class Fitter {
   Reduced reduce(const Linearised& point, const Columns& columns) const;
   /// Along all directions. `damping`: of the steps, as so much more precision around the point itself (Levenberg).
   Posterior solve(const Linearised& point, const Columns& columns, Reduced reduced, double damping = 0) const;
-  double cost(const Hypothesis& hypothesis, const SufficientStatistics& residual, const Eigen::VectorXd& at) const;
+  double cost(const Columns& background, const Eigen::MatrixXd& sums, const SufficientStatistics& residual,
+              const Eigen::VectorXd& at) const;
 
   const std::vector<PredictedFlight>& flights_;
   const Evidence& evidence_;
