@@ -56,10 +56,32 @@ struct Expected {
   BasisCoefficients form;                    ///< what its effects' equations get wrong
 };
 
-/// Nothing where its vehicle comes apart.
-std::optional<Expected> expect(const Rival& rival, const Fitter& fitter) {
-  const Linearised l = fitter.linearise(rival.hypothesis, rival.at, rival.directions);
+/// What the parameters that all hypotheses share change, by the columns of one along the directions of another.
+std::vector<BasisCoefficients> turned(const Linearised& l, const Directions& directions, Index shared) {
+  std::vector<BasisCoefficients> columns;
+  const MatrixXd turn =
+      l.directions.axes.topLeftCorner(shared, shared).transpose() * directions.axes.topLeftCorner(shared, shared);
+  for (Index d = 0; d < shared; ++d) {
+    BasisCoefficients sum;
+    for (Index i = 0; i < shared; ++i) {
+      const BasisCoefficients& column = l.columns[static_cast<std::size_t>(i)];
+      if (column.size() == 0) continue;
+      if (sum.size() == 0) sum = BasisCoefficients::Zero(column.rows(), column.cols());
+      sum += turn(i, d) * column;
+    }
+    columns.push_back(std::move(sum));
+  }
+  return columns;
+}
+
+/// Nothing where its vehicle comes apart. `first`: the first rival with parameters, whose columns serve the others.
+std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::optional<Linearised>& first) {
+  const bool with_parameters = rival.directions.reach.size() > 0;
+  std::vector<BasisCoefficients> known;
+  if (with_parameters && first) known = turned(*first, rival.directions, rival.hypothesis.shared());
+  const Linearised l = fitter.linearise(rival.hypothesis, rival.at, rival.directions, known);
   if (l.residual.empty()) return {};
+  if (with_parameters && !first) first = l;
   Expected e{l.statistics, {}, fitter.form_error(rival.hypothesis, l)};
   const Index k = rival.covariance.rows();
   if (k == 0) return e;  // without a gap nothing is uncertain
@@ -159,8 +181,9 @@ std::optional<NextExperiment> expected_separation(const Manoeuvre& m, const std:
   const Evidence evidence(flight, discrepancy, 1);
   const Fitter fitter(flight, evidence, 1);
   std::vector<Expected> expected;
+  std::optional<Linearised> first;
   for (const Rival& r : rivals) {
-    std::optional<Expected> e = expect(r, fitter);
+    std::optional<Expected> e = expect(r, fitter, first);
     if (!e) return {};
     expected.push_back(std::move(*e));
   }
