@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 /// Sets of effects of which it is asked whether something is left beside them.
 constexpr std::size_t kMostRemainders = 3;
 /// Fits of an effect from whose parameters these are fitted alone once more.
-constexpr std::size_t kRestarts = 2;
+constexpr std::size_t kRestarts = 1;
 /// Less than this share of what parameters leave may be chance; and the log evidence of what is refuted.
 constexpr double kLeastExplainable = 0.15, kRefuted = -1e9;
 /// A size that changes no row by so much, in its unit, cannot be told from none.
@@ -52,21 +52,30 @@ class Diagnoser {
     std::vector<Screened> open;
     const std::vector<Screened> screened = screen(evidence_, fitter_, parameters_, {}, robot_.sizes());
     if (!flights_.front().within_the_beat()) d.untestable = untestable();
-    for (std::size_t i = 0; i < screened.size(); ++i) {
-      const Screened& s = screened[i];
+    std::vector<Screened> finalists;
+    for (const Screened& s : screened) {
       if (std::ranges::count(d.untestable, s.effect)) continue;
-      ScoredHypothesis a;
-      if (static_cast<int>(i) < options_.finalists && s.gain > 0 &&
-          progress(0.4 + 0.3 * static_cast<double>(i) / options_.finalists, "fitting " + s.effect))
-        a = fit_effects({s});
-      if (vanished(a)) open.push_back(s);
-      else singles.push_back(std::move(a));
+      if (static_cast<int>(finalists.size()) < options_.finalists) finalists.push_back(s);
+      else open.push_back(s);
+    }
+    if (progress(0.4, "fitting effects")) {
+      // also those that promise nothing: beside parameters that make up for an effect, a line sees nothing of it
+      std::vector<ScoredHypothesis> fits(finalists.size());
+      io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}); });
+      for (std::size_t i = 0; i < fits.size(); ++i)
+        if (vanished(fits[i])) open.push_back(finalists[i]);
+        else singles.push_back(std::move(fits[i]));
+    } else {
+      open.insert(open.end(), finalists.begin(), finalists.end());
     }
     // what a fit found besides its effect, the parameters alone may have missed
     std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::log_evidence);
+    const double alone = robot_.weigh(plain, parameters_.point).posterior.log_evidence;
     for (std::size_t i = 0; i < std::min(singles.size(), kRestarts); ++i)
-      robot_.fit_parameters_from(singles[i].fit.point.at,
-                                 robot_.weigh(Hypothesis(uncertain_, singles[i].effects), singles[i].fit.point).scales);
+      if (singles[i].log_evidence - singles[i].log_prior > alone + rule_.gain.by_chance_nats)
+        robot_.fit_parameters_from(
+            singles[i].fit.point.at,
+            robot_.weigh(Hypothesis(uncertain_, singles[i].effects), singles[i].fit.point).scales);
     d.parameters = parameters_;
     loss_ = losses_of(around_, parameters_.point.residual);
     d.hypotheses.push_back(weigh(ScoredHypothesis::Kind::none, plain, robot_.nominal(), std::log(rule_.prior.none)));
