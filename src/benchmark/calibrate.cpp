@@ -28,12 +28,11 @@ struct Constant {
   bool by_factors;
 };
 
-const std::array<Constant, 6>& constants() {
-  static const std::array<Constant, 6> kAll = {{
+const std::array<Constant, 5>& constants() {
+  static const std::array<Constant, 5> kAll = {{
       {"doubt", "nats", [](VerdictRule& r) -> double& { return r.doubt.nats; }, 0.1, 100, true},
       {"doubt", "freedom", [](VerdictRule& r) -> double& { return r.doubt.freedom; }, 0.3, 30, true},
       {"gain", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.by_chance_nats; }, 0, 300, false},
-      {"gain", "by_model_nats", [](VerdictRule& r) -> double& { return r.gain.by_model_nats; }, 0, 300, false},
       {"prior", "unknown", [](VerdictRule& r) -> double& { return r.prior.unknown; }, 0.01, 0.8, true},
       {"prior", "remainder", [](VerdictRule& r) -> double& { return r.prior.remainder; }, 0.001, 1, true},
   }};

@@ -174,7 +174,6 @@ TEST_F(Benchmark, LearnsWhatANatIsWorth) {
   EXPECT_EQ(json.at("cases"), 2);
   const gap::VerdictRule before = gap::read_verdict_rule(), after = gap::read_verdict_rule(calibrated.out);
   EXPECT_GT(after.doubt.nats, 2 * before.doubt.nats);
-  EXPECT_EQ(after.gain.of_models, before.gain.of_models);
   EXPECT_EQ(after.naming.of_all, before.naming.of_all) << "what is not learnt stays";
   // nearly one half each, which is the best that can be said of both
   EXPECT_LT(json.at("score_before").get<double>(), json.at("score").get<double>() - 0.1);

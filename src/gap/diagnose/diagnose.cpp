@@ -22,8 +22,8 @@ using Eigen::VectorXd;
 
 /// Sets of effects of which it is asked whether something is left beside them.
 constexpr std::size_t kMostRemainders = 3;
-/// Fits of an effect from whose parameters these are fitted alone once more.
-constexpr std::size_t kRestarts = 1;
+/// Effects that are fitted jointly with what explains most.
+constexpr std::size_t kFurther = 3;
 /// Less than this share of what parameters leave may be chance; and the log evidence of what is refuted.
 constexpr double kLeastExplainable = 0.15, kRefuted = -1e9;
 /// A size that changes no row by so much, in its unit, cannot be told from none.
@@ -68,27 +68,18 @@ class Diagnoser {
     } else {
       open.insert(open.end(), finalists.begin(), finalists.end());
     }
-    // what a fit found besides its effect, the parameters alone may have missed
-    std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::log_evidence);
-    const double alone = robot_.weigh(plain, parameters_.point).posterior.log_evidence;
-    for (std::size_t i = 0; i < std::min(singles.size(), kRestarts); ++i)
-      if (singles[i].log_evidence - singles[i].log_prior > alone + rule_.gain.by_chance_nats)
-        robot_.fit_parameters_from(
-            singles[i].fit.point.at,
-            robot_.weigh(Hypothesis(uncertain_, singles[i].effects), singles[i].fit.point).scales);
     d.parameters = parameters_;
-    loss_ = losses_of(around_, parameters_.point.residual);
     d.hypotheses.push_back(weigh(ScoredHypothesis::Kind::none, plain, robot_.nominal(), std::log(rule_.prior.none)));
     d.hypotheses.push_back(
         weigh(ScoredHypothesis::Kind::parameters, plain, parameters_.point, std::log(rule_.prior.parameters)));
-    const double parameters = d.hypotheses[1].log_evidence;
-    plain_ = parameters - d.hypotheses[1].log_prior;
+    plain_ = d.hypotheses[1].log_evidence - d.hypotheses[1].log_prior;
     d.hypotheses.push_back(explain_freely(plain, parameters_.point, std::log(rule_.prior.unknown)));
     for (const Screened& s : open) singles.push_back(leave_open(s));
-    const auto counts = [&](const ScoredHypothesis& a) { return beyond_chance(a, plain_, rule_); };
-    std::ranges::sort(singles, std::greater{}, counts);
-    // further effects jointly with the best
-    if (!singles.empty() && singles.front().fitted() && counts(singles.front()) > parameters) {
+    // further effects jointly with what explains most: an effect, or what hides one as a background of its hypothesis
+    const auto explained = [](const ScoredHypothesis& a) { return a.log_evidence - a.log_prior; };
+    std::ranges::sort(singles, std::greater{}, explained);
+    if (!singles.empty() && singles.front().fitted() &&
+        explained(singles.front()) > plain_ + rule_.gain.by_chance_nats) {
       ScoredHypothesis best = singles.front();
       for (int n = 2; n <= options_.most_effects; ++n) {
         if (!progress(0.7 + 0.3 * (n - 1) / options_.most_effects,
@@ -96,22 +87,37 @@ class Diagnoser {
           break;
         // what is missing besides hides behind what models are off by with the best in force, not without it
         robot_.take_scales(Hypothesis(uncertain_, best.effects), best.fit.point);
-        const auto further = screen(evidence_, fitter_, best.fit, best.effects, beside(best.effects, robot_.sizes()));
-        if (further.empty() || further.front().gain < rule_.gain.further_screened_nats) break;
-        std::vector<Screened> set = screened_of(best);
-        set.push_back(further.front());
-        ScoredHypothesis more = fit_effects(set);
-        if (vanished(more) || counts(more) < counts(best)) break;
-        singles.push_back(more);
-        best = std::move(more);
+        std::vector<Screened> further =
+            screen(evidence_, fitter_, best.fit, best.effects, beside(best.effects, robot_.sizes()));
+        std::erase_if(further, [&](const Screened& s) { return s.gain < rule_.gain.further_screened_nats; });
+        further.resize(std::min(further.size(), evidence_.discrepancy().spread.beside_all ? 1 : kFurther));
+        std::vector<ScoredHypothesis> more(further.size());
+        io::parallel_for(more.size(), threads_, [&](std::size_t i) {
+          std::vector<Screened> set = screened_of(best);
+          set.push_back(further[i]);
+          more[i] = fit_effects(set);
+        });
+        std::erase_if(more, [&](const ScoredHypothesis& a) { return vanished(a); });
+        std::erase_if(more, [&](const ScoredHypothesis& a) {
+          return explained(a) < explained(best) + rule_.gain.by_chance_nats;
+        });
+        if (more.empty()) break;
+        for (const ScoredHypothesis& a : more) {  // what showed beside that may be all there is
+          const Screened last = screened_of(a).back();
+          const auto single = std::ranges::find(singles, std::vector{last.effect}, &ScoredHypothesis::effects);
+          if (single == singles.end() || single->fitted()) continue;
+          if (ScoredHypothesis fitted = fit_effects({last}); fitted.fitted()) *single = std::move(fitted);
+        }
+        singles.insert(singles.end(), more.begin(), more.end());
+        best = *std::ranges::max_element(more, {}, explained);
       }
       robot_.take_scales(plain, parameters_.point);
     }
     // what leaves more than that entry's equation may
-    std::ranges::sort(singles, std::greater{}, counts);
+    std::ranges::sort(singles, std::greater{}, explained);
     for (std::size_t i = 0, n = singles.size(); i < std::min<std::size_t>(n, kMostRemainders); ++i) {
-      const ScoredHypothesis& a = singles[i];
-      if (!a.fitted() || counts(a) < parameters) break;
+      const ScoredHypothesis a = singles[i];
+      if (!a.fitted() || explained(a) < plain_) break;
       ScoredHypothesis more = explain_freely(Hypothesis(uncertain_, a.effects), a.fit.point, 0);
       if (more.terms.empty()) continue;
       more.kind = ScoredHypothesis::Kind::effect;
@@ -256,7 +262,8 @@ class Diagnoser {
     for (const SizeColumn& c : robot_.sizes())
       if (c.effect == s.effect) own[static_cast<std::size_t>(c.unknown)] = c.change;
     a.fit = fitter_.linear(h, parameters_, own);
-    a.log_evidence = plain_ + std::min(s.gain, 0.0) + log_prior_of_one();
+    a.log_prior = log_prior_of_one();
+    a.log_evidence = plain_ + std::min(s.gain, 0.0) + a.log_prior;
     Posterior& p = a.fit.posterior;
     const Index first = h.shared();
     if (h.unknowns()[static_cast<std::size_t>(first)].low < 0) return a;
@@ -331,7 +338,7 @@ class Diagnoser {
   }
 
   /// What every vehicle has of an entry is a line beside the parameters, and an effect was flown: where that explains more than the line does, a
-  /// hypothesis without the effect has it, too, as its background, if it is a term that some models have.
+  /// hypothesis without the effect has it, too, as its background, at the price of its sizes there.
   void share_backgrounds(std::vector<ScoredHypothesis>& all) const {
     const auto parameters = [&] {
       return std::ranges::find(all, ScoredHypothesis::Kind::parameters, &ScoredHypothesis::kind)->log_evidence;
@@ -352,13 +359,12 @@ class Diagnoser {
       }
       for (ScoredHypothesis& b : all) {
         if (b.kind == ScoredHypothesis::Kind::none || b.terms.empty() != a.terms.empty()) continue;
-        if (b.effects.size() >= a.effects.size()) continue;
+        if (b.effects.size() >= a.effects.size() || (b.kind == ScoredHypothesis::Kind::effect && !b.fitted())) continue;
         double explained = a.log_evidence - a.log_prior;
         std::size_t shared = 0;
         for (const std::string& e : a.effects)
           if (std::ranges::count(b.effects, e) > 0) ++shared;
-          else if (std::ranges::count(rule_.gain.of_some_models, e) > 0) explained -= std::max(beyond[e], 0.0);
-          else explained = kRefuted;
+          else explained -= std::max(beyond[e], 0.0);
         if (shared == b.effects.size()) b.log_evidence = std::max(b.log_evidence, b.log_prior + explained);
       }
     }

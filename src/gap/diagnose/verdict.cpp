@@ -46,9 +46,7 @@ void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
 
 double beyond_chance(const ScoredHypothesis& a, double plain, const VerdictRule& rule) {
   const double gain = a.log_evidence - a.log_prior - plain;
-  double chance = 0;
-  for (const std::string& e : a.effects)
-    chance += std::ranges::count(rule.gain.of_models, e) > 0 ? rule.gain.by_model_nats : rule.gain.by_chance_nats;
+  const double chance = static_cast<double>(a.effects.size()) * rule.gain.by_chance_nats;
   return a.log_prior + plain + std::max(gain - chance, std::min(gain, 0.0));
 }
 

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "io/config.hpp"
-#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 
@@ -20,16 +19,8 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
   if (!(std::abs(r.prior.none + r.prior.parameters + r.prior.effect + r.prior.unknown - 1) < 1e-9))
     prior.fail("", "none, parameters, effect and unknown do not add up to 1", "probabilities that do");
   const io::Table gain = root.table("gain");
-  r.gain = {gain.number("by_chance_nats", kNats),
-            gain.number("by_model_nats", kNats),
-            gain.number("further_screened_nats", kNats),
-            gain.number("vanished_size", kPositive),
-            gain.strings("of_models"),
-            gain.strings("of_some_models")};
-  for (const auto& [key, list] :
-       {std::pair{"of_models", &r.gain.of_models}, {"of_some_models", &r.gain.of_some_models}})
-    for (const std::string& id : *list)
-      if (!model::is_effect(id)) gain.fail(key, "no effect \"" + id + "\"", "identifiers of docs/effects.md");
+  r.gain = {gain.number("by_chance_nats", kNats), gain.number("further_screened_nats", kNats),
+            gain.number("vanished_size", kPositive)};
   r.unknown = {root.table("unknown").number("freeing_nats", kNats)};
   const io::Table refutation = root.table("refutation");
   r.refutation = {refutation.number("share_of_gap", kNats), refutation.number_or("least_share", 0, kShare)};

@@ -3,8 +3,6 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
-#include <vector>
 
 #include "io/installation.hpp"
 
@@ -15,10 +13,7 @@ struct VerdictRule {
     double none, parameters, effect, unknown, further_effect, remainder;
   } prior;
   struct Gain {
-    double by_chance_nats, by_model_nats, further_screened_nats, vanished_size;
-    std::vector<std::string> of_models;  ///< entries that by_model_nats are of
-    /// Those that published models of wings have or lack: what one explains, hypotheses without it have, too, at the price of its sizes.
-    std::vector<std::string> of_some_models;
+    double by_chance_nats, further_screened_nats, vanished_size;
   } gain;
   struct UnknownCause {
     double freeing_nats;

@@ -51,8 +51,9 @@ struct Columns {
   std::vector<double> prior_mean;
   std::vector<int>
       entry;  ///< of what every vehicle has of an entry: which of Scales::entries it grows with; -1: of none
+  std::vector<double> freedom;  ///< of that scale, as degrees of freedom
   Eigen::VectorXd mean() const;
-  void add(const BasisCoefficients& column, double mean, int of_entry = -1);
+  void add(const BasisCoefficients& column, double mean, int of_entry = -1, double freedom_of_entry = 0);
 };
 
 /// All that the rows of flights say of smooth residuals: sums over the whitened rows of a group, basis x
@@ -118,7 +119,7 @@ class Evidence {
                 const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats = {},
                 int iterations = kMostIterations) const;
   /// Nats that it costs a hypothesis that this robot has so many times what is usual of an entry.
-  double price_of(double times) const;
+  double price_of(double times, double freedom) const;
   static constexpr int kMostIterations = 40;
   void set_discrepancy(ModelDiscrepancy discrepancy) { discrepancy_ = std::move(discrepancy); }
   /// Those that every model of this robot has from now on.

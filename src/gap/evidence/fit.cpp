@@ -154,6 +154,7 @@ void Fitter::set_background(const Columns& same, const std::vector<Background>& 
   background_.clear();
   means_.clear();
   entry_.clear();
+  freedom_.clear();
   places_.clear();
   Columns all = own_columns_of(beside.point);
   const std::size_t first = all.columns.size(), scaled = first + same.columns.size();
@@ -164,7 +165,7 @@ void Fitter::set_background(const Columns& same, const std::vector<Background>& 
       entry = static_cast<int>(entries_.size());
       entries_.push_back(b.entry);
     }
-    all.add(b.column, 0, entry);
+    all.add(b.column, 0, entry, evidence_.discrepancy().freedom_of(b.entry));
   }
   const Reduced reduced = reduce(beside.point, all);
   for (std::size_t i = first; i < all.columns.size(); ++i) {
@@ -173,6 +174,7 @@ void Fitter::set_background(const Columns& same, const std::vector<Background>& 
     background_.push_back(*all.columns[i]);
     means_.push_back(all.prior_mean[i]);
     entry_.push_back(all.entry[i]);
+    freedom_.push_back(all.freedom[i]);
     if (i < scaled) places_.push_back(i - first);
   }
   take_scales();
@@ -215,7 +217,7 @@ void Fitter::add_background(const std::vector<BasisCoefficients>& list, const st
                             Columns& to) const {
   for (std::size_t k = 0; k < list.size(); ++k)
     if (entry_[k] < 0 || std::ranges::count(without, entries_[static_cast<std::size_t>(entry_[k])]) == 0)
-      to.add(list[k], means_[k], entry_[k]);
+      to.add(list[k], means_[k], entry_[k], freedom_[k]);
 }
 
 Columns Fitter::columns_of(const Linearised& point, const std::vector<std::string>& effects) const {

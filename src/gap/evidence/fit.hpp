@@ -111,6 +111,7 @@ class Fitter {
   std::vector<BasisCoefficients> background_, scaled_;
   std::vector<double> means_;         ///< of background_
   std::vector<int> entry_;            ///< of background_: in entries_, or -1
+  std::vector<double> freedom_;       ///< of background_: of that entry's scale
   std::vector<std::string> entries_;  ///< as in Scales::entries
   std::vector<std::size_t> places_;   ///< of the columns that are of no entry, as they were given
 };

@@ -31,7 +31,6 @@ using Factors = std::map<std::string, double>;
 /// What every robot says of the variances, given those that are thought.
 void expect(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDiscrepancy& now, Shares& shares,
             std::map<std::string, Moment>& sizes, std::vector<Factors>& factors) {
-  const double nu = now.spread.entry_freedom;
   factors.resize(robots.size());
   for (std::size_t r = 0; r < robots.size(); ++r) {
     const std::unique_ptr<RobotFit>& robot = robots[r];
@@ -57,7 +56,7 @@ void expect(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDis
       m.count += 1;
     }
     for (const auto& [entry, m] : own) {
-      const double factor2 = (m.sum + nu) / (m.count + nu);
+      const double nu = now.freedom_of(entry), factor2 = (m.sum + nu) / (m.count + nu);
       factors[r][entry] = std::sqrt(factor2);
       sizes[entry].sum += std::pow(now.background_sd(entry), 2) * m.sum / factor2;
       sizes[entry].count += m.count;

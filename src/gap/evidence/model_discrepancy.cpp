@@ -35,7 +35,8 @@ constexpr const char* kShares =
 constexpr const char* kSpread =
     R"(# How much more or less than usual models of a robot are off: standard deviation of the log of its own factor, wide, for a robot may be
 # nearly the model; and how far its blocks (a kind of regime in a channel and harmonic), and what it has of each entry, go their own ways
-# about it, as degrees of freedom of an inverse gamma law. Choices.
+# about it, as degrees of freedom of an inverse gamma law: few of entries that say how a wing, its hinges and its drive work by
+# themselves (of_models), for each model, and each maker's robot, has such laws of its own. Choices.
 )";
 constexpr const char* kSensors =
     R"(# What laboratories declare of sensors is right to so much, whatever else is so: standard deviations. Choices.
@@ -74,6 +75,10 @@ double ModelDiscrepancy::background_sd(const std::string& effect) const {
   return entry != effect ? background_sd(entry) : background.at("other");
 }
 
+double ModelDiscrepancy::freedom_of(const std::string& effect) const {
+  return std::ranges::count(of_models, entry_of(effect)) > 0 ? spread.model_freedom : spread.entry_freedom;
+}
+
 std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learnt) {
   const auto number = [](double v) {
     char text[32];
@@ -92,9 +97,14 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
     }
     text += "\n";
   }
+  std::string of_models;
+  if (!d.of_models.empty()) {
+    for (const std::string& id : d.of_models) of_models += (of_models.empty() ? "\"" : ", \"") + id + "\"";
+    of_models = "\nmodel_freedom = " + number(d.spread.model_freedom) + "\nof_models = [" + of_models + "]";
+  }
   text += std::string(kSpread) + "[spread]\nrobot_sd = " + number(d.spread.robot_sd) +
           "\nblock_freedom = " + number(d.spread.block_freedom) +
-          "\nentry_freedom = " + number(d.spread.entry_freedom) +
+          "\nentry_freedom = " + number(d.spread.entry_freedom) + of_models +
           (d.spread.beside_all ? "\nbeside_all = true\n\n" : "\n\n") + kSensors +
           "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") + "  # as it is mounted, about each axis\n" +
           "imu_place_m = " + sensor("imu_place") + "  # along each axis\npower_latency_s = " + sensor("power_delay") +
@@ -110,7 +120,13 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   ModelDiscrepancy d;
   const io::Table spread = root.table("spread");
   d.spread = {spread.number("robot_sd", io::positive()), spread.number("block_freedom", io::positive()),
-              spread.number("entry_freedom", io::positive()), spread.boolean_or("beside_all", false)};
+              spread.number("entry_freedom", io::positive()), 0, spread.boolean_or("beside_all", false)};
+  if (!d.spread.beside_all) {
+    d.spread.model_freedom = spread.number("model_freedom", io::positive());
+    d.of_models = spread.strings("of_models");
+  }
+  for (const std::string& id : d.of_models)
+    if (!model::is_effect(id)) spread.fail("of_models", "no effect \"" + id + "\"", "identifiers of docs/effects.md");
   d.form_error = root.number("form_error", io::non_negative());
 
   for (int channel = 0; channel < kChannels; ++channel) {

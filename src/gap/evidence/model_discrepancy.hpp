@@ -24,6 +24,7 @@ struct ModelDiscrepancy {
   struct Spread {
     double robot_sd, block_freedom;
     double entry_freedom;  ///< the same of what a vehicle has of an entry
+    double model_freedom;  ///< .. of one that models describe each in its own way
     /// What models are off by is what is left beside every entry together, and the same for every hypothesis.
     bool beside_all;
   } spread{};
@@ -42,10 +43,13 @@ struct ModelDiscrepancy {
   }
   /// Sd of the coordinates of an effect's sizes (gap/evidence/hypothesis.hpp) in a vehicle without any effect.
   double background_sd(const std::string& effect) const;
+  /// Degrees of freedom of how much more or less a robot has of that.
+  double freedom_of(const std::string& effect) const;
 
   std::array<std::array<std::array<double, static_cast<std::size_t>(BasisFunction::count)>, kHarmonics + 1>, kChannels>
       shares{};
   std::map<std::string, double> background;  ///< by effect, and of "other"
+  std::vector<std::string> of_models;        ///< entries that spread.model_freedom is of
 };
 
 /// After an entry with a size for each wing: what both wings have of it alike.

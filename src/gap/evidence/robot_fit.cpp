@@ -72,29 +72,12 @@ void RobotFit::widen_entries() {
   set_scales(wide);
 }
 
-void RobotFit::fit_parameters_from(const VectorXd& at, const Scales& scales) {
-  Weighed best = weigh(plain_, parameters_.point);
-  if (Weighed w = weigh(plain_, parameters_.point, scales); w.posterior.log_evidence > best.posterior.log_evidence)
-    best = std::move(w);
-  set_scales(best.scales);
-  double most = best.posterior.log_evidence;
-  for (const VectorXd& from : {VectorXd(parameters_.point.at), VectorXd(at.head(plain_.size()))}) {
-    Fit other = fitter_.fit(plain_, from, kIterations);
-    if (other.point.residual.empty()) continue;
-    const Weighed w = weigh(plain_, other.point);
-    if (!(w.posterior.log_evidence > most)) continue;
-    most = w.posterior.log_evidence;
-    parameters_ = std::move(other);
-    take_scales(plain_, parameters_.point);
-  }
-}
-
 double RobotFit::beyond_background(const std::string& effect, const VectorXd& sizes) const {
-  const double nu = evidence_.discrepancy().spread.entry_freedom, f = evidence_.scales().robot;
+  const double nu = evidence_.discrepancy().freedom_of(effect), f = evidence_.scales().robot;
   const auto improbable = [&](const std::string& entry, const VectorXd& own) {
     const double sd = evidence_.discrepancy().background_sd(entry), n = static_cast<double>(own.size());
     const double times = std::sqrt((own.squaredNorm() / (sd * sd) + nu * f * f) / (n + nu));
-    return 0.5 * own.squaredNorm() / std::pow(times * sd, 2) + n * std::log(times * sd) + evidence_.price_of(times);
+    return 0.5 * own.squaredNorm() / std::pow(times * sd, 2) + n * std::log(times * sd) + evidence_.price_of(times, nu);
   };
   const double usual = -0.5 * sizes.squaredNorm();
   if (!of_sides(*model::find_effect(uncertain_.nominal(), effect))) return usual + improbable(effect, sizes);
@@ -143,12 +126,13 @@ std::vector<Background> RobotFit::background(bool shapes) const {
     const std::string& effect = sizes_[i].effect;
     const double sd = evidence_.discrepancy().background_sd(effect);
     if (!of_sides(*model::find_effect(uncertain_.nominal(), effect))) {
-      list.push_back({effect, sd * sizes_[i].change});
+      const auto n = static_cast<double>(sizes_[i].near.size());
+      for (const BasisCoefficients& near : sizes_[i].near) list.push_back({effect, sd / std::sqrt(n) * near});
       continue;
     }
     if (i + 1 == sizes_.size() || sizes_[i + 1].effect != effect) continue;
     const std::string both = effect + kOfBoth;
-    const BasisCoefficients &left = sizes_[i].change, &right = sizes_[i + 1].change;
+    const BasisCoefficients &left = sizes_[i].near[0], &right = sizes_[i + 1].near[0];
     list.push_back({effect, sd * std::numbers::sqrt2 / 2 * (left - right)});
     list.push_back({both, evidence_.discrepancy().background_sd(both) * std::numbers::sqrt2 / 2 * (left + right)});
     ++i;
@@ -222,7 +206,7 @@ std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const
     const auto log_evidence = [&](double factor) {
       const Eigen::LLT<MatrixXd> llt(factor * factor * precision + MatrixXd::Identity(n, n));
       return 0.5 * factor * factor * sum.dot(llt.solve(sum)) - llt.matrixLLT().diagonal().array().log().sum() -
-             evidence_.price_of(factor * now.entries[e]);
+             evidence_.price_of(factor * now.entries[e], c.freedom[static_cast<std::size_t>(columns[0])]);
     };
     const double before = log_evidence(1);
     for (const double factor : {2.0, 4.0, 8.0, 16.0, 32.0, 64.0}) {
@@ -264,12 +248,13 @@ BasisCoefficients RobotFit::change(Residuals there, double steps) const {
 }
 
 void RobotFit::find_sizes() {
-  std::vector<SizeStep> steps = size_steps(uncertain_, parameters_.point.at, withheld_);
+  std::vector<SizeStep> steps = size_steps(uncertain_, parameters_.point.at, withheld_, &evidence_.discrepancy());
   std::vector<Candidate> candidates;
   for (SizeStep& s : steps) {
     candidates.push_back(std::move(s.candidate));
     for (Candidate& c : s.shaped) candidates.push_back(std::move(c));
     for (Candidate& c : s.further) candidates.push_back(std::move(c));
+    for (Candidate& c : s.near) candidates.push_back(std::move(c));
   }
   std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
   std::vector<BasisCoefficients> changes(rows.size());  // of all that there is
@@ -284,10 +269,17 @@ void RobotFit::find_sizes() {
     const std::size_t shapes = i;
     i += s.shaped.size();
     for (std::size_t n = 0; n < s.further.size(); ++n) along.push_back(changes[i++]);
+    const std::size_t near = i;
+    i += s.near.size();
     if (along[0].size() == 0) continue;
-    sizes_.push_back({s, along[0] / kSizeReach, {}});
+    sizes_.push_back({s, along[0] / kSizeReach, {}, {}});
+    for (std::size_t n = 0; n < s.near.size(); ++n) {
+      const BasisCoefficients& there = changes[near + n];
+      sizes_.back().near.push_back(there.size() > 0 ? BasisCoefficients(there / (n == 0 ? s.reach : -s.reach))
+                                                    : sizes_.back().change);
+    }
     for (std::size_t k = shapes; k < shapes + s.shaped.size(); ++k)
-      if (changes[k].size() > 0) shapes_.push_back({s, (changes[k] - along[0]) / kSizeReach, {}});
+      if (changes[k].size() > 0) shapes_.push_back({s, (changes[k] - along[0]) / kSizeReach, {}, {}});
     for (std::size_t n = 1; n + 1 < along.size() && along[n].size() > 0 && along[n + 1].size() > 0; ++n) {
       const double at = kSizeReach * static_cast<double>(n + 1);
       sizes_.back().large.push_back({at, along[n] / at, (along[n + 1] - along[n - 1]) / (2 * kSizeReach)});

@@ -24,9 +24,6 @@ class RobotFit {
   /// The same beside what sensors may have and every vehicle has a little of, which is found first.
   void refit_beside_background();
 
-  /// The parameters once more, from where a fit of more than them ended, and from the scales found there: kept where that is more probable.
-  void fit_parameters_from(const Eigen::VectorXd& at, const Scales& scales);
-
   void set_discrepancy(const ModelDiscrepancy& discrepancy) { evidence_.set_discrepancy(discrepancy); }
   const Evidence& evidence() const { return evidence_; }
   const Fitter& fitter() const { return fitter_; }

@@ -95,7 +95,8 @@ class Screening {
         s.gain = p.log_evidence - without_;
         if (const std::vector<double>& have = evidence_.scales().entries;
             others.size() < base_.size() && static_cast<std::size_t>(entry) < have.size())
-          s.gain += evidence_.price_of(have[static_cast<std::size_t>(entry)]);
+          s.gain +=
+              evidence_.price_of(have[static_cast<std::size_t>(entry)], evidence_.discrepancy().freedom_of(effect));
         for (std::size_t k = 0; k < own.size(); ++k)
           if (one_sided(own[k])) s.gain += log_twice_positive(coordinate(k), std::sqrt(p.covariance(at(k), at(k))));
       }
@@ -124,14 +125,19 @@ class Screening {
 
 }  // namespace
 
+/// How many standard deviations of it a robot may well have of an entry, and how near differences are rough.
+constexpr double kFarFromUsual = 2, kLeastReach = 0.05;
+
 std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const VectorXd& at,
-                                 const std::vector<std::string>& withheld) {
+                                 const std::vector<std::string>& withheld, const ModelDiscrepancy* usual) {
   std::vector<SizeStep> steps;
   const model::Vehicle now = Hypothesis(uncertain, {}).candidate(at).vehicle;
   for (const model::EffectEntry& e : model::catalogue_of(uncertain.nominal())) {
     const std::string id = e.info.id;
     if (std::ranges::count(withheld, id)) continue;
     const Hypothesis h(uncertain, {id});
+    const double sd = usual ? std::max(usual->background_sd(id), usual->background_sd(id + kOfBoth)) : 0,
+                 reach = std::clamp(kFarFromUsual * sd, kLeastReach, kSizeReach);
     const Index first = at.size();
     VectorXd here = h.start(now);
     here.head(first) = at;
@@ -140,7 +146,11 @@ std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Vect
       VectorXd there = here;
       there[i] += kSizeReach;
       const bool one_sided = h.unknowns()[static_cast<std::size_t>(i)].low >= 0;
-      steps.push_back({{id, i - first, h.size() - first, one_sided, here[i]}, h.candidate(there), {}, {}});
+      steps.push_back({{id, i - first, h.size() - first, one_sided, here[i]}, h.candidate(there), {}, {}, reach, {}});
+      for (const double sign : {1.0, -1.0}) {
+        there[i] = here[i] + sign * reach;
+        if (usual && (sign > 0 || !one_sided)) steps.back().near.push_back(h.candidate(h.bounded(there)));
+      }
       for (std::size_t n = 2; n <= kFurthest && one_sided; ++n) {
         there[i] = here[i] + kSizeReach * static_cast<double>(n);
         if (h.bounded(there)[i] != there[i]) break;

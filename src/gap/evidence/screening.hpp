@@ -18,18 +18,23 @@ struct SizeStep : EffectSize {
   Candidate candidate;
   std::vector<Candidate> shaped;   ///< the same with each of its shapes a standard deviation away
   std::vector<Candidate> further;  ///< of a size of one sign: two steps away, three, .. kFurthest
+  double reach;                    ///< as far as vehicles without the effect go, ..
+  std::vector<Candidate> near;     ///< .. and there: above, and below where a size may be
 };
 inline constexpr std::size_t kFurthest = 5;
 inline constexpr double kSizeReach = 0.4;
 
-/// Of every entry of the catalogue but `withheld`, at the given coordinates of the parameters; shapes are in the middle.
+/// Of every entry of the catalogue but `withheld`, at the given coordinates of the parameters; shapes are in the middle. `usual`: what
+/// vehicles have of it without the effect, for steps as near as that.
 std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
-                                 const std::vector<std::string>& withheld);
+                                 const std::vector<std::string>& withheld, const ModelDiscrepancy* usual = nullptr);
 
 /// What a size changes for a unit of its coordinate, near the file's; and where it is large, as a delay of a third of a beat turns what a smaller
 /// one does into something else.
 struct SizeColumn : EffectSize {
   BasisCoefficients change;
+  /// Where it is as small as in vehicles without the effect, above 0 and below: how a wing lands on its stop is another matter there.
+  std::vector<BasisCoefficients> near;
   struct Large {
     double at;                        ///< coordinate beyond the file's
     BasisCoefficients chord, change;  ///< on the way there, and there

@@ -75,15 +75,13 @@ int Evidence::block_of(int group, BasisFunction function) {
   return (group / kCoefficients * (kHarmonics + 1) + harmonic) * kClasses + static_cast<int>(regimes_of(function));
 }
 
-double Evidence::price_of(double times) const {
-  return -log_prior(times, scales_.robot, discrepancy_.spread.entry_freedom);
-}
+double Evidence::price_of(double times, double freedom) const { return -log_prior(times, scales_.robot, freedom); }
 
 Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& columns, const std::vector<char>& use,
                         const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats,
                         int iterations) const {
   const Index q = basis_.size(), k = static_cast<Index>(columns.columns.size());
-  const double nu = discrepancy_.spread.block_freedom, entry_nu = discrepancy_.spread.entry_freedom;
+  const double nu = discrepancy_.spread.block_freedom;
   const VectorXd prior_mean = columns.mean();
   std::vector<int> seen;
   for (int g = 0; g < kGroups; ++g)
@@ -122,13 +120,18 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
   if (best.scales.free.empty()) best.scales.free.assign(kBlocks, 0);
   best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
   std::vector<int> of_entry;  // how many columns
-  for (const int e : columns.entry)
-    if (e >= 0) {
-      of_entry.resize(std::max(of_entry.size(), static_cast<std::size_t>(e) + 1));
-      ++of_entry[static_cast<std::size_t>(e)];
+  std::vector<double> entry_nu;
+  for (std::size_t i = 0; i < columns.entry.size(); ++i)
+    if (columns.entry[i] >= 0) {
+      const auto e = static_cast<std::size_t>(columns.entry[i]);
+      of_entry.resize(std::max(of_entry.size(), e + 1));
+      entry_nu.resize(of_entry.size());
+      ++of_entry[e];
+      entry_nu[e] = columns.freedom[i];
     }
   best.scales.entries.resize(std::max(best.scales.entries.size(), of_entry.size()), 1);
   of_entry.resize(best.scales.entries.size());
+  entry_nu.resize(best.scales.entries.size());
   Scales now = best.scales, next = best.scales;
   double stride = 1;
   std::vector<Half> halves(seen.size());
@@ -167,7 +170,7 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
     for (std::size_t b = 0; b < kBlocks; ++b)
       if (counts[b] > 0) thought += now.free[b] ? -*freeing_nats : held_ ? 0 : log_prior(now.blocks[b], now.robot, nu);
     for (std::size_t e = 0; e < of_entry.size(); ++e)
-      if (of_entry[e] > 0 && !held_) thought += log_prior(now.entries[e], now.robot, entry_nu);
+      if (of_entry[e] > 0 && !held_) thought += log_prior(now.entries[e], now.robot, entry_nu[e]);
     w.posterior.log_evidence += thought;
     const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
     if (!(gain > 0)) {  // too far: from the best on, by a step that cannot fail
@@ -210,8 +213,8 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
       for (std::size_t e = 0; e < of_entry.size(); ++e) {
         if (of_entry[e] == 0) continue;
         const double f2 = next.robot * next.robot, scale2 = next.entries[e] * next.entries[e];
-        next.entries[e] = std::sqrt((squares[e] * scale2 + entry_nu * f2) / (of_entry[e] + entry_nu));
-        freedom += entry_nu, inverses += entry_nu / (next.entries[e] * next.entries[e]);
+        next.entries[e] = std::sqrt((squares[e] * scale2 + entry_nu[e] * f2) / (of_entry[e] + entry_nu[e]));
+        freedom += entry_nu[e], inverses += entry_nu[e] / (next.entries[e] * next.entries[e]);
       }
     }
     for (std::size_t b = 0; b < kBlocks; ++b) {

@@ -333,7 +333,7 @@ TEST(RobotFit, SaysHowMuchMoreProbableSizesAreOfAnEffect) {
     for (double log_t = -3; log_t < 6; log_t += 1e-3) {
       const double sd = std::exp(log_t) * discrepancy.background_sd(entry);
       least = std::min(least, 0.5 * sizes.squaredNorm() / (sd * sd) + static_cast<double>(sizes.size()) * std::log(sd) +
-                                  robot.evidence().price_of(std::exp(log_t)));
+                                  robot.evidence().price_of(std::exp(log_t), discrepancy.freedom_of(entry)));
     }
     return least;
   };
@@ -347,6 +347,40 @@ TEST(RobotFit, SaysHowMuchMoreProbableSizesAreOfAnEffect) {
   };
   EXPECT_NEAR(robot.beyond_background("wing_damage", one), sides(0.5 / std::sqrt(2), 0.5 / std::sqrt(2)) - 0.125, 1e-5);
   EXPECT_NEAR(robot.beyond_background("wing_damage", both), sides(0, std::sqrt(0.5)) - 0.25, 1e-5);
+}
+
+// How a wing lands on its stop turns with its spring: a line from where an effect is large is none of what a robot has anyway.
+TEST(Diagnose, NamesNoEffectForWhatAnyRobotMayHave) {
+  const std::vector<PredictedFlight> flights =
+      flown("hummingbird_nominal", {"vehicle.effects.spring_hardening.per_rad2=-0.015", "flight.duration_s=5"});
+  DiagnoseOptions options;
+  options.threads = 2;
+  options.discrepancy.background["spring_hardening"] = 0.08;
+  const Diagnosis d = diagnose(flights, uncertain(), options);
+  EXPECT_TRUE(d.conclusion.effects.empty()) << d.conclusion.effects[0];
+}
+
+TEST(Screening, StepsAsFarAsRobotsGoAnyway) {
+  ModelDiscrepancy usual = read_model_discrepancy();
+  usual.background = {{"other", 0.001}, {"spring_hardening", 0.06}, {"ground_effect", 1}};
+  const sim::Randomisation prior = uncertain();
+  const Eigen::VectorXd at = Hypothesis(prior, {}).start();
+  for (const SizeStep& s : size_steps(prior, at, {}, &usual)) {
+    const auto near = [&](std::size_t i, const char* size) {
+      return s.near.at(i).vehicle.effects.at(s.effect).at(size);
+    };
+    if (s.effect == "spring_hardening") {
+      ASSERT_EQ(s.near.size(), 2u);
+      EXPECT_NEAR(near(0, "per_rad2"), 2 * 0.06 * unknowns_of(s.effect)[0].scale, 1e-12);
+      EXPECT_NEAR(near(1, "per_rad2"), -near(0, "per_rad2"), 1e-12);
+    } else if (s.effect == "ground_effect") {
+      ASSERT_EQ(s.near.size(), 1u) << "of one sign";
+      EXPECT_NEAR(near(0, "gain"), kSizeReach * unknowns_of(s.effect)[0].scale, 1e-12) << "no farther than far";
+    } else {
+      EXPECT_EQ(s.reach, 0.05) << s.effect << ": nearer, differences are rough";
+    }
+  }
+  EXPECT_TRUE(size_steps(prior, at, {})[0].near.empty());
 }
 
 // A third of a beat and more: near 0 its derivative shows nothing of it.
@@ -411,8 +445,8 @@ SufficientStatistics sums_of(const Evidence& evidence, const PredictedFlight& fl
   return s;
 }
 
-// Deltas drawn at three times their sd in all blocks, and at thirty times in one: the robot's scale is three, and the block is free where
-// that is allowed. A sum of squares of n normal numbers is n (1 +- sqrt(2 / n)); heavy tails of the law draw a robot's scale in.
+// Deltas drawn at three times their sd in all blocks, and at ninety times in one: the robot's scale is three, and the block is free where
+// that is allowed, for its scale costs more than the 10 nats of that: nu / 2 (2 log 30 - 1), nu = 4. A sum of squares of n normal numbers is n (1 +- sqrt(2 / n)); heavy tails of the law draw a robot's scale in.
 TEST(Evidence, FindsHowFarModelsOfARobotAreOff) {
   const std::vector<PredictedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
   const Evidence evidence(flights, read_model_discrepancy(), 2);
@@ -423,7 +457,7 @@ TEST(Evidence, FindsHowFarModelsOfARobotAreOff) {
   BasisCoefficients delta = sd;
   for (int g = 0; g < kGroups; ++g)
     for (int i = 0; i < evidence.basis().size(); ++i)
-      delta(g, i) *= (Evidence::block_of(g, evidence.basis().kind(i)) == freed ? 30 : 3) * normal(random);
+      delta(g, i) *= (Evidence::block_of(g, evidence.basis().kind(i)) == freed ? 90 : 3) * normal(random);
   const SufficientStatistics s = sums_of(evidence, flights[0], delta);
   const auto weigh = [&](std::optional<double> nats, int iterations) {
     return evidence.weigh(s, {}, {1}, {}, Scales{}, nats, iterations);
@@ -462,10 +496,11 @@ TEST(Evidence, FindsHowMuchARobotHasOfAnEntry) {
   constexpr double kTimes = 20;
   const SufficientStatistics s = sums_of(evidence, flights[0], kTimes * column);
   Columns usual, alone;
-  usual.add(column, 0, 0);
+  constexpr double nu = 7;
+  usual.add(column, 0, 0, nu);
   alone.add(column, 0);
   const Weighed w = evidence.weigh(s, usual, {1}, {}, Scales{});
-  const double nu = discrepancy.spread.entry_freedom, f = w.scales.robot;
+  const double f = w.scales.robot;
   ASSERT_EQ(w.scales.entries.size(), 1u);
   const double t2 = (kTimes * kTimes + nu * f * f) / (1 + nu);
   EXPECT_NEAR(w.scales.entries[0] / std::sqrt(t2), 1, 0.03);
@@ -476,8 +511,8 @@ TEST(Evidence, FindsHowMuchARobotHasOfAnEntry) {
   const double gain = by_entry + 0.5 * kTimes * kTimes;
   EXPECT_NEAR((w.posterior.log_evidence - fixed.posterior.log_evidence) / gain, 1, 0.1)
       << "the robot's own factor, and its blocks, move along";
-  EXPECT_EQ(evidence.price_of(evidence.scales().robot), 0);
-  EXPECT_NEAR(evidence.price_of(10), nu / 2 * (2 * std::log(10) - 1 + 0.01), 1e-12);
+  EXPECT_EQ(evidence.price_of(evidence.scales().robot, nu), 0);
+  EXPECT_NEAR(evidence.price_of(10, nu), nu / 2 * (2 * std::log(10) - 1 + 0.01), 1e-12);
 }
 
 }  // namespace
