@@ -138,9 +138,9 @@ class Diagnoser {
     if (!robot_.evidence().discrepancy().spread.beside_all) share_backgrounds(d.hypotheses);
     set_probabilities(d.hypotheses, rule_);
     d.conclusion = conclude(d.hypotheses, rule_);
-    const ScoredHypothesis& concluded = d.hypotheses[d.conclusion.hypothesis];
-    d.sensors = concluded.fitted() ? robot_.sensors(Hypothesis(uncertain_, concluded.effects), concluded.fit)
-                                   : robot_.sensors(plain, parameters_);
+    const ScoredHypothesis& fit = flown(d);
+    d.sensors = fit.fitted() ? robot_.sensors(Hypothesis(uncertain_, fit.effects), fit.fit)
+                             : robot_.sensors(plain, parameters_);
     d.minors = uncertain_.minors();
     d.noise_sd = noise_sd();
     if (!flights_.front().within_the_beat()) d.validation = validate(robot_, flights_, d, threads_);
@@ -365,7 +365,9 @@ class Diagnoser {
         for (const std::string& e : a.effects)
           if (std::ranges::count(b.effects, e) > 0) ++shared;
           else explained -= std::max(beyond[e], 0.0);
-        if (shared == b.effects.size()) b.log_evidence = std::max(b.log_evidence, b.log_prior + explained);
+        if (shared < b.effects.size() || b.log_prior + explained <= b.log_evidence) continue;
+        b.log_evidence = b.log_prior + explained;
+        b.flown_with = a.flown_with.empty() ? a.effects : a.flown_with;
       }
     }
     // of what the flights tell nothing, that changes nothing
@@ -396,6 +398,14 @@ class Diagnoser {
 };
 
 }  // namespace
+
+const ScoredHypothesis& flown(const Diagnosis& diagnosis) {
+  const ScoredHypothesis& concluded = diagnosis.hypotheses[diagnosis.conclusion.hypothesis];
+  if (concluded.flown_with.empty()) return concluded;
+  return *std::ranges::find_if(diagnosis.hypotheses, [&](const ScoredHypothesis& a) {
+    return a.fitted() && a.effects == concluded.flown_with && a.terms.empty() == concluded.terms.empty();
+  });
+}
 
 Diagnosis diagnose(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
                    const DiagnoseOptions& options) {

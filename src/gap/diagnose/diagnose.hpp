@@ -32,6 +32,8 @@ struct ScoredHypothesis {
   /// its size is what flights that tell nothing of it leave probable.
   Fit fit;
   Residuals left;  ///< of an effect that was fitted: in each flight what is left with the fit to the others
+  /// Effects of the hypothesis whose fit explains most of this one; beyond its own they are in it as what any robot may have. Empty: its own.
+  std::vector<std::string> flown_with;
   bool fitted() const { return !fit.point.residual.empty(); }
 };
 
@@ -99,6 +101,9 @@ struct Diagnosis {
   Residuals refit;               ///< with parameters alone: in each flight what is left with the fit to the others
   std::vector<double> noise_sd;  ///< [group] of the rows of noise alone, as found
 };
+
+/// Whose fit is that of what was concluded: of the hypothesis itself, or of one with a background beside its effects.
+const ScoredHypothesis& flown(const Diagnosis& diagnosis);
 
 Diagnosis diagnose(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
                    const DiagnoseOptions& options);

@@ -53,9 +53,9 @@ Diagnosis diagnose_visibly(const std::vector<PredictedFlight>& flights, const si
 }
 
 /// The vehicle with what was concluded, and what remains uncertain of it.
-model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Diagnosis& d, const Conclusion& conclusion,
+model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Diagnosis& d,
                                  const sim::Randomisation& uncertain) {
-  const ScoredHypothesis& best = d.hypotheses[conclusion.hypothesis];
+  const ScoredHypothesis& best = flown(d);
   const Hypothesis h(uncertain, best.effects);
   const Fit& fit = best.kind == ScoredHypothesis::Kind::effect ? best.fit : d.parameters;
   model::Vehicle corrected = vehicle;
@@ -217,7 +217,7 @@ Json run_diagnose(const DiagnoseCommand& command) {
   std::string written = kJson;
   if (!faulty) {
     std::optional<model::Vehicle> corrected;
-    if (d.complete) corrected = corrected_vehicle(asked.vehicle, d, report.conclusion, asked.uncertain);
+    if (d.complete) corrected = corrected_vehicle(asked.vehicle, d, asked.uncertain);
     if (!out.empty()) written += write_all(out, report, corrected);
     if (corrected) look_ahead(command, asked, flights, d, *corrected, report);
   }

@@ -170,9 +170,13 @@ Report verdict_report_of(const std::vector<PredictedFlight>& flights, const sim:
     if (std::abs(s.value) > std::max(reach, kNoticed * s.believed_sd))
       r.sensors.push_back({s.name, s.value, s.value - reach, s.value + reach, unit_of(s.name)});
   }
-  if (concluded.kind == ScoredHypothesis::Kind::effect)
-    r.moved = moved_by(concluded.fit, Hypothesis(uncertain, concluded.effects));
-  else r.moved = moved_by(d.parameters, Hypothesis(uncertain, {}));
+  const ScoredHypothesis& fit = flown(d);
+  const bool effects = fit.kind == ScoredHypothesis::Kind::effect;
+  r.moved = moved_by(effects ? fit.fit : d.parameters, Hypothesis(uncertain, fit.effects));
+  if (effects) r.background = sizes_of(fit, uncertain);
+  std::erase_if(r.background, [&](const SizeEstimate& s) {
+    return std::ranges::any_of(concluded.effects, [&](const std::string& e) { return s.name.starts_with(e + "."); });
+  });
   return r;
 }
 
@@ -254,6 +258,7 @@ Json diagnosis_json(const Report& r) {
                  {"effects", r.conclusion.effects},
                  {"remainder", r.conclusion.remainder},
                  {"probability", r.conclusion.probability}}},
+               {"background", estimates(r.background)},
                {"sensors", estimates(r.sensors)},
                {"where", where},
                {"candidates", candidates},

@@ -61,6 +61,7 @@ struct Report {
   std::vector<Reported> candidates;  ///< effects, the most probable first; then the kinds without one
   std::vector<Unexplained> unexplained;
   std::vector<std::string> jointly_with;  ///< effects that are in force beside what is unexplained
+  std::vector<SizeEstimate> background;   ///< of effects no larger than any robot may have, beside the concluded ones
   std::vector<Moved> moved;               ///< parameters beside the concluded effects, the farthest first
   std::vector<SizeEstimate> sensors;      ///< what headers have wrong for sure, and not by next to nothing
   std::vector<GapLocation> places;

@@ -11,13 +11,18 @@
 namespace flappy::gap {
 namespace {
 
-constexpr std::size_t kSizes = 9, kRunnersUp = 3, kMoved = 3, kTerms = 3, kSensors = 3;
+constexpr std::size_t kSizes = 6, kBackground = 2, kRunnersUp = 3, kMoved = 3, kTerms = 3, kSensors = 3;
 
 std::string listed(const std::vector<std::string>& words, const char* last) {
   std::string all;
   for (std::size_t i = 0; i < words.size(); ++i)
     all += (i == 0 ? "" : i + 1 == words.size() ? std::string(" ") + last + " " : ", ") + words[i];
   return all;
+}
+
+std::string size_line(const SizeEstimate& s) {
+  return flightlog::format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
+                           s.unit.empty() ? "" : " ", s.unit.c_str());
 }
 
 std::string place_of(const Unexplained& u) {
@@ -137,11 +142,13 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
       concluded = c;
   if (concluded != nullptr) {
     lines.push_back("size, with its 90 % interval:");
-    for (std::size_t i = 0; i < concluded->sizes.size() && i < kSizes; ++i) {
-      const SizeEstimate& s = concluded->sizes[i];
-      lines.push_back(flightlog::format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
-                                        s.unit.empty() ? "" : " ", s.unit.c_str()));
-    }
+    for (std::size_t i = 0; i < concluded->sizes.size() && i < kSizes; ++i)
+      lines.push_back(size_line(concluded->sizes[i]));
+  }
+  if (!r.background.empty()) {
+    lines.push_back("besides, in the corrected vehicle, no more than any robot may have:");
+    for (std::size_t i = 0; i < r.background.size() && i < kBackground; ++i)
+      lines.push_back(size_line(r.background[i]));
   }
   if ((r.conclusion.kind == Conclusion::Kind::unknown || r.conclusion.remainder) && !r.unexplained.empty()) {
     lines.push_back(r.jointly_with.empty()

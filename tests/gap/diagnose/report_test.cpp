@@ -173,6 +173,21 @@ TEST(Verdict, WidensSizesAndShapes) {
 
 // ---- what is written
 
+// What was concluded is flown as the fit that explains most of it, with all that this one has in force.
+TEST(Verdict, FliesABackgroundBesideItsEffects) {
+  Diagnosis d;
+  d.hypotheses = {hypothesis(0.5, ScoredHypothesis::Kind::parameters), hypothesis(0.2, {"wind", "tether"}),
+                  hypothesis(0.2, {"wind", "tether"}), hypothesis(0.1, {"wind"})};
+  d.hypotheses[1].terms.emplace_back();
+  for (std::size_t i = 1; i < 4; ++i) d.hypotheses[i].fit.point.residual.emplace_back();
+  EXPECT_EQ(&flown(d), &d.hypotheses[0]);
+  d.hypotheses[0].flown_with = {"wind", "tether"};
+  EXPECT_EQ(&flown(d), &d.hypotheses[2]) << "the one with something more is another";
+  d.conclusion.hypothesis = 3;
+  d.hypotheses[3].flown_with = {"wind", "tether"};
+  EXPECT_EQ(&flown(d), &d.hypotheses[2]);
+}
+
 TEST(Report, UnitsAreThoseOfTheNames) {
   const std::pair<const char*, const char*> kExpected[] = {{"x_m", "m"},
                                                            {"delay_s", "s"},
@@ -215,6 +230,7 @@ TEST(Report, SaysWhatToDoInThirtyLines) {
   r.sensors = {{"imu.latency_s", 3.6e-4, 3e-4, 4.2e-4, "s"},
                {"power_delay.delay_s", -1e-3, -1.2e-3, -8e-4, "s"},
                {"imu_mounting.y_rad", -0.02, -0.03, -0.01, "rad"}};
+  for (int i = 0; i < 9; ++i) r.background.push_back({"spring_hardening.per_rad2", -0.02, -0.03, -0.01, "1/rad^2"});
   r.closed_loop = {{"flight", "mean_bias_V", 1, 0, 0.9}};
   r.next = NextExperiment{"dash", {"wind", "tether"}, 3};
   r.closure = Closure{0.9, 0.8, 0.95};
@@ -232,6 +248,9 @@ TEST(Report, SaysWhatToDoInThirtyLines) {
   EXPECT_NE(text.find("wind.x_m_s"), std::string::npos);
   EXPECT_NE(text.find("0.3 (0.1 to 0.5) m/s\n"), std::string::npos);
   EXPECT_NE(text.find("runners-up: tether 0.2"), std::string::npos) << text;
+  EXPECT_NE(text.find("no more than any robot may have:\n  spring_hardening.per_rad2                 -0.02 (-0.03 to "),
+            std::string::npos)
+      << text;
   EXPECT_NE(
       text.find("the IMU's samples are 0.36 ms older (0.3 to 0.42)\n  those of currents are 1 ms younger (0.8 to 1.2)\n"
                 "  the IMU is turned by 1.1 deg about -y (0.57 to 1.7)\n"),
@@ -296,8 +315,9 @@ std::string contents(const std::filesystem::path& path) { return io::read_text(p
 void expect_schema(const nlohmann::ordered_json& j) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : j.items()) keys.push_back(key);
-  EXPECT_EQ(keys, (std::vector<std::string>{"schema", "flights", "data_faults", "verdict", "sensors", "where",
-                                            "candidates", "unexplained", "gap", "closed_loop", "next_experiment"}));
+  EXPECT_EQ(keys,
+            (std::vector<std::string>{"schema", "flights", "data_faults", "verdict", "background", "sensors", "where",
+                                      "candidates", "unexplained", "gap", "closed_loop", "next_experiment"}));
   double sum = 0;
   for (const auto& c : j["candidates"]) {
     sum += c["probability"].get<double>();
