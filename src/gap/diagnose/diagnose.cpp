@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 /// Sets of effects of which it is asked whether something is left beside them.
 constexpr std::size_t kMostRemainders = 3;
 /// Effects that are fitted jointly with what explains most.
-constexpr std::size_t kFurther = 3;
+constexpr std::size_t kFurther = 2;
 /// Less than this share of what parameters leave may be chance; and the log evidence of what is refuted.
 constexpr double kLeastExplainable = 0.15, kRefuted = -1e9;
 /// A size that changes no row by so much, in its unit, cannot be told from none.

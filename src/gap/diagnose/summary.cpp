@@ -106,6 +106,8 @@ std::string sensor_line(const SizeEstimate& s) {
   const std::string axis = s.name.substr(s.name.rfind('.') + 1, 1), way = more ? "+" : "-";
   if (s.name == "imu.latency_s") return told("the IMU's samples are", 1e3, "ms", more ? "older" : "younger");
   if (s.name == "power_delay.delay_s") return told("those of currents are", 1e3, "ms", more ? "older" : "younger");
+  if (const std::size_t clock = s.name.find("_clock"); clock != std::string::npos)
+    return told("the clock of " + s.name.substr(0, clock) + ".csv is", 1e6, "ppm", more ? "fast" : "slow");
   if (s.name.starts_with("imu_mounting"))
     return told("the IMU is turned by", 180 / std::numbers::pi, "deg", "about " + way + axis);
   return told("the IMU sits", 1e3, "mm", "along " + way + axis);

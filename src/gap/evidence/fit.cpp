@@ -350,6 +350,9 @@ Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iteration
 Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters, bool own) const {
   if (fit.point.residual.empty()) return fit;  // comes apart
   VectorXd linearised_at = fit.point.at;
+  std::vector<Index> of_log;
+  for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i)
+    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].log) of_log.push_back(i);
   const auto linearise_here = [&](const VectorXd& at) {
     Linearised next = parameters == nullptr
                           ? linearise(hypothesis, at, principal(hypothesis, fit))
@@ -375,8 +378,12 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
       for (const double share : kShares) tries.push_back(hypothesis.bounded(l.at + share * step));
       for (const double damping : kDampings)
         tries.push_back(hypothesis.bounded(l.at + l.directions.axes * solve(l, columns, reduced, damping).mean));
+      // flown with the log as it is here, so that all share one; what else they would have the log say is a line
       std::vector<Candidate> candidates;
-      for (const VectorXd& at : tries) candidates.push_back(hypothesis.candidate(at));
+      for (VectorXd at : tries) {
+        at(of_log) = l.at(of_log);
+        candidates.push_back(hypothesis.candidate(at));
+      }
       std::vector<Residuals> left = residuals(flights_, candidates, threads_);
       left.push_back(l.residual);
       tries.push_back(l.at);
@@ -387,12 +394,21 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
       const Index others = static_cast<Index>(background.columns.size()),
                   first = static_cast<Index>(columns.columns.size()) - others;
       const MatrixXd sums = reduced.sums.block(first, first, others, others);
-      io::parallel_for(left.size(), threads_, [&](std::size_t i) {
+      const auto weigh = [&](std::size_t i, const std::vector<Index>& lines) {
         if (left[i].empty()) return;
         statistics[i] = evidence_.statistics(left[i]);
+        for (const Index line : lines)
+          if (const BasisCoefficients& column = l.columns[static_cast<std::size_t>(line)]; column.size() > 0)
+            evidence_.add(l.at[line] - tries[i][line], column, statistics[i]);
         costs[i] = cost(background, sums, statistics[i], tries[i]);
-      });
+      };
+      io::parallel_for(left.size(), threads_, [&](std::size_t i) { weigh(i, of_log); });
       const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
+      if (!of_log.empty() && best + 1 < left.size()) {
+        left[best] = std::move(residuals(flights_, {hypothesis.candidate(tries[best])}, threads_)[0]);
+        costs[best] = std::numeric_limits<double>::infinity();
+        weigh(best, {});
+      }
       improved = costs.back() - costs[best] >= kWorthwhile;
       if (improved) {
         const VectorXd away = l.directions.axes.transpose() * (tries[best] - linearised_at);

@@ -29,6 +29,7 @@ std::vector<Unknown> unknowns_of(const model::EffectEntry& entry) {
     Unknown u{entry.info.id, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < entry.info.sizes};
     if (u.size) u.scale = std::max(-p.prior_low, p.prior_high) / kHalf90;
     else u.centre = p.typical, u.scale = (p.prior_high - p.prior_low) / (2 * kHalf90);
+    u.log = entry.info.stage == model::Stage::sensor;
     list.push_back(std::move(u));
   }
   return list;
@@ -41,7 +42,10 @@ Hypothesis::Hypothesis(const sim::Randomisation& uncertain, std::vector<std::str
                          uncertain.is_uniform(d) ? 1.0 : kFarthest, false});
   unknowns_.push_back({"", "imu.latency_s", 0, kImuLagSd_s, -kFarthest * kImuLagSd_s, kFarthest * kImuLagSd_s, false});
   for (const std::string& e : effects_)
-    for (Unknown& u : unknowns_of(*model::find_effect(uncertain.nominal(), e))) unknowns_.push_back(std::move(u));
+    for (Unknown& u : unknowns_of(*model::find_effect(uncertain.nominal(), e))) {
+      u.log = u.log && !uncertain.nominal().beat_averaged;  // which has its sensors in its prediction
+      unknowns_.push_back(std::move(u));
+    }
 }
 
 Eigen::VectorXd Hypothesis::start(const model::Vehicle& vehicle) const {

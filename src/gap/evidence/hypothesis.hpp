@@ -24,6 +24,7 @@ struct Unknown {
   double centre = 0, scale = 1;
   double low = -1e30, high = 1e30;  ///< of the value
   bool size = false;                ///< the effect vanishes where all of its sizes are 0
+  bool log = false;                 ///< it changes what the log says, not what is flown (replay/sensor_correction.hpp)
   double value(double coordinate) const;
   double coordinate(double of_value) const { return (of_value - centre) / scale; }
 };

@@ -35,7 +35,7 @@ constexpr const char* kShares =
 constexpr const char* kSpread =
     R"(# How much more or less than usual models of a robot are off: standard deviation of the log of its own factor, wide, for a robot may be
 # nearly the model; and how far its blocks (a kind of regime in a channel and harmonic), and what it has of each entry, go their own ways
-# about it, as degrees of freedom of an inverse gamma law: few of entries that say how a wing, its hinges and its drive work by
+# about it, as degrees of freedom of an inverse gamma law: many of blocks of the place, for a wing knows nothing of it; few of entries that say how a wing, its hinges and its drive work by
 # themselves (of_models), for each model, and each maker's robot, has such laws of its own. Choices.
 )";
 constexpr const char* kSensors =
@@ -104,11 +104,13 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
   }
   text += std::string(kSpread) + "[spread]\nrobot_sd = " + number(d.spread.robot_sd) +
           "\nblock_freedom = " + number(d.spread.block_freedom) +
+          (d.spread.beside_all ? "" : "\nplace_freedom = " + number(d.spread.place_freedom)) +
           "\nentry_freedom = " + number(d.spread.entry_freedom) + of_models +
           (d.spread.beside_all ? "\nbeside_all = true\n\n" : "\n\n") + kSensors +
           "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") + "  # as it is mounted, about each axis\n" +
           "imu_place_m = " + sensor("imu_place") + "  # along each axis\npower_latency_s = " + sensor("power_delay") +
-          "  # of a sample that is an instant, a mean, or held\n\n" + kBackground + "[background_sd]\n";
+          "  # of a sample that is an instant, a mean, or held\nclock_rate = " + sensor("imu_clock") +
+          "  # of each stream's clock against that of the commands\n\n" + kBackground + "[background_sd]\n";
   for (const auto& [effect, sd] : d.background) text += effect + " = " + number(sd) + "\n";
   return text;
 }
@@ -119,9 +121,14 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   root.schema(1);
   ModelDiscrepancy d;
   const io::Table spread = root.table("spread");
-  d.spread = {spread.number("robot_sd", io::positive()), spread.number("block_freedom", io::positive()),
-              spread.number("entry_freedom", io::positive()), 0, spread.boolean_or("beside_all", false)};
+  d.spread = {spread.number("robot_sd", io::positive()),
+              spread.number("block_freedom", io::positive()),
+              spread.number("block_freedom", io::positive()),
+              spread.number("entry_freedom", io::positive()),
+              0,
+              spread.boolean_or("beside_all", false)};
   if (!d.spread.beside_all) {
+    d.spread.place_freedom = spread.number("place_freedom", io::positive());
     d.spread.model_freedom = spread.number("model_freedom", io::positive());
     d.of_models = spread.strings("of_models");
   }
@@ -148,6 +155,8 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
     axes("imu_mounting", "rad", sensors->number("imu_rotation_rad", io::positive()));
     axes("imu_place", "m", sensors->number("imu_place_m", io::positive()));
     d.nuisances.push_back({"power_delay", "delay_s", sensors->number("power_latency_s", io::positive())});
+    for (const char* id : {"imu_clock", "mocap_clock", "power_clock"})
+      d.nuisances.push_back({id, "rate", sensors->number("clock_rate", io::positive())});
   }
   const io::Table background = root.table("background_sd");
   d.background["other"] = background.number("other", io::positive());

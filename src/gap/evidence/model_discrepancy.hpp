@@ -23,6 +23,7 @@ struct ModelDiscrepancy {
   /// left has heavy tails. So has what every vehicle has of an entry, and it is the more, too, the more models of it are off.
   struct Spread {
     double robot_sd, block_freedom;
+    double place_freedom;  ///< .. of blocks of the place, of which a wing knows nothing
     double entry_freedom;  ///< the same of what a vehicle has of an entry
     double model_freedom;  ///< .. of one that models describe each in its own way
     /// What models are off by is what is left beside every entry together, and the same for every hypothesis.
@@ -43,7 +44,11 @@ struct ModelDiscrepancy {
   }
   /// Sd of the coordinates of an effect's sizes (gap/evidence/hypothesis.hpp) in a vehicle without any effect.
   double background_sd(const std::string& effect) const;
-  /// Degrees of freedom of how much more or less a robot has of that.
+  /// Degrees of freedom of how much more or less a robot has of a block of such functions.
+  double freedom_of(Regimes regimes) const {
+    return regimes == Regimes::place ? spread.place_freedom : spread.block_freedom;
+  }
+  /// .. and of an entry.
   double freedom_of(const std::string& effect) const;
 
   std::array<std::array<std::array<double, static_cast<std::size_t>(BasisFunction::count)>, kHarmonics + 1>, kChannels>

@@ -278,6 +278,7 @@ void RobotFit::find_sizes() {
       sizes_.back().near.push_back(there.size() > 0 ? BasisCoefficients(there / (n == 0 ? s.reach : -s.reach))
                                                     : sizes_.back().change);
     }
+    if (s.near.empty()) sizes_.back().near.push_back(sizes_.back().change);
     for (std::size_t k = shapes; k < shapes + s.shaped.size(); ++k)
       if (changes[k].size() > 0) shapes_.push_back({s, (changes[k] - along[0]) / kSizeReach, {}, {}});
     for (std::size_t n = 1; n + 1 < along.size() && along[n].size() > 0 && along[n + 1].size() > 0; ++n) {

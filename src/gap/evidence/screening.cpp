@@ -145,11 +145,12 @@ std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Vect
       if (!h.unknowns()[static_cast<std::size_t>(i)].size) continue;
       VectorXd there = here;
       there[i] += kSizeReach;
-      const bool one_sided = h.unknowns()[static_cast<std::size_t>(i)].low >= 0;
+      const bool one_sided = h.unknowns()[static_cast<std::size_t>(i)].low >= 0,
+                 of_log = h.unknowns()[static_cast<std::size_t>(i)].log;  // a line, near and far
       steps.push_back({{id, i - first, h.size() - first, one_sided, here[i]}, h.candidate(there), {}, {}, reach, {}});
       for (const double sign : {1.0, -1.0}) {
         there[i] = here[i] + sign * reach;
-        if (usual && (sign > 0 || !one_sided)) steps.back().near.push_back(h.candidate(h.bounded(there)));
+        if (usual && !of_log && (sign > 0 || !one_sided)) steps.back().near.push_back(h.candidate(h.bounded(there)));
       }
       for (std::size_t n = 2; n <= kFurthest && one_sided; ++n) {
         there[i] = here[i] + kSizeReach * static_cast<double>(n);

@@ -81,7 +81,8 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
                         const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats,
                         int iterations) const {
   const Index q = basis_.size(), k = static_cast<Index>(columns.columns.size());
-  const double nu = discrepancy_.spread.block_freedom;
+  std::vector<double> nu;
+  for (std::size_t b = 0; b < kBlocks; ++b) nu.push_back(discrepancy_.freedom_of(static_cast<Regimes>(b % kClasses)));
   const VectorXd prior_mean = columns.mean();
   std::vector<int> seen;
   for (int g = 0; g < kGroups; ++g)
@@ -168,7 +169,8 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
               BasisCoefficients::Zero(kGroups, q)};
     double thought = -0.5 * std::pow(std::log(now.robot) / discrepancy_.spread.robot_sd, 2);
     for (std::size_t b = 0; b < kBlocks; ++b)
-      if (counts[b] > 0) thought += now.free[b] ? -*freeing_nats : held_ ? 0 : log_prior(now.blocks[b], now.robot, nu);
+      if (counts[b] > 0)
+        thought += now.free[b] ? -*freeing_nats : held_ ? 0 : log_prior(now.blocks[b], now.robot, nu[b]);
     for (std::size_t e = 0; e < of_entry.size(); ++e)
       if (of_entry[e] > 0 && !held_) thought += log_prior(now.entries[e], now.robot, entry_nu[e]);
     w.posterior.log_evidence += thought;
@@ -220,19 +222,19 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
     for (std::size_t b = 0; b < kBlocks; ++b) {
       if (counts[b] == 0) continue;
       const double n = counts[b], f2 = next.robot * next.robot;
-      const double usual2 = held_ ? scales_.blocks[b] * scales_.blocks[b] : (total[b] + nu * f2) / (n + nu);
+      const double usual2 = held_ ? scales_.blocks[b] * scales_.blocks[b] : (total[b] + nu[b] * f2) / (n + nu[b]);
       next.blocks[b] = std::sqrt(usual2);
       next.free[b] = 0;
       if (freeing_nats) {
         const double free2 = std::max(total[b] / n, kLeastFree * kLeastFree * f2);
         const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };
-        const double usual = held_ ? 0 : log_prior(std::sqrt(usual2), next.robot, nu);
+        const double usual = held_ ? 0 : log_prior(std::sqrt(usual2), next.robot, nu[b]);
         if (objective(free2) - *freeing_nats > objective(usual2) + usual) {
           next.blocks[b] = std::sqrt(free2);
           next.free[b] = 1;
         }
       }
-      if (!next.free[b]) freedom += nu, inverses += nu / (next.blocks[b] * next.blocks[b]);
+      if (!next.free[b]) freedom += nu[b], inverses += nu[b] / (next.blocks[b] * next.blocks[b]);
     }
     if (!held_) next.robot = robot_of(freedom, inverses, discrepancy_.spread.robot_sd);
     now = strided(best.scales, next, stride);

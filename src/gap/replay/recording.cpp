@@ -57,7 +57,9 @@ Recording::Recording(const Recording& other, flightlog::FlightLog flight_log)
       log(std::move(flight_log)),
       smoother(log, other.name),
       begin_s(other.begin_s),
-      last_s(other.last_s) {
+      last_s(other.last_s),
+      beats(other.beats),
+      first_beat_(other.first_beat_) {
   prepare(name);
 }
 
@@ -162,15 +164,16 @@ void Recording::find_phase() {
       }
     }
   }
-  const double first = std::floor(beat_at(begin_s));
-  phase_offset_ -= first;
-  for (double& b : phase_beats_) b -= first;
+  const bool as_before = beats > 0;  // a clock that is corrected moves the grid by a step
+  if (!as_before) first_beat_ = std::floor(beat_at(begin_s));
+  phase_offset_ -= first_beat_;
+  for (double& b : phase_beats_) b -= first_beat_;
   double from_s = begin_s;
   for (std::size_t k = 0; k < intervals(); ++k) {
     beat.push_back(beat_at((from_s + end_s[k]) / 2));
     from_s = end_s[k];
   }
-  beats = beat.empty() ? 0 : static_cast<std::size_t>(std::max(0.0, std::floor(beat.back())));
+  if (!as_before) beats = beat.empty() ? 0 : static_cast<std::size_t>(std::max(0.0, std::floor(beat.back())));
 }
 
 double Recording::beat_at(double t_s) const {

@@ -71,6 +71,7 @@ struct Recording {
   void read_regimes();
   std::vector<double> phase_t_s_, phase_beats_;  ///< unwrapped, where the log has it
   double phase_offset_ = 0, phase_hz_ = 0;
+  double first_beat_ = 0;  ///< of the command's, that is beat 0
 };
 
 }  // namespace flappy::gap

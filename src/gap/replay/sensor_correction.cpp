@@ -73,6 +73,11 @@ void undo_rectification(const Values& v, double flapping_Hz, flightlog::ImuStrea
   }
 }
 
+void undo_clock(const Values& v, flightlog::Column& t_s) {
+  const double rate = v.at("rate"), middle_s = (t_s.front() + t_s.back()) / 2;
+  for (double& t : t_s) t -= rate * (t - middle_s);
+}
+
 template <class Change>
 void change_poses(flightlog::MocapStream& m, const Change& change) {
   for (std::size_t i = 0; i < m.t_s.size(); ++i) {
@@ -102,6 +107,9 @@ flightlog::FlightLog without(const EffectValues& effects, flightlog::FlightLog l
     return at == effects.end() ? nullptr : &at->second;
   };
   // the last of what a sensor did is undone first
+  if (const Values* v = given("imu_clock")) undo_clock(*v, log.imu.t_s);
+  if (const Values* v = given("mocap_clock")) undo_clock(*v, log.mocap.t_s);
+  if (const Values* v = given("power_clock"); v && log.power) undo_clock(*v, log.power->t_s);
   if (const Values* v = given("gyro_bias")) undo_gyro_bias(*v, log.imu);
   if (const Values* v = given("vibration_rectification")) undo_rectification(*v, log.header.flapping_Hz, log.imu);
   if (const Values* v = given("accelerometer_misalignment")) undo_misalignment(*v, log.imu);

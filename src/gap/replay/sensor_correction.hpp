@@ -13,6 +13,8 @@
 //   imu_mounting                gyro and force turned back by a small rotation vector
 //   imu_place                   the IMU sits elsewhere in B
 //   power_delay                 currents earlier by what the header does not say
+//   imu_clock, mocap_clock,     instants about the middle of the log, by a clock that runs so much too fast: a crystal's 50 ppm are 3 %
+//     power_clock                 of the fourth harmonic's period at either end of 10 s
 #pragma once
 
 #include <map>
