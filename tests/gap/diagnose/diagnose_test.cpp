@@ -277,6 +277,12 @@ TEST(SensorEffects, AreTakenBack) {
   EXPECT_NEAR(mounted.imu.accel_y_m_s2[50], turned.imu.accel_y_m_s2[50], 1e-12);
   EXPECT_EQ(without({{"imu_place", {{"x_m", 0.01}, {"y_m", 0}, {"z_m", 0}}}}, log).header.imu.position_m[0],
             log.header.imu.position_m[0] + 0.01);
+  // a clock that runs fast is right in the middle, and beats stay where they were
+  const auto slowed = without({{"imu_clock", {{"rate", 1e-4}}}}, log);
+  EXPECT_NEAR(log.imu.t_s.back() - slowed.imu.t_s.back(), 0.5e-4 * (log.imu.t_s.back() - log.imu.t_s.front()), 1e-12);
+  EXPECT_NEAR(slowed.imu.t_s.back() + slowed.imu.t_s.front(), log.imu.t_s.back() + log.imu.t_s.front(), 1e-9);
+  EXPECT_EQ(slowed.mocap, log.mocap);
+  EXPECT_EQ(flights[0].with_log(slowed).beats(), flights[0].beats());
   EXPECT_TRUE(sensor_effects({{"wind", {}}, {"mocap_tilt", {}}}).count("mocap_tilt"));
   EXPECT_FALSE(sensor_effects({{"wind", {}}, {"mocap_tilt", {}}}).count("wind"));
 }
@@ -350,14 +356,20 @@ TEST(RobotFit, SaysHowMuchMoreProbableSizesAreOfAnEffect) {
 }
 
 // How a wing lands on its stop turns with its spring: a line from where an effect is large is none of what a robot has anyway.
+// So is a clock that runs 60 ppm fast: over 5 s it turns the fourth harmonic by 0.13 rad at either end.
 TEST(Diagnose, NamesNoEffectForWhatAnyRobotMayHave) {
-  const std::vector<PredictedFlight> flights =
+  std::vector<PredictedFlight> flights =
       flown("hummingbird_nominal", {"vehicle.effects.spring_hardening.per_rad2=-0.015", "flight.duration_s=5"});
+  flights[0] = flights[0].with_log(without({{"imu_clock", {{"rate", -6e-5}}}}, flights[0].recording().log));
   DiagnoseOptions options;
   options.threads = 2;
   options.discrepancy.background["spring_hardening"] = 0.08;
   const Diagnosis d = diagnose(flights, uncertain(), options);
   EXPECT_TRUE(d.conclusion.effects.empty()) << d.conclusion.effects[0];
+  const auto clock = std::ranges::find(d.sensors, "imu_clock.rate", &SensorFinding::name);
+  ASSERT_NE(clock, d.sensors.end());
+  EXPECT_NEAR(clock->value, 6e-5, 4 * clock->sd);
+  EXPECT_LT(clock->sd, 1e-5);
 }
 
 TEST(Screening, StepsAsFarAsRobotsGoAnyway) {
