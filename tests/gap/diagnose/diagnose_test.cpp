@@ -461,7 +461,9 @@ SufficientStatistics sums_of(const Evidence& evidence, const PredictedFlight& fl
 // that is allowed, for its scale costs more than the 10 nats of that: nu / 2 (2 log 30 - 1), nu = 4. A sum of squares of n normal numbers is n (1 +- sqrt(2 / n)); heavy tails of the law draw a robot's scale in.
 TEST(Evidence, FindsHowFarModelsOfARobotAreOff) {
   const std::vector<PredictedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
-  const Evidence evidence(flights, read_model_discrepancy(), 2);
+  ModelDiscrepancy discrepancy = read_model_discrepancy();
+  discrepancy.spread.place_freedom = discrepancy.spread.block_freedom;
+  const Evidence evidence(flights, discrepancy, 2);
   const BasisCoefficients sd = evidence.discrepancy_sd();
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
