@@ -122,7 +122,9 @@ class Diagnoser {
       if (more.terms.empty()) continue;
       more.kind = ScoredHypothesis::Kind::effect;
       more.effects = a.effects;
+      const double shape = more.fit.point.shape;
       more.fit = a.fit;
+      more.fit.point.shape = shape;
       more.log_evidence += a.log_prior + std::log(rule_.prior.remainder);
       more.log_prior = a.log_prior + std::log(rule_.prior.remainder);
       singles.push_back(std::move(more));
@@ -154,6 +156,7 @@ class Diagnoser {
     return sd;
   }
 
+  /// None or parameters.
   ScoredHypothesis weigh(ScoredHypothesis::Kind kind, const Hypothesis& h, const Linearised& l,
                          double log_prior) const {
     ScoredHypothesis a;
@@ -178,6 +181,7 @@ class Diagnoser {
     a.jointly_with = h.effects();
     a.log_evidence = w.posterior.log_evidence + log_prior;
     a.log_prior = log_prior;
+    a.fit.point.shape = w.shape;
     const RegimeBasis& basis = evidence_.basis();
     for (std::size_t block = 0; block < w.scales.free.size(); ++block) {
       if (!w.scales.free[block]) continue;
@@ -305,7 +309,13 @@ class Diagnoser {
       const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
       if (u.size && u.low >= 0) log_prior += std::log(2.0);
     }
-    ScoredHypothesis a = weigh(ScoredHypothesis::Kind::effect, h, fit.point, log_prior);
+    const Weighed w = robot_.weigh(h, fit.point);
+    fit.point.shape = w.shape;
+    ScoredHypothesis a;
+    a.kind = ScoredHypothesis::Kind::effect;
+    a.effects = effects;
+    a.log_evidence = w.posterior.log_evidence + log_prior;
+    a.log_prior = log_prior;
     a.fit = std::move(fit);
     return a;
   }
@@ -347,7 +357,7 @@ class Diagnoser {
     for (const ScoredHypothesis& a : all) {
       if (!a.fitted()) continue;
       const Hypothesis h(uncertain_, a.effects);
-      const VectorXd mean = a.fit.mean();
+      const VectorXd mean = std::max(1.0, a.fit.point.shape) * a.fit.mean();  // a law that is far from the entry's is as much of it
       std::map<std::string, double> beyond;
       for (const std::string& e : a.effects) {
         std::vector<double> sizes;

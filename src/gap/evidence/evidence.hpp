@@ -87,6 +87,7 @@ struct Posterior {
 struct Weighed {
   Posterior posterior;  ///< its evidence includes what is thought of the scales
   Scales scales;
+  double shape = 1;           ///< as of Linearised
   BasisCoefficients delta;    ///< mean of what is left for the discrepancy, over its sd
   BasisCoefficients squares;  ///< expected square of delta, over that of its sd where all scales are 1; 0: not seen
 };

@@ -232,7 +232,8 @@ Columns Fitter::unscaled_columns_of(const Linearised& point, const std::vector<s
   return c;
 }
 
-BasisCoefficients Fitter::form_error(const Hypothesis& hypothesis, const Linearised& point) const {
+/// What all sizes of each effect change.
+std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypothesis, const Linearised& point) const {
   std::map<std::string, BasisCoefficients> whole;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
     const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(i)];
@@ -242,9 +243,43 @@ BasisCoefficients Fitter::form_error(const Hypothesis& hypothesis, const Lineari
     if (own.size() == 0) own = BasisCoefficients::Zero(column.rows(), column.cols());
     own += point.at[i] * column;
   }
+  return whole;
+}
+
+BasisCoefficients Fitter::form_error(const Hypothesis& hypothesis, const Linearised& point, double shape) const {
   BasisCoefficients squares = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
-  for (const auto& [effect, own] : whole) squares += (evidence_.discrepancy().form_error * own).cwiseAbs2();
+  for (const auto& [effect, own] : changes(hypothesis, point))
+    squares += (evidence_.discrepancy().form_error * own).cwiseAbs2() + (shape * shape_error(own)).cwiseAbs2();
   return squares.cwiseSqrt();
+}
+
+bool Fitter::has_shape(const Hypothesis& hypothesis, const Linearised& point) const {
+  return std::ranges::any_of(changes(hypothesis, point),
+                             [&](const auto& own) { return shape_error(own.second).any(); });
+}
+
+/// Laws of what acts by the place (near surfaces, at a line, in time) differ in more than size: along the functions of the place that this change
+/// follows, every load of the body may have as much of it as they have on average.
+BasisCoefficients Fitter::shape_error(const BasisCoefficients& change) const {
+  const RegimeBasis& basis = evidence_.basis();
+  BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
+  if (evidence_.discrepancy().spread.beside_all) return sd;
+  const auto of_place = [&](int i) { return regimes_of(basis.kind(i)) == Regimes::place; };
+  const auto load = [](int g) { return g / kCoefficients <= kForceZ; };
+  VectorXd squares = VectorXd::Zero(change.cols());
+  double groups = 0, place = 0, all = 0;
+  for (int g = 0; g < kGroups; ++g) {
+    const double signal = evidence_.signal(g);
+    if (!load(g) || !(signal > 0)) continue;
+    squares += (change.row(g).transpose() / signal).cwiseAbs2();
+    ++groups;
+  }
+  for (int i = 1; i < basis.size(); ++i) all += squares[i], place += of_place(i) ? squares[i] : 0;
+  if (!(place > all / 2)) return sd;
+  for (int g = 0; g < kGroups; ++g)
+    for (int i = 1; i < basis.size(); ++i)
+      if (load(g) && of_place(i)) sd(g, i) = std::sqrt(squares[i] / groups) * evidence_.signal(g);
+  return sd;
 }
 
 Posterior Fitter::posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const {

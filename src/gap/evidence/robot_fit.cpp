@@ -22,6 +22,9 @@ constexpr int kRemainderRounds = 3;
 /// Nats that another round has to bring; and that a round may lose, as lines are no curves.
 constexpr double kWorthwhile = 2;
 
+/// How far another law than the entry's may go: sd of the log of its factor, and the largest.
+constexpr double kShapeSd = 1, kMostShape = 32;
+
 /// Whether an entry has a size for each wing, and no other.
 bool of_sides(const model::EffectEntry& entry) {
   return entry.info.sizes == 2 && std::string_view(entry.parameters[0].name).starts_with("left_") &&
@@ -222,8 +225,23 @@ std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const
 
 Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, const Scales& start,
                         std::optional<double> freeing_nats) const {
-  return evidence_.weigh(at.statistics, fitter_.unscaled_columns_of(at, hypothesis.effects()), fitter_.all_flights(),
-                         fitter_.form_error(hypothesis, at), start, freeing_nats);
+  const Columns columns = fitter_.unscaled_columns_of(at, hypothesis.effects());
+  const auto with = [&](double shape, const Scales& from) {
+    Weighed w = evidence_.weigh(at.statistics, columns, fitter_.all_flights(),
+                                fitter_.form_error(hypothesis, at, shape), from, freeing_nats);
+    w.shape = shape;
+    w.posterior.log_evidence -= 0.5 * std::pow(std::log(shape) / kShapeSd, 2);
+    return w;
+  };
+  Weighed best = with(1, start);
+  if (!fitter_.has_shape(hypothesis, at)) return best;
+  for (const double step : {2.0, 0.5})
+    for (double shape = step; shape <= kMostShape && shape >= 1 / kMostShape; shape *= step) {
+      Weighed other = with(shape, best.scales);
+      if (other.posterior.log_evidence < best.posterior.log_evidence) break;
+      best = std::move(other);
+    }
+  return best;
 }
 
 std::vector<SensorFinding> RobotFit::sensors(const Hypothesis& hypothesis, const Fit& fit) const {

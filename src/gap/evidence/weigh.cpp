@@ -165,7 +165,7 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
       reduced.log_scale -= h.llt.matrixLLT().diagonal().array().log().sum();
     }
     reduced.sums = MatrixXd(reduced.sums.selfadjointView<Eigen::Lower>());
-    Weighed w{posterior(reduced, chosen, prior_mean), now, BasisCoefficients::Zero(kGroups, q),
+    Weighed w{posterior(reduced, chosen, prior_mean), now, 1, BasisCoefficients::Zero(kGroups, q),
               BasisCoefficients::Zero(kGroups, q)};
     double thought = -0.5 * std::pow(std::log(now.robot) / discrepancy_.spread.robot_sd, 2);
     for (std::size_t b = 0; b < kBlocks; ++b)
