@@ -58,21 +58,23 @@ class Diagnoser {
       if (static_cast<int>(finalists.size()) < options_.finalists) finalists.push_back(s);
       else open.push_back(s);
     }
-    if (progress(0.4, "fitting effects")) {
-      // also those that promise nothing: beside parameters that make up for an effect, a line sees nothing of it
-      std::vector<ScoredHypothesis> fits(finalists.size());
-      io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}); });
-      for (std::size_t i = 0; i < fits.size(); ++i)
-        if (vanished(fits[i])) open.push_back(finalists[i]);
-        else singles.push_back(std::move(fits[i]));
-    } else {
-      open.insert(open.end(), finalists.begin(), finalists.end());
-    }
     d.parameters = parameters_;
     d.hypotheses.push_back(weigh(ScoredHypothesis::Kind::none, plain, robot_.nominal(), std::log(rule_.prior.none)));
     d.hypotheses.push_back(
         weigh(ScoredHypothesis::Kind::parameters, plain, parameters_.point, std::log(rule_.prior.parameters)));
     plain_ = d.hypotheses[1].log_evidence - d.hypotheses[1].log_prior;
+    if (progress(0.4, "fitting effects")) {
+      // also those that promise nothing: beside parameters that make up for an effect, a line sees nothing of it
+      std::vector<ScoredHypothesis> fits(finalists.size());
+      io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}); });
+      for (std::size_t i = 0; i < fits.size(); ++i)
+        // a fit that flew to where less is explained than a line from the parameters promises found nothing
+        if (vanished(fits[i]) || fits[i].log_evidence < leave_open(finalists[i]).log_evidence)
+          open.push_back(finalists[i]);
+        else singles.push_back(std::move(fits[i]));
+    } else {
+      open.insert(open.end(), finalists.begin(), finalists.end());
+    }
     d.hypotheses.push_back(explain_freely(plain, parameters_.point, std::log(rule_.prior.unknown)));
     for (const Screened& s : open) singles.push_back(leave_open(s));
     // further effects jointly with what explains most: an effect, or what hides one as a background of its hypothesis
@@ -357,7 +359,8 @@ class Diagnoser {
     for (const ScoredHypothesis& a : all) {
       if (!a.fitted()) continue;
       const Hypothesis h(uncertain_, a.effects);
-      const VectorXd mean = std::max(1.0, a.fit.point.shape) * a.fit.mean();  // a law that is far from the entry's is as much of it
+      const VectorXd mean =
+          std::max(1.0, a.fit.point.shape) * a.fit.mean();  // a law that is far from the entry's is as much of it
       std::map<std::string, double> beyond;
       for (const std::string& e : a.effects) {
         std::vector<double> sizes;
@@ -375,6 +378,7 @@ class Diagnoser {
         for (const std::string& e : a.effects)
           if (std::ranges::count(b.effects, e) > 0) ++shared;
           else explained -= std::max(beyond[e], 0.0);
+        if (b.kind == ScoredHypothesis::Kind::unknown && b.terms.empty()) explained -= rule_.unknown.freeing_nats;
         if (shared < b.effects.size() || b.log_prior + explained <= b.log_evidence) continue;
         b.log_evidence = b.log_prior + explained;
         b.flown_with = a.flown_with.empty() ? a.effects : a.flown_with;

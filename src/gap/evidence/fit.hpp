@@ -20,7 +20,7 @@ struct Linearised {
   Residuals residual;               ///< empty: the vehicle comes apart
   SufficientStatistics statistics;  ///< of the residual, less rough
   std::vector<BasisCoefficients>
-      columns;  ///< change of the prediction for a unit along each direction; empty: it comes apart there
+      columns;       ///< change of the prediction for a unit along each direction; empty: it comes apart there
   double shape = 1;  ///< how much of another law its effects have than their entries (Fitter::form_error)
 };
 
