@@ -126,6 +126,7 @@ class Diagnoser {
       more.effects = a.effects;
       const double shape = more.fit.point.shape;
       more.fit = a.fit;
+      more.otherwise = a.otherwise;
       more.fit.point.shape = shape;
       more.log_evidence += a.log_prior + std::log(rule_.prior.remainder);
       more.log_prior = a.log_prior + std::log(rule_.prior.remainder);
@@ -319,7 +320,21 @@ class Diagnoser {
     a.log_evidence = w.posterior.log_evidence + log_prior;
     a.log_prior = log_prior;
     a.fit = std::move(fit);
+    if (w.shape > 1) a.otherwise = most_otherwise(w);
     return a;
+  }
+
+  /// The function of the place that takes most of a free shape.
+  Term most_otherwise(const Weighed& w) const {
+    const RegimeBasis& basis = evidence_.basis();
+    Term most;
+    for (int g = 0; g < kGroups; ++g)
+      for (int i = 0; i < basis.size(); ++i) {
+        const double gain = 0.5 * std::pow(w.delta(g, i), 2);
+        if (regimes_of(basis.kind(i)) == Regimes::place && gain > most.gain)
+          most = {g / kCoefficients, (g % kCoefficients + 1) / 2, i, w.shape, gain};
+      }
+    return most;
   }
 
   /// What is left in every flight with the fit to the others; of a single flight, with its own.

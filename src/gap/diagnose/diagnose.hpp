@@ -31,6 +31,8 @@ struct ScoredHypothesis {
   /// Of effects and parameters. An effect that would gain nothing is weighed as far as a linear model sees: no residual, and
   /// its size is what flights that tell nothing of it leave probable.
   Fit fit;
+  /// Of effects that act by the place: where most otherwise than their entries say; none: as these say, up to what any law may be off.
+  std::optional<Term> otherwise;
   Residuals left;  ///< of an effect that was fitted: in each flight what is left with the fit to the others
   /// Effects of the hypothesis whose fit explains most of this one; beyond its own they are in it as what any robot may have. Empty: its own.
   std::vector<std::string> flown_with;

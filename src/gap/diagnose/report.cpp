@@ -161,9 +161,16 @@ Report verdict_report_of(const std::vector<PredictedFlight>& flights, const sim:
           ? *std::ranges::find(d.hypotheses, ScoredHypothesis::Kind::unknown, &ScoredHypothesis::kind)
           : concluded;
   const RegimeBasis basis(flights);
-  for (const Term& t : freest.terms)
-    r.unexplained.push_back({channel_name(t.channel), std::to_string(t.harmonic), basis.name(t.function),
-                             regime_of(basis.name(t.function), basis.kind(t.function)), t.times, t.gain});
+  const auto told = [&](const Term& t) -> Unexplained {
+    return {channel_name(t.channel),
+            std::to_string(t.harmonic),
+            basis.name(t.function),
+            regime_of(basis.name(t.function), basis.kind(t.function)),
+            t.times,
+            t.gain};
+  };
+  for (const Term& t : freest.terms) r.unexplained.push_back(told(t));
+  if (concluded.otherwise) r.otherwise = told(*concluded.otherwise);
   r.jointly_with = freest.jointly_with;
   for (const SensorFinding& s : d.sensors) {
     const double reach = kHalf90 * s.sd;
@@ -209,12 +216,14 @@ Report report_of(const std::vector<std::string>& names, std::vector<flightlog::D
 Json diagnosis_json(const Report& r) {
   Json faults = Json::array(), where = Json::array(), candidates = Json::array(), closed_loop = Json::array(),
        unexplained = Json::array();
-  for (const Unexplained& u : r.unexplained)
-    unexplained.push_back({{"channel", u.channel},
-                           {"harmonic", u.harmonic},
-                           {"function", u.function},
-                           {"times_usual", u.times},
-                           {"gain_nats", u.gain}});
+  const auto term = [](const Unexplained& u) {
+    return Json{{"channel", u.channel},
+                {"harmonic", u.harmonic},
+                {"function", u.function},
+                {"times_usual", u.times},
+                {"gain_nats", u.gain}};
+  };
+  for (const Unexplained& u : r.unexplained) unexplained.push_back(term(u));
   const auto finite = [](double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); };
   for (const ClosedLoop& c : r.closed_loop)
     closed_loop.push_back({{"flight", c.flight},
@@ -262,6 +271,7 @@ Json diagnosis_json(const Report& r) {
                {"sensors", estimates(r.sensors)},
                {"where", where},
                {"candidates", candidates},
+               {"otherwise", r.otherwise ? term(*r.otherwise) : Json(nullptr)},
                {"unexplained", {{"jointly_with", r.jointly_with}, {"terms", unexplained}}},
                {"gap",
                 {{"nominal", number(r.nominal)},

@@ -60,6 +60,7 @@ struct Report {
   Conclusion conclusion;
   std::vector<Reported> candidates;  ///< effects, the most probable first; then the kinds without one
   std::vector<Unexplained> unexplained;
+  std::optional<Unexplained> otherwise;   ///< where what is concluded acts most otherwise than its entry says
   std::vector<std::string> jointly_with;  ///< effects that are in force beside what is unexplained
   std::vector<SizeEstimate> background;   ///< of effects no larger than any robot may have, beside the concluded ones
   std::vector<Moved> moved;               ///< parameters beside the concluded effects, the farthest first

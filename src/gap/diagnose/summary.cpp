@@ -147,6 +147,10 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
     for (std::size_t i = 0; i < concluded->sizes.size() && i < kSizes; ++i)
       lines.push_back(size_line(concluded->sizes[i]));
   }
+  if (r.otherwise)
+    lines.push_back(flightlog::format("by another law than the entry's, most so in %s, on %s (%s)",
+                                      place_of(*r.otherwise).c_str(), r.otherwise->regime.c_str(),
+                                      r.otherwise->function.c_str()));
   if (!r.background.empty()) {
     lines.push_back("besides, in the corrected vehicle, no more than any robot may have:");
     for (std::size_t i = 0; i < r.background.size() && i < kBackground; ++i)

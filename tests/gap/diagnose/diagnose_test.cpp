@@ -170,6 +170,48 @@ TEST(Fit, EveryEquationErrsByItself) {
   EXPECT_NEAR(fitter.form_error(h, l).minCoeff(), 0.3 * 2 * std::sqrt(2), 1e-12);
 }
 
+// What acts by the place may act by another law: along the functions that its own change follows, every load of the body may have as much as the
+// loads have on average, and no other function or channel any. An effect that follows the inputs has no such shape.
+TEST(Fit, WhatActsByThePlaceHasAShape) {
+  const std::vector<PredictedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
+  const Evidence evidence(flights, read_model_discrepancy(), 2);
+  const Fitter fitter(flights, evidence, 2);
+  const sim::Randomisation prior = uncertain();
+  const Hypothesis h(prior, {"ground_effect"});
+  const RegimeBasis& basis = evidence.basis();
+  const auto index = [&](const char* name) {
+    for (int i = 0; i < basis.size(); ++i)
+      if (basis.name(i) == name) return i;
+    ADD_FAILURE() << "no " << name;
+    return 0;
+  };
+  const auto with = [&](int function) {
+    Linearised l{Eigen::VectorXd::Zero(h.size()), Fitter::axes(h), {}, {}, {}};
+    for (Index i = 0; i < h.size(); ++i) l.columns.push_back(BasisCoefficients::Zero(kGroups, basis.size()));
+    const int lift = kForceZ * kCoefficients;
+    l.at[h.shared()] = 2;
+    l.columns[static_cast<std::size_t>(h.shared())](lift, function) = 0.3 * evidence.signal(lift);
+    return l;
+  };
+  const int near = index("near ground"), height = index("height"), amplitude = index("amplitude");
+  Linearised l = with(near);
+  ASSERT_TRUE(fitter.has_shape(h, l));
+  const double loads = 6 * kCoefficients, rms = 2 * 0.3 / std::sqrt(loads);
+  for (const double shape : {1.0, 4.0}) {
+    l.shape = shape;
+    const BasisCoefficients sd = fitter.form_error(h, l);
+    for (const int g : {kTorqueX * kCoefficients, kForceX * kCoefficients + 3})
+      EXPECT_NEAR(sd(g, near), shape * rms * evidence.signal(g), 1e-9 * evidence.signal(g)) << g;
+    const double own = 0.3 * 2 * 0.3,
+                 lift = sd(kForceZ * kCoefficients, near) / evidence.signal(kForceZ * kCoefficients);
+    EXPECT_NEAR(lift, std::hypot(own, shape * rms), 1e-9) << "beside what any equation errs by";
+    EXPECT_EQ(sd.col(height).maxCoeff(), 0);
+    EXPECT_EQ(sd.col(amplitude).maxCoeff(), 0);
+    EXPECT_EQ(sd.bottomRows(kGroups - static_cast<int>(loads)).maxCoeff(), 0) << "strokes, currents, motion capture";
+  }
+  EXPECT_FALSE(fitter.has_shape(h, with(amplitude)));
+}
+
 TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   const std::vector<PredictedFlight> flights = flown("hummingbird_identified");
   const sim::Randomisation prior = uncertain();
