@@ -46,8 +46,6 @@ class Diagnoser {
     progress(0.3, "screening effects");
     robot_.refit_beside_background();
     const Hypothesis& plain = robot_.plain();
-    around_ = row_context_of(flights_, noise_sd());
-    loss_ = losses_of(around_, parameters_.point.residual);
     std::vector<ScoredHypothesis> singles;
     std::vector<Screened> open;
     const std::vector<Screened> screened = screen(evidence_, fitter_, parameters_, {}, robot_.sizes());
@@ -298,7 +296,7 @@ class Diagnoser {
       at += s.coordinates.size();
     }
     Fit fit = fitter_.fit(h, h.bounded(start), parameters_, 6);
-    if (fit.point.residual.empty() || refuted(loss_, losses_of(around_, fit.point.residual), rule_)) {
+    if (fit.point.residual.empty()) {
       ScoredHypothesis none;
       none.kind = ScoredHypothesis::Kind::effect;
       none.effects = effects;
@@ -419,8 +417,6 @@ class Diagnoser {
   const Evidence& evidence_ = robot_.evidence();
   const Fitter& fitter_ = robot_.fitter();
   const Fit& parameters_ = robot_.parameters();
-  RowContext around_;
-  Losses loss_;                   ///< of the parameters alone
   double plain_ = 0;              ///< log evidence of the parameters alone
   std::optional<Scales> freest_;  ///< of an unknown cause alone
   bool stopped_ = false;

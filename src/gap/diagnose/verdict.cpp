@@ -28,11 +28,6 @@ std::string pool_name(const std::vector<std::string>& effects) {
   return name;
 }
 
-bool refuted(const Losses& parameters, const Losses& effects, const VerdictRule& rule) {
-  const auto before = parameters.mean(), after = effects.mean();
-  return before && after && *after - *before > rule.refutation.share_of_gap * (*before - huber_floor());
-}
-
 void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
   const Eigen::VectorXd mean = fit.mean();
   Eigen::MatrixXd& covariance = fit.posterior.covariance;

@@ -9,10 +9,6 @@
 
 namespace flappy::gap {
 
-/// Whether effects, wherever models may be mistaken, leave more in all than the parameters alone: by more than a share of the gap
-/// that these leave.
-bool refuted(const Losses& parameters, const Losses& effects, const VerdictRule& rule);
-
 /// Makes the figures of the effects of a fit, along whose coordinates its directions are, as uncertain as they are.
 void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule);
 

@@ -22,8 +22,8 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
   r.gain = {gain.number("by_chance_nats", kNats), gain.number("further_screened_nats", kNats),
             gain.number("vanished_size", kPositive)};
   r.unknown = {root.table("unknown").number("freeing_nats", kNats)};
-  const io::Table refutation = root.table("refutation");
-  r.refutation = {refutation.number("share_of_gap", kNats), refutation.number_or("least_share", 0, kShare)};
+  if (const auto refutation = root.optional_table("refutation"))
+    r.refutation.least_share = refutation->number("least_share", kShare);
   const io::Table interval = root.table("interval");
   r.interval = {interval.number("sd_factor", kPositive), interval.number("size_error", kNats)};
   const io::Table doubt = root.table("doubt");

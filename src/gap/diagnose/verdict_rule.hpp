@@ -19,7 +19,6 @@ struct VerdictRule {
     double freeing_nats;
   } unknown;
   struct Refutation {
-    double share_of_gap;
     double least_share;  ///< of what smooth functions of the regime take away in flights held out; 0: not asked
   } refutation;
   struct Interval {

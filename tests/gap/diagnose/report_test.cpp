@@ -134,17 +134,6 @@ TEST(Verdict, PoolsSetsByTheGroupsOfTheirEffects) {
   EXPECT_EQ(c.effects, (std::vector<std::string>{"wind", "body_drag", "tether"}));
 }
 
-// Between what refitted parameters leave and the floor lies the gap; three tenths of it more is too much.
-TEST(Verdict, RefutesWhatLeavesMore) {
-  const double floor = huber_floor();
-  const auto losses = [](double mean) { return Losses{{8 * mean, 4 * mean}, {8, 4}}; };
-  const Losses before = losses(floor + 1);
-  EXPECT_FALSE(refuted(before, losses(floor + 1.29), read_verdict_rule()));
-  EXPECT_TRUE(refuted(before, losses(floor + 1.31), read_verdict_rule()));
-  EXPECT_FALSE(refuted(before, losses(floor), read_verdict_rule()));
-  EXPECT_FALSE(refuted(before, {}, read_verdict_rule())) << "a vehicle that came apart has no loss";
-}
-
 // Of coordinates with sd 0.2 and covariance 0.01: 1.4 times as wide, and a size of 2 by a tenth of itself besides.
 TEST(Verdict, WidensSizesAndShapes) {
   const auto uncertain =
