@@ -82,7 +82,7 @@ std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::op
   const Linearised l = fitter.linearise(rival.hypothesis, rival.at, rival.directions, known);
   if (l.residual.empty()) return {};
   if (with_parameters && !first) first = l;
-  Expected e{l.statistics, {}, fitter.form_error(rival.hypothesis, l)};
+  Expected e{l.statistics, {}, fitter.shape_error(rival.hypothesis, l)};
   const Index k = rival.covariance.rows();
   if (k == 0) return e;  // without a gap nothing is uncertain
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(rival.covariance);

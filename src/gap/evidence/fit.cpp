@@ -246,21 +246,19 @@ std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypot
   return whole;
 }
 
-BasisCoefficients Fitter::form_error(const Hypothesis& hypothesis, const Linearised& point, double shape) const {
+BasisCoefficients Fitter::shape_error(const Hypothesis& hypothesis, const Linearised& point, double shape) const {
   BasisCoefficients squares = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
-  for (const auto& [effect, own] : changes(hypothesis, point))
-    squares += (evidence_.discrepancy().form_error * own).cwiseAbs2() + (shape * shape_error(own)).cwiseAbs2();
+  for (const auto& [effect, own] : changes(hypothesis, point)) squares += (shape * shape_of(own)).cwiseAbs2();
   return squares.cwiseSqrt();
 }
 
 bool Fitter::has_shape(const Hypothesis& hypothesis, const Linearised& point) const {
-  return std::ranges::any_of(changes(hypothesis, point),
-                             [&](const auto& own) { return shape_error(own.second).any(); });
+  return std::ranges::any_of(changes(hypothesis, point), [&](const auto& own) { return shape_of(own.second).any(); });
 }
 
 /// Laws of what acts by the place (near surfaces, at a line, in time) differ in more than size: along the functions of the place that this change
 /// follows, every load of the body may have as much of it as they have on average.
-BasisCoefficients Fitter::shape_error(const BasisCoefficients& change) const {
+BasisCoefficients Fitter::shape_of(const BasisCoefficients& change) const {
   const RegimeBasis& basis = evidence_.basis();
   BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
   if (evidence_.discrepancy().spread.beside_all) return sd;
@@ -285,7 +283,7 @@ BasisCoefficients Fitter::shape_error(const BasisCoefficients& change) const {
 Posterior Fitter::posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const {
   const Columns columns = columns_of(point, hypothesis.effects());
   const BasisCoefficients sd =
-      (evidence_.discrepancy_sd().cwiseAbs2() + form_error(hypothesis, point).cwiseAbs2()).cwiseSqrt();
+      (evidence_.discrepancy_sd().cwiseAbs2() + shape_error(hypothesis, point).cwiseAbs2()).cwiseSqrt();
   return solve(point, columns, evidence_.reduce(point.statistics, columns.columns, use, sd));
 }
 

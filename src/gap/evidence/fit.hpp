@@ -21,7 +21,7 @@ struct Linearised {
   SufficientStatistics statistics;  ///< of the residual, less rough
   std::vector<BasisCoefficients>
       columns;       ///< change of the prediction for a unit along each direction; empty: it comes apart there
-  double shape = 1;  ///< how much of another law its effects have than their entries (Fitter::form_error)
+  double shape = 1;  ///< how much of another law its effects have than their entries (Fitter::shape_error)
 };
 
 struct Fit {
@@ -70,11 +70,11 @@ class Fitter {
   Columns unscaled_columns_of(const Linearised& point, const std::vector<std::string>& effects) const;
   /// What some of the flights say alone, along all directions of a point.
   Posterior posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const;
-  /// What the equations of its effects get wrong of themselves: shares of all that the sizes of each change.
-  BasisCoefficients form_error(const Hypothesis& hypothesis, const Linearised& point) const {
-    return form_error(hypothesis, point, point.shape);
+  /// Of its effects that act by the place, how far their laws may be others than their entries'.
+  BasisCoefficients shape_error(const Hypothesis& hypothesis, const Linearised& point) const {
+    return shape_error(hypothesis, point, point.shape);
   }
-  BasisCoefficients form_error(const Hypothesis& hypothesis, const Linearised& point, double shape) const;
+  BasisCoefficients shape_error(const Hypothesis& hypothesis, const Linearised& point, double shape) const;
   /// Whether any of its effects acts by the place, and so has a shape.
   bool has_shape(const Hypothesis& hypothesis, const Linearised& point) const;
 
@@ -95,7 +95,7 @@ class Fitter {
 
  private:
   std::map<std::string, BasisCoefficients> changes(const Hypothesis& hypothesis, const Linearised& point) const;
-  BasisCoefficients shape_error(const BasisCoefficients& change) const;
+  BasisCoefficients shape_of(const BasisCoefficients& change) const;
   static Directions joint_directions(const Hypothesis& hypothesis, const Fit& parameters);
   static std::vector<BasisCoefficients> known(const Hypothesis& hypothesis, const Fit& parameters);
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);

@@ -23,10 +23,6 @@ constexpr const char* kHead =
 # from robots of your own that you trust.
 #
 # Learnt from )";
-constexpr const char* kFormError =
-    R"(# How well an entry's equation describes the effect of its name: standard deviation of every coefficient as a share of what the
-# entry's sizes change, for several entries each by its own. A choice: published laws of one cause differ by about so much.
-form_error = )";
 constexpr const char* kShares =
     R"(# Standard deviation of a coefficient of the regime's basis, as a share of the channel's signal, by harmonic of the beat from 0 to 4:
 # the mean; what follows the inputs, the body's rates, products, the place (height, heading, time, nearness of surfaces); the velocity v
@@ -87,7 +83,7 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
   const auto sensor = [&](const char* id) {
     return number(std::ranges::find(d.nuisances, id, &ModelDiscrepancy::Nuisance::id)->sd);
   };
-  std::string text = kHead + learnt + ".\nschema = 1\n\n" + kFormError + number(d.form_error) + "\n\n" + kShares;
+  std::string text = kHead + learnt + ".\nschema = 1\n\n" + kShares;
   for (int channel = 0; channel < kChannels; ++channel) {
     text += std::string("[share.") + channel_name(channel) + "]\n";
     for (const auto& [function, key] : kKeys) {
@@ -134,7 +130,6 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   }
   for (const std::string& id : d.of_models)
     if (!model::is_effect(id)) spread.fail("of_models", "no effect \"" + id + "\"", "identifiers of docs/effects.md");
-  d.form_error = root.number("form_error", io::non_negative());
 
   for (int channel = 0; channel < kChannels; ++channel) {
     const io::Table share = root.table("share");

@@ -29,8 +29,6 @@ struct ModelDiscrepancy {
     /// What models are off by is what is left beside every entry together, and the same for every hypothesis.
     bool beside_all;
   } spread{};
-  /// How well an entry's equation describes the effect of its name: sd of every coefficient as a share of its own.
-  double form_error = 0;
   /// What a sensor may be off by beyond its header, whatever the hypothesis: one standard deviation of each number.
   struct Nuisance {
     std::string id, value;  ///< of gap/replay/sensor_correction.hpp

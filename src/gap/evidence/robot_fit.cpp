@@ -190,7 +190,7 @@ void RobotFit::take_scales(const Hypothesis& hypothesis, const Linearised& at) {
 std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const Linearised& at) const {
   const Scales& now = evidence_.scales();
   const Columns c = fitter_.columns_of(at, hypothesis.effects());
-  const BasisCoefficients own = fitter_.form_error(hypothesis, at);
+  const BasisCoefficients own = fitter_.shape_error(hypothesis, at);
   const Posterior p =
       Evidence::posterior(evidence_.reduce(at.statistics, c.columns, fitter_.all_flights(),
                                            (evidence_.discrepancy_sd().cwiseAbs2() + own.cwiseAbs2()).cwiseSqrt()),
@@ -228,7 +228,7 @@ Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, cons
   const Columns columns = fitter_.unscaled_columns_of(at, hypothesis.effects());
   const auto with = [&](double shape, const Scales& from) {
     Weighed w = evidence_.weigh(at.statistics, columns, fitter_.all_flights(),
-                                fitter_.form_error(hypothesis, at, shape), from, freeing_nats);
+                                fitter_.shape_error(hypothesis, at, shape), from, freeing_nats);
     w.shape = shape;
     w.posterior.log_evidence -= 0.5 * std::pow(std::log(shape) / kShapeSd, 2);
     return w;

@@ -152,24 +152,6 @@ TEST(Recording, FliesWhatWasDriven) {
   EXPECT_EQ(whole.full, 1);
 }
 
-// Of two effects that oppose each other each errs by 0.3 of what its sizes change; shapes are no more of it.
-TEST(Fit, EveryEquationErrsByItself) {
-  const std::vector<PredictedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
-  const Evidence evidence(flights, read_model_discrepancy(), 2);
-  const Fitter fitter(flights, evidence, 2);
-  const sim::Randomisation prior = uncertain();
-  const Hypothesis h(prior, {"ground_effect", "spring_hardening"});
-  Linearised l{Eigen::VectorXd::Zero(h.size()), Fitter::axes(h), {}, {}, {}};
-  for (Index i = 0; i < h.size(); ++i) {
-    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
-    if (i >= h.shared()) l.at[i] = u.effect == "ground_effect" ? 2 : -2;
-    l.columns.push_back(BasisCoefficients::Constant(kGroups, evidence.basis().size(), u.size ? 1 : 50));
-  }
-  ASSERT_EQ(h.size() - h.shared(), 3) << "two sizes and a length";
-  EXPECT_NEAR(fitter.form_error(h, l).maxCoeff(), 0.3 * 2 * std::sqrt(2), 1e-12);
-  EXPECT_NEAR(fitter.form_error(h, l).minCoeff(), 0.3 * 2 * std::sqrt(2), 1e-12);
-}
-
 // What acts by the place may act by another law: along the functions that its own change follows, every load of the body may have as much as the
 // loads have on average, and no other function or channel any. An effect that follows the inputs has no such shape.
 TEST(Fit, WhatActsByThePlaceHasAShape) {
@@ -199,12 +181,9 @@ TEST(Fit, WhatActsByThePlaceHasAShape) {
   const double loads = 6 * kCoefficients, rms = 2 * 0.3 / std::sqrt(loads);
   for (const double shape : {1.0, 4.0}) {
     l.shape = shape;
-    const BasisCoefficients sd = fitter.form_error(h, l);
-    for (const int g : {kTorqueX * kCoefficients, kForceX * kCoefficients + 3})
+    const BasisCoefficients sd = fitter.shape_error(h, l);
+    for (const int g : {kTorqueX * kCoefficients, kForceX * kCoefficients + 3, kForceZ * kCoefficients})
       EXPECT_NEAR(sd(g, near), shape * rms * evidence.signal(g), 1e-9 * evidence.signal(g)) << g;
-    const double own = 0.3 * 2 * 0.3,
-                 lift = sd(kForceZ * kCoefficients, near) / evidence.signal(kForceZ * kCoefficients);
-    EXPECT_NEAR(lift, std::hypot(own, shape * rms), 1e-9) << "beside what any equation errs by";
     EXPECT_EQ(sd.col(height).maxCoeff(), 0);
     EXPECT_EQ(sd.col(amplitude).maxCoeff(), 0);
     EXPECT_EQ(sd.bottomRows(kGroups - static_cast<int>(loads)).maxCoeff(), 0) << "strokes, currents, motion capture";

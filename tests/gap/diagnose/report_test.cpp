@@ -306,9 +306,9 @@ std::string contents(const std::filesystem::path& path) { return io::read_text(p
 void expect_schema(const nlohmann::ordered_json& j) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : j.items()) keys.push_back(key);
-  EXPECT_EQ(keys,
-            (std::vector<std::string>{"schema", "flights", "data_faults", "verdict", "background", "sensors", "where",
-                                      "candidates", "unexplained", "gap", "closed_loop", "next_experiment"}));
+  EXPECT_EQ(keys, (std::vector<std::string>{"schema", "flights", "data_faults", "verdict", "background", "sensors",
+                                            "where", "candidates", "otherwise", "unexplained", "gap", "closed_loop",
+                                            "next_experiment"}));
   double sum = 0;
   for (const auto& c : j["candidates"]) {
     sum += c["probability"].get<double>();
