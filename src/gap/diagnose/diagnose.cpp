@@ -48,7 +48,7 @@ class Diagnoser {
     const Hypothesis& plain = robot_.plain();
     std::vector<ScoredHypothesis> singles;
     std::vector<Screened> open;
-    const std::vector<Screened> screened = screen(evidence_, fitter_, parameters_, {}, robot_.sizes());
+    const std::vector<Screened> screened = screen(evidence_, fitter_, parameters_, robot_.sizes());
     if (!flights_.front().within_the_beat()) d.untestable = untestable();
     std::vector<Screened> finalists;
     for (const Screened& s : screened) {
@@ -87,8 +87,7 @@ class Diagnoser {
           break;
         // what is missing besides hides behind what models are off by with the best in force, not without it
         robot_.take_scales(Hypothesis(uncertain_, best.effects), best.fit.point);
-        std::vector<Screened> further =
-            screen(evidence_, fitter_, best.fit, best.effects, beside(best.effects, robot_.sizes()));
+        std::vector<Screened> further = screen(evidence_, fitter_, best.fit, beside(best.effects, robot_.sizes()));
         std::erase_if(further, [&](const Screened& s) { return s.gain < rule_.gain.further_screened_nats; });
         further.resize(std::min(further.size(), evidence_.discrepancy().spread.beside_all ? 1 : kFurther));
         std::vector<ScoredHypothesis> more(further.size());

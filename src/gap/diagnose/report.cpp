@@ -46,6 +46,8 @@ std::string regime_of(const std::string& function, BasisFunction kind) {
   switch (kind) {
     case BasisFunction::constant:
       return "always";
+    case BasisFunction::flight:
+      return "flight";
     case BasisFunction::rate:
       return "rate";
     case BasisFunction::input:

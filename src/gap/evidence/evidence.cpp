@@ -41,12 +41,12 @@ VectorXd Columns::mean() const {
   return Eigen::Map<const VectorXd>(prior_mean.data(), static_cast<Index>(prior_mean.size()));
 }
 
-void Columns::add(const BasisCoefficients& column, double mean, int of_entry, double freedom_of_entry) {
+void Columns::add(const BasisCoefficients& column, double mean, int of_entry, Tail of_scale) {
   chosen.push_back(static_cast<int>(columns.size()));
   columns.push_back(&column);
   prior_mean.push_back(mean);
   entry.push_back(of_entry);
-  freedom.push_back(freedom_of_entry);
+  tail.push_back(of_scale);
 }
 
 Evidence::Evidence(const std::vector<PredictedFlight>& flights, ModelDiscrepancy discrepancy, int threads)

@@ -51,9 +51,9 @@ struct Columns {
   std::vector<double> prior_mean;
   std::vector<int>
       entry;  ///< of what every vehicle has of an entry: which of Scales::entries it grows with; -1: of none
-  std::vector<double> freedom;  ///< of that scale, as degrees of freedom
+  std::vector<Tail> tail;  ///< of that scale
   Eigen::VectorXd mean() const;
-  void add(const BasisCoefficients& column, double mean, int of_entry = -1, double freedom_of_entry = 0);
+  void add(const BasisCoefficients& column, double mean, int of_entry = -1, Tail of_scale = {});
 };
 
 /// All that the rows of flights say of smooth residuals: sums over the whitened rows of a group, basis x
@@ -74,6 +74,8 @@ struct Scales {
   std::vector<double> entries;  ///< of what it has of each entry, as every vehicle does; empty: 1
   std::vector<double> blocks;   ///< [kBlocks]
   std::vector<char> free;       ///< [kBlocks] whether it is larger than models are, by whatever it takes
+  /// Of such an entry, where nothing was found.
+  double usual(Tail tail) const { return tail.of_model ? robot : 1; }
 };
 inline constexpr int kClasses = static_cast<int>(Regimes::count), kBlocks = kChannels * (kHarmonics + 1) * kClasses;
 
@@ -120,7 +122,7 @@ class Evidence {
                 const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats = {},
                 int iterations = kMostIterations) const;
   /// Nats that it costs a hypothesis that this robot has so many times what is usual of an entry.
-  double price_of(double times, double freedom) const;
+  double price_of(double times, Tail tail) const;
   static constexpr int kMostIterations = 40;
   void set_discrepancy(ModelDiscrepancy discrepancy) { discrepancy_ = std::move(discrepancy); }
   /// Those that every model of this robot has from now on.

@@ -154,7 +154,7 @@ void Fitter::set_background(const Columns& same, const std::vector<Background>& 
   background_.clear();
   means_.clear();
   entry_.clear();
-  freedom_.clear();
+  tails_.clear();
   places_.clear();
   Columns all = own_columns_of(beside.point);
   const std::size_t first = all.columns.size(), scaled = first + same.columns.size();
@@ -165,7 +165,7 @@ void Fitter::set_background(const Columns& same, const std::vector<Background>& 
       entry = static_cast<int>(entries_.size());
       entries_.push_back(b.entry);
     }
-    all.add(b.column, 0, entry, evidence_.discrepancy().freedom_of(b.entry));
+    all.add(b.column, 0, entry, evidence_.discrepancy().tail_of(b.entry));
   }
   const Reduced reduced = reduce(beside.point, all);
   for (std::size_t i = first; i < all.columns.size(); ++i) {
@@ -174,7 +174,7 @@ void Fitter::set_background(const Columns& same, const std::vector<Background>& 
     background_.push_back(*all.columns[i]);
     means_.push_back(all.prior_mean[i]);
     entry_.push_back(all.entry[i]);
-    freedom_.push_back(all.freedom[i]);
+    tails_.push_back(all.tail[i]);
     if (i < scaled) places_.push_back(i - first);
   }
   take_scales();
@@ -186,7 +186,7 @@ int Fitter::entry_of(const std::string& effect) const {
 }
 
 std::vector<Fitter::Beside> Fitter::beside(const Linearised& point) const {
-  const Columns c = columns_of(point, {});
+  const Columns c = columns_of(point);
   const Posterior p = Evidence::posterior(reduce(point, c), c.chosen, c.mean());
   std::vector<Beside> list;
   for (std::size_t k = 0; k < places_.size(); ++k) {
@@ -201,7 +201,7 @@ void Fitter::take_scales() {
   scaled_ = background_;
   for (std::size_t k = places_.size(); k < scaled_.size(); ++k) {
     const auto entry = static_cast<std::size_t>(entry_[k]);
-    scaled_[k] *= entry < s.entries.size() ? s.entries[entry] : s.robot;
+    scaled_[k] *= entry < s.entries.size() ? s.entries[entry] : s.usual(tails_[k]);
   }
 }
 
@@ -213,22 +213,19 @@ Columns Fitter::own_columns_of(const Linearised& point) {
   return c;
 }
 
-void Fitter::add_background(const std::vector<BasisCoefficients>& list, const std::vector<std::string>& without,
-                            Columns& to) const {
-  for (std::size_t k = 0; k < list.size(); ++k)
-    if (entry_[k] < 0 || std::ranges::count(without, entries_[static_cast<std::size_t>(entry_[k])]) == 0)
-      to.add(list[k], means_[k], entry_[k], freedom_[k]);
+void Fitter::add_background(const std::vector<BasisCoefficients>& list, Columns& to) const {
+  for (std::size_t k = 0; k < list.size(); ++k) to.add(list[k], means_[k], entry_[k], tails_[k]);
 }
 
-Columns Fitter::columns_of(const Linearised& point, const std::vector<std::string>& effects) const {
+Columns Fitter::columns_of(const Linearised& point) const {
   Columns c = own_columns_of(point);
-  add_background(scaled_, effects, c);
+  add_background(scaled_, c);
   return c;
 }
 
-Columns Fitter::unscaled_columns_of(const Linearised& point, const std::vector<std::string>& effects) const {
+Columns Fitter::unscaled_columns_of(const Linearised& point) const {
   Columns c = own_columns_of(point);
-  add_background(background_, effects, c);
+  add_background(background_, c);
   return c;
 }
 
@@ -281,7 +278,7 @@ BasisCoefficients Fitter::shape_of(const BasisCoefficients& change) const {
 }
 
 Posterior Fitter::posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const {
-  const Columns columns = columns_of(point, hypothesis.effects());
+  const Columns columns = columns_of(point);
   const BasisCoefficients sd =
       (evidence_.discrepancy_sd().cwiseAbs2() + shape_error(hypothesis, point).cwiseAbs2()).cwiseSqrt();
   return solve(point, columns, evidence_.reduce(point.statistics, columns.columns, use, sd));
@@ -368,7 +365,7 @@ Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters,
   l.at.head(hypothesis.shared()) = parameters.point.at;
   l.directions = joint_directions(hypothesis, parameters);
   l.columns.insert(l.columns.end(), own.begin(), own.end());
-  const Columns columns = columns_of(l, hypothesis.effects());
+  const Columns columns = columns_of(l);
   result.posterior = solve(l, columns, reduce(l, columns));
   return result;
 }
@@ -398,7 +395,7 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
   };
   for (int n = 1;; ++n) {
     const Linearised& l = fit.point;
-    const Columns columns = columns_of(l, hypothesis.effects());
+    const Columns columns = columns_of(l);
     const Reduced reduced = reduce(l, columns);
     fit.posterior = solve(l, columns, reduced);
     const VectorXd step = l.directions.axes * fit.posterior.mean;
@@ -423,7 +420,7 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
       std::vector<SufficientStatistics> statistics(left.size());
       std::vector<double> costs(left.size(), std::numeric_limits<double>::infinity());
       Columns background;
-      add_background(scaled_, hypothesis.effects(), background);
+      add_background(scaled_, background);
       const Index others = static_cast<Index>(background.columns.size()),
                   first = static_cast<Index>(columns.columns.size()) - others;
       const MatrixXd sums = reduced.sums.block(first, first, others, others);

@@ -61,13 +61,15 @@ class Fitter {
   void take_scales();
   /// Its place in Scales::entries; -1: none.
   int entry_of(const std::string& effect) const;
+  const std::vector<std::string>& entries() const { return entries_; }
   std::vector<char> all_flights() const { return std::vector<char>(flights_.size(), 1); }
   /// The columns of a point that do not come apart.
   static Columns own_columns_of(const Linearised& point);
-  /// Those, then the background's, as this robot has it, but for what it has of these effects.
-  Columns columns_of(const Linearised& point, const std::vector<std::string>& effects) const;
+  /// Those, then the background's, as this robot has it: also of effects that a hypothesis names, for what models get wrong along an entry
+  /// is there beside the entry's own size.
+  Columns columns_of(const Linearised& point) const;
   /// The same with the background of a robot whose scales are 1.
-  Columns unscaled_columns_of(const Linearised& point, const std::vector<std::string>& effects) const;
+  Columns unscaled_columns_of(const Linearised& point) const;
   /// What some of the flights say alone, along all directions of a point.
   Posterior posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const;
   /// Of its effects that act by the place, how far their laws may be others than their entries'.
@@ -114,12 +116,11 @@ class Fitter {
   const std::vector<PredictedFlight>& flights_;
   const Evidence& evidence_;
   int threads_;
-  void add_background(const std::vector<BasisCoefficients>& list, const std::vector<std::string>& without,
-                      Columns& to) const;
+  void add_background(const std::vector<BasisCoefficients>& list, Columns& to) const;
   std::vector<BasisCoefficients> background_, scaled_;
   std::vector<double> means_;         ///< of background_
   std::vector<int> entry_;            ///< of background_: in entries_, or -1
-  std::vector<double> freedom_;       ///< of background_: of that entry's scale
+  std::vector<Tail> tails_;           ///< of background_: of that entry's scale
   std::vector<std::string> entries_;  ///< as in Scales::entries
   std::vector<std::size_t> places_;   ///< of the columns that are of no entry, as they were given
 };

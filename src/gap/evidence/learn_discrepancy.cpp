@@ -56,7 +56,7 @@ void expect(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDis
       m.count += 1;
     }
     for (const auto& [entry, m] : own) {
-      const double nu = now.freedom_of(entry), factor2 = (m.sum + nu) / (m.count + nu);
+      const double nu = now.tail_of(entry).freedom, factor2 = (m.sum + nu) / (m.count + nu);
       factors[r][entry] = std::sqrt(factor2);
       sizes[entry].sum += std::pow(now.background_sd(entry), 2) * m.sum / factor2;
       sizes[entry].count += m.count;

@@ -13,9 +13,9 @@ namespace {
 using enum BasisFunction;
 constexpr std::pair<BasisFunction, const char*> kKeys[] = {
     {constant, "constant"},     {input, "input"},           {rate, "rate"},
-    {product, "product"},       {place, "place"},           {velocity_x, "velocity_x"},
-    {velocity_y, "velocity_y"}, {velocity_z, "velocity_z"}, {drag_x, "drag_x"},
-    {drag_y, "drag_y"},         {drag_z, "drag_z"}};
+    {product, "product"},       {place, "place"},           {flight, "flight"},
+    {velocity_x, "velocity_x"}, {velocity_y, "velocity_y"}, {velocity_z, "velocity_z"},
+    {drag_x, "drag_x"},         {drag_y, "drag_y"},         {drag_z, "drag_z"}};
 
 constexpr const char* kHead =
     R"(# How much models of one flapping wing are off before anything is known of a vehicle: the model discrepancy of Kennedy and O'Hagan
@@ -25,14 +25,14 @@ constexpr const char* kHead =
 # Learnt from )";
 constexpr const char* kShares =
     R"(# Standard deviation of a coefficient of the regime's basis, as a share of the channel's signal, by harmonic of the beat from 0 to 4:
-# the mean; what follows the inputs, the body's rates, products, the place (height, heading, time, nearness of surfaces); the velocity v
-# in B, and |v| v.
+# the mean; what follows the inputs, the body's rates, products, the place (height, heading, time, nearness of surfaces); what
+# changes from flight to flight (a warm sensor, another day's battery); the velocity v in B, and |v| v.
 )";
 constexpr const char* kSpread =
     R"(# How much more or less than usual models of a robot are off: standard deviation of the log of its own factor, wide, for a robot may be
 # nearly the model; and how far its blocks (a kind of regime in a channel and harmonic), and what it has of each entry, go their own ways
 # about it, as degrees of freedom of an inverse gamma law: many of blocks of the place, for a wing knows nothing of it; few of entries that say how a wing, its hinges and its drive work by
-# themselves (of_models), for each model, and each maker's robot, has such laws of its own. Choices.
+# themselves (of_models), for each model, and each maker's robot, has such laws of its own. What it has of other entries has nothing to do with that factor. Choices.
 )";
 constexpr const char* kSensors =
     R"(# What laboratories declare of sensors is right to so much, whatever else is so: standard deviations. Choices.
@@ -52,6 +52,7 @@ std::string entry_of(const std::string& background) {
 Regimes regimes_of(BasisFunction function) {
   switch (function) {
     case BasisFunction::constant:
+    case BasisFunction::flight:
       return Regimes::always;
     case BasisFunction::input:
     case BasisFunction::rate:
@@ -71,8 +72,10 @@ double ModelDiscrepancy::background_sd(const std::string& effect) const {
   return entry != effect ? background_sd(entry) : background.at("other");
 }
 
-double ModelDiscrepancy::freedom_of(const std::string& effect) const {
-  return std::ranges::count(of_models, entry_of(effect)) > 0 ? spread.model_freedom : spread.entry_freedom;
+Tail ModelDiscrepancy::tail_of(const std::string& effect) const {
+  if (spread.beside_all) return {spread.entry_freedom, true};
+  const bool of_model = std::ranges::count(of_models, entry_of(effect)) > 0;
+  return {of_model ? spread.model_freedom : spread.entry_freedom, of_model};
 }
 
 std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learnt) {

@@ -17,10 +17,17 @@ namespace flappy::gap {
 enum class Regimes { always, inputs, velocity, place, count };
 Regimes regimes_of(BasisFunction function);
 
+/// How much more or less than usual a robot has of an entry: an inverse gamma law of so many degrees of freedom about 1, or, of an entry
+/// that models of a wing describe each in its own way, about how far models of this robot are off.
+struct Tail {
+  double freedom = 0;
+  bool of_model = false;
+};
+
 struct ModelDiscrepancy {
   /// Of one robot models are off by more or less than usual, and so is each kind of regime in each channel and harmonic of it (a
   /// block): log robot ~ N(0, robot_sd^2), and block^2 / robot^2 ~ inverse gamma of so many degrees of freedom, so that what is
-  /// left has heavy tails. So has what every vehicle has of an entry, and it is the more, too, the more models of it are off.
+  /// left has heavy tails. So has what every vehicle has of an entry (Tail).
   struct Spread {
     double robot_sd, block_freedom;
     double place_freedom;  ///< .. of blocks of the place, of which a wing knows nothing
@@ -46,13 +53,12 @@ struct ModelDiscrepancy {
   double freedom_of(Regimes regimes) const {
     return regimes == Regimes::place ? spread.place_freedom : spread.block_freedom;
   }
-  /// .. and of an entry.
-  double freedom_of(const std::string& effect) const;
+  Tail tail_of(const std::string& effect) const;
 
   std::array<std::array<std::array<double, static_cast<std::size_t>(BasisFunction::count)>, kHarmonics + 1>, kChannels>
       shares{};
   std::map<std::string, double> background;  ///< by effect, and of "other"
-  std::vector<std::string> of_models;        ///< entries that spread.model_freedom is of
+  std::vector<std::string> of_models;        ///< entries that follow the robot's own factor, with spread.model_freedom
 };
 
 /// After an entry with a size for each wing: what both wings have of it alike.

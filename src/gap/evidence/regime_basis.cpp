@@ -35,6 +35,11 @@ RegimeBasis::RegimeBasis(const std::vector<PredictedFlight>& flights) {
     for (std::size_t f = 0; f < flights.size(); ++f) column[f] = functions[f][i].values;
     append(functions.front()[i].name, functions.front()[i].kind);
   }
+  // what changes from flight to flight, and would else look like a height at which one of them flew
+  for (std::size_t own = 1; own < flights.size() && flights.front().within_the_beat(); ++own) {
+    for (std::size_t f = 0; f < flights.size(); ++f) column[f].setConstant(f == own ? 1 : 0);
+    append("flight " + flights[own].name(), BasisFunction::flight);
+  }
   // of what is already centred, so that a product says what its factors do not
   const auto index = [&](const std::string& name) {
     return static_cast<Eigen::Index>(std::ranges::find(names_, name) - names_.begin());

@@ -71,16 +71,19 @@ void RobotFit::refit_beside_background() {
 void RobotFit::widen_entries() {
   if (evidence_.discrepancy().spread.beside_all) return;
   Scales wide = weigh(plain_, parameters_.point).scales;
-  for (double& times : wide.entries) times = kWide * wide.robot;
+  for (std::size_t e = 0; e < wide.entries.size(); ++e)
+    wide.entries[e] = kWide * wide.usual(evidence_.discrepancy().tail_of(fitter_.entries()[e]));
   set_scales(wide);
 }
 
 double RobotFit::beyond_background(const std::string& effect, const VectorXd& sizes) const {
-  const double nu = evidence_.discrepancy().freedom_of(effect), f = evidence_.scales().robot;
+  const Tail tail = evidence_.discrepancy().tail_of(effect);
+  const double nu = tail.freedom, f = evidence_.scales().usual(tail);
   const auto improbable = [&](const std::string& entry, const VectorXd& own) {
     const double sd = evidence_.discrepancy().background_sd(entry), n = static_cast<double>(own.size());
     const double times = std::sqrt((own.squaredNorm() / (sd * sd) + nu * f * f) / (n + nu));
-    return 0.5 * own.squaredNorm() / std::pow(times * sd, 2) + n * std::log(times * sd) + evidence_.price_of(times, nu);
+    return 0.5 * own.squaredNorm() / std::pow(times * sd, 2) + n * std::log(times * sd) +
+           evidence_.price_of(times, tail);
   };
   const double usual = -0.5 * sizes.squaredNorm();
   if (!of_sides(*model::find_effect(uncertain_.nominal(), effect))) return usual + improbable(effect, sizes);
@@ -189,7 +192,7 @@ void RobotFit::take_scales(const Hypothesis& hypothesis, const Linearised& at) {
 /// flights say of its coefficients is normal with precision C^-1 - 1 and sum C^-1 m, m and C being their posterior.
 std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const Linearised& at) const {
   const Scales& now = evidence_.scales();
-  const Columns c = fitter_.columns_of(at, hypothesis.effects());
+  const Columns c = fitter_.columns_of(at);
   const BasisCoefficients own = fitter_.shape_error(hypothesis, at);
   const Posterior p =
       Evidence::posterior(evidence_.reduce(at.statistics, c.columns, fitter_.all_flights(),
@@ -209,7 +212,7 @@ std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const
     const auto log_evidence = [&](double factor) {
       const Eigen::LLT<MatrixXd> llt(factor * factor * precision + MatrixXd::Identity(n, n));
       return 0.5 * factor * factor * sum.dot(llt.solve(sum)) - llt.matrixLLT().diagonal().array().log().sum() -
-             evidence_.price_of(factor * now.entries[e], c.freedom[static_cast<std::size_t>(columns[0])]);
+             evidence_.price_of(factor * now.entries[e], c.tail[static_cast<std::size_t>(columns[0])]);
     };
     const double before = log_evidence(1);
     for (const double factor : {2.0, 4.0, 8.0, 16.0, 32.0, 64.0}) {
@@ -225,7 +228,7 @@ std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const
 
 Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, const Scales& start,
                         std::optional<double> freeing_nats) const {
-  const Columns columns = fitter_.unscaled_columns_of(at, hypothesis.effects());
+  const Columns columns = fitter_.unscaled_columns_of(at);
   const auto with = [&](double shape, const Scales& from) {
     Weighed w = evidence_.weigh(at.statistics, columns, fitter_.all_flights(),
                                 fitter_.shape_error(hypothesis, at, shape), from, freeing_nats);
@@ -234,6 +237,17 @@ Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, cons
     return w;
   };
   Weighed best = with(1, start);
+  // what the effect explains now need not be this robot's own any longer
+  Scales usual = start;
+  bool differs = false;
+  for (const std::string& effect : hypothesis.effects())
+    for (const std::string& entry : {effect, effect + kOfBoth})
+      if (const auto e = static_cast<std::size_t>(fitter_.entry_of(entry)); e < usual.entries.size()) {
+        usual.entries[e] = usual.usual(evidence_.discrepancy().tail_of(entry));
+        differs = true;
+      }
+  if (differs)
+    if (Weighed w = with(1, usual); w.posterior.log_evidence > best.posterior.log_evidence) best = std::move(w);
   if (!fitter_.has_shape(hypothesis, at)) return best;
   for (const double step : {2.0, 0.5})
     for (double shape = step; shape <= kMostShape && shape >= 1 / kMostShape; shape *= step) {

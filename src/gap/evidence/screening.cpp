@@ -20,10 +20,9 @@ double log_twice_positive(double mean, double sd) {
 /// One effect at a time, beside the columns of a fit.
 class Screening {
  public:
-  Screening(const Evidence& evidence, const Fitter& fitter, const Fit& fit, const std::vector<std::string>& beside,
-            const std::vector<SizeColumn>& columns)
+  Screening(const Evidence& evidence, const Fitter& fitter, const Fit& fit, const std::vector<SizeColumn>& columns)
       : evidence_(evidence), fitter_(fitter), columns_(columns) {
-    Columns c = fitter.columns_of(fit.point, beside);
+    Columns c = fitter.columns_of(fit.point);
     base_ = c.chosen;
     entry_ = c.entry;
     for (const SizeColumn& column : columns) {
@@ -80,23 +79,27 @@ class Screening {
     const auto one_sided = [&](const Size& s) { return columns_[s.column].one_sided; };
     Screened s{effect, 0, VectorXd::Zero(columns_[own.front().column].unknowns)};
     for (const Size& size : own) s.coordinates[columns_[size.column].unknown] = columns_[size.column].from;
-    // without what every vehicle has of it
+    // beside what this robot has of it as a background, or instead of all that, whose price is then not paid
     const int entry = fitter_.entry_of(effect);
+    const std::vector<double>& have = evidence_.scales().entries;
     std::vector<int> others;
     for (const int i : base_)
       if (entry < 0 || entry_[static_cast<std::size_t>(i)] != entry) others.push_back(i);
-    for (bool whole = true; !own.empty(); whole = false) {
-      std::vector<int> chosen = others;
+    double saved = 0;
+    if (others.size() < base_.size() && static_cast<std::size_t>(entry) < have.size())
+      saved = evidence_.price_of(have[static_cast<std::size_t>(entry)], evidence_.discrepancy().tail_of(effect));
+    const auto with = [&](std::vector<int> chosen) {
       for (const Size& size : own) chosen.push_back(size.at);
-      const Posterior p = Evidence::posterior(reduced, chosen, mean_(chosen));
-      const auto at = [&](std::size_t k) { return static_cast<Index>(others.size() + k); };
+      return Evidence::posterior(reduced, chosen, mean_(chosen));
+    };
+    for (bool whole = true; !own.empty(); whole = false) {
+      Posterior p = with(base_), instead = with(others);
+      instead.log_evidence += saved;
+      if (instead.log_evidence > p.log_evidence) p = std::move(instead);
+      const auto at = [&](std::size_t k) { return p.mean.size() - static_cast<Index>(own.size() - k); };
       const auto coordinate = [&](std::size_t k) { return columns_[own[k].column].from + own[k].from + p.mean[at(k)]; };
       if (whole) {
         s.gain = p.log_evidence - without_;
-        if (const std::vector<double>& have = evidence_.scales().entries;
-            others.size() < base_.size() && static_cast<std::size_t>(entry) < have.size())
-          s.gain +=
-              evidence_.price_of(have[static_cast<std::size_t>(entry)], evidence_.discrepancy().freedom_of(effect));
         for (std::size_t k = 0; k < own.size(); ++k)
           if (one_sided(own[k])) s.gain += log_twice_positive(coordinate(k), std::sqrt(p.covariance(at(k), at(k))));
       }
@@ -170,8 +173,8 @@ std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Vect
 }
 
 std::vector<Screened> screen(const Evidence& evidence, const Fitter& fitter, const Fit& fit,
-                             const std::vector<std::string>& beside, const std::vector<SizeColumn>& columns) {
-  const Screening screening(evidence, fitter, fit, beside, columns);
+                             const std::vector<SizeColumn>& columns) {
+  const Screening screening(evidence, fitter, fit, columns);
   std::vector<Screened> ranking;
   for (const SizeColumn& c : columns)
     if (ranking.empty() || ranking.back().effect != c.effect) ranking.push_back(screening.of(c.effect));

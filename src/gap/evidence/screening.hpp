@@ -48,8 +48,8 @@ struct Screened {
   Eigen::VectorXd coordinates;  ///< of its unknowns
 };
 
-/// Every effect that has columns, those that follow one another; the largest gain first. `beside`: the effects of the fit.
+/// Every effect that has columns, those that follow one another; the largest gain first.
 std::vector<Screened> screen(const Evidence& evidence, const Fitter& fitter, const Fit& fit,
-                             const std::vector<std::string>& beside, const std::vector<SizeColumn>& columns);
+                             const std::vector<SizeColumn>& columns);
 
 }  // namespace flappy::gap

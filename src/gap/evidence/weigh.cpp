@@ -4,7 +4,7 @@
 //   z | theta ~ N(H^-1 d (right - normal change theta), H^-1)      H = 1 + d normal d
 // so that the expected squares of delta in a block follow, and with n coefficients in it the scale that makes them most probable,
 //   s^2 = (sum E[delta^2] / D^2 + nu f^2) / (n + nu),
-// f being the robot's own. What every vehicle has of an entry has a scale alike, with tails of its own: a robot, or a maker's, may have much
+// f being the robot's own. What every vehicle has of an entry has a scale alike, about f or about 1 (Tail): a robot, or a maker's, may have much
 // of what looks like one entry, and a hypothesis pays for that what log_prior says (Dempster, Laird, Rubin 1977: the log evidence, with what is
 // thought of the scales, never falls). The evidence is taken where it is largest: the width of that maximum is the same for every hypothesis, to first order.
 #include <cmath>
@@ -75,7 +75,9 @@ int Evidence::block_of(int group, BasisFunction function) {
   return (group / kCoefficients * (kHarmonics + 1) + harmonic) * kClasses + static_cast<int>(regimes_of(function));
 }
 
-double Evidence::price_of(double times, double freedom) const { return -log_prior(times, scales_.robot, freedom); }
+double Evidence::price_of(double times, Tail tail) const {
+  return -log_prior(times, scales_.usual(tail), tail.freedom);
+}
 
 Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& columns, const std::vector<char>& use,
                         const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats,
@@ -121,18 +123,18 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
   if (best.scales.free.empty()) best.scales.free.assign(kBlocks, 0);
   best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
   std::vector<int> of_entry;  // how many columns
-  std::vector<double> entry_nu;
+  std::vector<Tail> tails;
   for (std::size_t i = 0; i < columns.entry.size(); ++i)
     if (columns.entry[i] >= 0) {
       const auto e = static_cast<std::size_t>(columns.entry[i]);
       of_entry.resize(std::max(of_entry.size(), e + 1));
-      entry_nu.resize(of_entry.size());
+      tails.resize(of_entry.size());
       ++of_entry[e];
-      entry_nu[e] = columns.freedom[i];
+      tails[e] = columns.tail[i];
     }
   best.scales.entries.resize(std::max(best.scales.entries.size(), of_entry.size()), 1);
   of_entry.resize(best.scales.entries.size());
-  entry_nu.resize(best.scales.entries.size());
+  tails.resize(best.scales.entries.size());
   Scales now = best.scales, next = best.scales;
   double stride = 1;
   std::vector<Half> halves(seen.size());
@@ -172,7 +174,7 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
       if (counts[b] > 0)
         thought += now.free[b] ? -*freeing_nats : held_ ? 0 : log_prior(now.blocks[b], now.robot, nu[b]);
     for (std::size_t e = 0; e < of_entry.size(); ++e)
-      if (of_entry[e] > 0 && !held_) thought += log_prior(now.entries[e], now.robot, entry_nu[e]);
+      if (of_entry[e] > 0 && !held_) thought += log_prior(now.entries[e], now.usual(tails[e]), tails[e].freedom);
     w.posterior.log_evidence += thought;
     const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
     if (!(gain > 0)) {  // too far: from the best on, by a step that cannot fail
@@ -214,9 +216,10 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
           squares[static_cast<std::size_t>(e)] += w_mean[i] * w_mean[i] + w_variance[i];
       for (std::size_t e = 0; e < of_entry.size(); ++e) {
         if (of_entry[e] == 0) continue;
-        const double f2 = next.robot * next.robot, scale2 = next.entries[e] * next.entries[e];
-        next.entries[e] = std::sqrt((squares[e] * scale2 + entry_nu[e] * f2) / (of_entry[e] + entry_nu[e]));
-        freedom += entry_nu[e], inverses += entry_nu[e] / (next.entries[e] * next.entries[e]);
+        const double nu_e = tails[e].freedom, usual = next.usual(tails[e]);
+        const double squares_e = squares[e] * next.entries[e] * next.entries[e];
+        next.entries[e] = std::sqrt((squares_e + nu_e * usual * usual) / (of_entry[e] + nu_e));
+        if (tails[e].of_model) freedom += nu_e, inverses += nu_e / (next.entries[e] * next.entries[e]);
       }
     }
     for (std::size_t b = 0; b < kBlocks; ++b) {

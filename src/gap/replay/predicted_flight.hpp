@@ -57,6 +57,7 @@ enum class BasisFunction {
   rate,
   product,
   place,
+  flight,  ///< one of several, as a whole
   velocity_x,
   velocity_y,
   velocity_z,

@@ -360,7 +360,7 @@ TEST(RobotFit, SaysHowMuchMoreProbableSizesAreOfAnEffect) {
     for (double log_t = -3; log_t < 6; log_t += 1e-3) {
       const double sd = std::exp(log_t) * discrepancy.background_sd(entry);
       least = std::min(least, 0.5 * sizes.squaredNorm() / (sd * sd) + static_cast<double>(sizes.size()) * std::log(sd) +
-                                  robot.evidence().price_of(std::exp(log_t), discrepancy.freedom_of(entry)));
+                                  robot.evidence().price_of(std::exp(log_t), discrepancy.tail_of(entry)));
     }
     return least;
   };
@@ -424,7 +424,7 @@ TEST(Screening, FindsALongDelay) {
   RobotFit robot(flights, prior, read_model_discrepancy(), {}, 2);
   robot.fit_parameters();
   robot.refit_beside_background();
-  const Screened first = screen(robot.evidence(), robot.fitter(), robot.parameters(), {}, robot.sizes()).front();
+  const Screened first = screen(robot.evidence(), robot.fitter(), robot.parameters(), robot.sizes()).front();
   EXPECT_EQ(first.effect, "command_delay");
   EXPECT_GT(first.gain, 50);
   const Unknown delay = unknowns_of("command_delay").front();
@@ -532,7 +532,8 @@ TEST(Evidence, FindsHowMuchARobotHasOfAnEntry) {
   const SufficientStatistics s = sums_of(evidence, flights[0], kTimes * column);
   Columns usual, alone;
   constexpr double nu = 7;
-  usual.add(column, 0, 0, nu);
+  const Tail of_model{nu, true}, of_its_own{nu, false};
+  usual.add(column, 0, 0, of_model);
   alone.add(column, 0);
   const Weighed w = evidence.weigh(s, usual, {1}, {}, Scales{});
   const double f = w.scales.robot;
@@ -546,8 +547,56 @@ TEST(Evidence, FindsHowMuchARobotHasOfAnEntry) {
   const double gain = by_entry + 0.5 * kTimes * kTimes;
   EXPECT_NEAR((w.posterior.log_evidence - fixed.posterior.log_evidence) / gain, 1, 0.1)
       << "the robot's own factor, and its blocks, move along";
-  EXPECT_EQ(evidence.price_of(evidence.scales().robot, nu), 0);
-  EXPECT_NEAR(evidence.price_of(10, nu), nu / 2 * (2 * std::log(10) - 1 + 0.01), 1e-12);
+  EXPECT_NEAR(evidence.price_of(10, of_model), nu / 2 * (2 * std::log(10) - 1 + 0.01), 1e-12);
+  // of what no model of a wing describes that is about 1, however far models of this robot are off
+  Evidence far(flights, discrepancy, 2);
+  far.set_scales({5, {}, std::vector<double>(kBlocks, 5), std::vector<char>(kBlocks, 0)});
+  EXPECT_EQ(far.price_of(5, of_model), 0);
+  EXPECT_EQ(far.price_of(1, of_its_own), 0);
+}
+
+// Three flights, of which the second is higher and shows 10 % more of a harmonic, as a sensor does that is warm: that is of the
+// flight, and no cause that acts by the height. It is ten times what flights usually differ by, and a block may be free for 10 nats.
+TEST(Evidence, WhatChangesFromFlightToFlightIsOfNoPlace) {
+  const std::vector<PredictedFlight> one = flown("hummingbird_nominal", {"flight.duration_s=4"});
+  flightlog::FlightLog higher = one[0].recording().log;
+  for (double& z : higher.mocap.z_m) z += 3;
+  const std::vector<PredictedFlight> flights = {one[0], one[0].with_log(higher), one[0]};
+  const Evidence evidence(flights, read_model_discrepancy(), 2);
+  const RegimeBasis& basis = evidence.basis();
+  std::vector<int> of_flights;
+  for (int i = 0; i < basis.size(); ++i)
+    if (basis.kind(i) == BasisFunction::flight) of_flights.push_back(i);
+  ASSERT_EQ(of_flights.size(), 2u) << "of the others than the first";
+  EXPECT_EQ(RegimeBasis(one).size(), basis.size() - 2) << "a flight alone has none";
+  const auto column = [&](std::size_t f) { return basis.values(f).col(of_flights[0]); };
+  EXPECT_NEAR((column(1).array() - column(1)[0]).abs().maxCoeff(), 0, 1e-12);
+  EXPECT_GT(column(1)[0], 0);
+  EXPECT_LT(column(0)[0], 0);
+  EXPECT_DOUBLE_EQ(column(0)[0], column(2)[0]);
+  constexpr int kGroup = kForceX * kCoefficients + 1;
+  Residuals residual;
+  for (std::size_t f = 0; f < flights.size(); ++f) {
+    Rows rows(flights[f].beats() * kRowsPerBeat, 0);
+    for (std::size_t j = 0; f == 1 && j < flights[f].beats(); ++j)
+      rows[j * kRowsPerBeat + kGroup] = 0.1 * evidence.signal(kGroup);
+    residual.push_back(std::move(rows));
+  }
+  // beside what models of a usual robot get wrong
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  BasisCoefficients delta = evidence.discrepancy_sd();
+  for (double& d : delta.reshaped()) d *= normal(random);
+  SufficientStatistics s = evidence.statistics(residual);
+  evidence.add(1, delta, s);
+  const Weighed w = evidence.weigh(s, {}, {1, 1, 1}, {}, Scales{}, 10);
+  const auto free_of_place = [&] {
+    int n = 0;
+    for (std::size_t b = 0; b < kBlocks; ++b)
+      n += w.scales.free[b] && b % kClasses == static_cast<std::size_t>(Regimes::place) ? 1 : 0;
+    return n;
+  };
+  EXPECT_EQ(free_of_place(), 0);
 }
 
 }  // namespace

@@ -426,7 +426,7 @@ TEST(VerdictRule, IsReadStrictly) {
   EXPECT_NE(verdict(with(rule, "freedom = ", "free = ")).find("doubt.freedom"), std::string::npos);
   const std::string model = contents(kConfigs + "gap/model_discrepancy.toml");
   EXPECT_EQ(discrepancy(model), "accepted");
-  EXPECT_NE(discrepancy(with(model, "\"body_drag\"", "\"body_drags\"")).find("no effect \"body_drags\""),
+  EXPECT_NE(discrepancy(with(model, "\"added_mass\"", "\"added_masses\"")).find("no effect \"added_masses\""),
             std::string::npos);
   EXPECT_NE(discrepancy(with(model, "body_drag = ", "body_dragg = ")).find("background_sd.body_dragg"),
             std::string::npos);
