@@ -12,8 +12,8 @@ namespace flappy::gap {
 /// Makes the figures of the effects of a fit, along whose coordinates its directions are, as uncertain as they are.
 void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule);
 
-/// The log evidence of a hypothesis, where what its effects gain over the parameters alone by chance counts for nothing. `plain`: log
-/// evidence of the parameters, without what was thought before.
+/// The log evidence of a hypothesis, where what its effects, and something that no entry explains, gain over the parameters alone by chance
+/// counts for nothing. `plain`: log evidence of the parameters, without what was thought before.
 double beyond_chance(const ScoredHypothesis& hypothesis, double plain, const VerdictRule& rule);
 
 /// Of every hypothesis; the most probable first. Where d nats speak for the best rather than for it, it counts
