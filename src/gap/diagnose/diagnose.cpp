@@ -24,6 +24,8 @@ using Eigen::VectorXd;
 constexpr std::size_t kMostRemainders = 3;
 /// Effects that are fitted jointly with what explains most.
 constexpr std::size_t kFurther = 2;
+/// Effects that explain most, beside which parameters are moved.
+constexpr std::size_t kFreely = 3;
 /// Less than this share of what parameters leave may be chance; and the log evidence of what is refuted.
 constexpr double kLeastExplainable = 0.15, kRefuted = -1e9;
 /// A size that changes no row by so much, in its unit, cannot be told from none.
@@ -64,7 +66,13 @@ class Diagnoser {
     if (progress(0.4, "fitting effects")) {
       // also those that promise nothing: beside parameters that make up for an effect, a line sees nothing of it
       std::vector<ScoredHypothesis> fits(finalists.size());
-      io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}); });
+      io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}, false); });
+      std::vector<std::size_t> order(fits.size());
+      std::iota(order.begin(), order.end(), std::size_t{0});
+      std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) { return fits[i].log_evidence; });
+      order.resize(std::min(order.size(), kFreely));
+      io::parallel_for(order.size(), threads_,
+                       [&](std::size_t i) { fits[order[i]] = fit_effects({finalists[order[i]]}, true); });
       for (std::size_t i = 0; i < fits.size(); ++i)
         // a fit that flew to where less is explained than a line from the parameters promises found nothing
         if (vanished(fits[i]) || fits[i].log_evidence < leave_open(finalists[i]).log_evidence)
@@ -94,7 +102,7 @@ class Diagnoser {
         io::parallel_for(more.size(), threads_, [&](std::size_t i) {
           std::vector<Screened> set = screened_of(best);
           set.push_back(further[i]);
-          more[i] = fit_effects(set);
+          more[i] = fit_effects(set, true);
         });
         std::erase_if(more, [&](const ScoredHypothesis& a) { return vanished(a); });
         std::erase_if(more, [&](const ScoredHypothesis& a) {
@@ -105,7 +113,7 @@ class Diagnoser {
           const Screened last = screened_of(a).back();
           const auto single = std::ranges::find(singles, std::vector{last.effect}, &ScoredHypothesis::effects);
           if (single == singles.end() || single->fitted()) continue;
-          if (ScoredHypothesis fitted = fit_effects({last}); fitted.fitted()) *single = std::move(fitted);
+          if (ScoredHypothesis fitted = fit_effects({last}, false); fitted.fitted()) *single = std::move(fitted);
         }
         singles.insert(singles.end(), more.begin(), more.end());
         best = *std::ranges::max_element(more, {}, explained);
@@ -141,8 +149,10 @@ class Diagnoser {
     set_probabilities(d.hypotheses, rule_);
     d.conclusion = conclude(d.hypotheses, rule_);
     const ScoredHypothesis& fit = flown(d);
-    d.sensors = fit.fitted() ? robot_.sensors(Hypothesis(uncertain_, fit.effects), fit.fit)
-                             : robot_.sensors(plain, parameters_);
+    const Fit& best = fit.fitted() ? fit.fit : parameters_;
+    const Hypothesis concluded(uncertain_, fit.fitted() ? fit.effects : std::vector<std::string>());
+    d.sensors = robot_.sensors(concluded, best);
+    d.corrected = fitter_.joint(concluded, best.point, fitter_.all_flights(), true).at;
     d.minors = uncertain_.minors();
     d.noise_sd = noise_sd();
     if (!flights_.front().within_the_beat()) d.validation = validate(robot_, flights_, d, threads_);
@@ -283,7 +293,14 @@ class Diagnoser {
     return std::log(rule_.prior.effect / static_cast<double>(model::catalogue_of(uncertain_.nominal()).size()));
   }
 
-  ScoredHypothesis fit_effects(const std::vector<Screened>& set) const {
+  /// None where it comes apart.
+  std::optional<Weighed> weighed(const Hypothesis& h, const Fit& fit) const {
+    if (fit.point.residual.empty()) return std::nullopt;
+    return robot_.weigh(h, fit.point);
+  }
+
+  /// Beside the parameters where they are; `freely`: or where these move to, if that explains more.
+  ScoredHypothesis fit_effects(const std::vector<Screened>& set, bool freely) const {
     std::vector<std::string> effects;
     for (const Screened& s : set) effects.push_back(s.effect);
     const Hypothesis h(uncertain_, effects);
@@ -294,13 +311,17 @@ class Diagnoser {
       start.segment(at, s.coordinates.size()) = s.coordinates;
       at += s.coordinates.size();
     }
-    Fit fit = fitter_.fit(h, h.bounded(start), parameters_, 6);
-    if (fit.point.residual.empty()) {
-      ScoredHypothesis none;
-      none.kind = ScoredHypothesis::Kind::effect;
-      none.effects = effects;
-      return none;
+    Fit fit = fitter_.fit_beside(h, start, parameters_);
+    std::optional<Weighed> w = weighed(h, fit);
+    if (freely) {
+      Fit other = fitter_.fit(h, h.bounded(start), parameters_, 6);
+      std::optional<Weighed> own = weighed(h, other);
+      if (own && (!w || own->posterior.log_evidence > w->posterior.log_evidence)) fit = std::move(other), w = std::move(own);
     }
+    ScoredHypothesis a;
+    a.kind = ScoredHypothesis::Kind::effect;
+    a.effects = effects;
+    if (!w) return a;
     double log_prior = log_prior_of_one();
     for (std::size_t i = 1; i < set.size(); ++i)
       log_prior +=
@@ -309,15 +330,11 @@ class Diagnoser {
       const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
       if (u.size && u.low >= 0) log_prior += std::log(2.0);
     }
-    const Weighed w = robot_.weigh(h, fit.point);
-    fit.point.shape = w.shape;
-    ScoredHypothesis a;
-    a.kind = ScoredHypothesis::Kind::effect;
-    a.effects = effects;
-    a.log_evidence = w.posterior.log_evidence + log_prior;
+    fit.point.shape = w->shape;
+    a.log_evidence = w->posterior.log_evidence + log_prior;
     a.log_prior = log_prior;
     a.fit = std::move(fit);
-    if (w.shape > 1) a.otherwise = most_otherwise(w);
+    if (w->shape > 1) a.otherwise = most_otherwise(*w);
     return a;
   }
 

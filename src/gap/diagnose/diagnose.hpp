@@ -96,6 +96,7 @@ struct Diagnosis {
   std::vector<std::string>
       untestable;                      ///< entries that cannot show in these logs, of a robot that is known by the beat
   Fit parameters;                      ///< without any effect
+  Eigen::VectorXd corrected;           ///< coordinates of what was concluded, of a robot that has nothing else
   std::vector<double> minors;          ///< variates of the vehicle's minor draws, for sim::Randomisation::set_minors
   std::vector<SensorFinding> sensors;  ///< beside what is concluded
   std::optional<Validation> validation;  ///< of a robot that is known by the beat

@@ -56,11 +56,11 @@ Diagnosis diagnose_visibly(const std::vector<PredictedFlight>& flights, const si
 model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Diagnosis& d,
                                  const sim::Randomisation& uncertain) {
   const ScoredHypothesis& best = flown(d);
-  const Hypothesis h(uncertain, best.effects);
-  const Fit& fit = best.kind == ScoredHypothesis::Kind::effect ? best.fit : d.parameters;
+  const Fit& fit = best.fitted() ? best.fit : d.parameters;
+  const Hypothesis h(uncertain, best.fitted() ? best.effects : std::vector<std::string>());
   model::Vehicle corrected = vehicle;
   if (best.kind != ScoredHypothesis::Kind::none) {
-    const Eigen::VectorXd mean = h.bounded(fit.mean());
+    const Eigen::VectorXd& mean = d.corrected;
     const Eigen::MatrixXd covariance = fit.covariance();
     std::vector<std::vector<double>> rows;
     for (const auto& row : covariance.rowwise()) rows.emplace_back(row.begin(), row.end());

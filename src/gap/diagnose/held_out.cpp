@@ -19,12 +19,6 @@ constexpr int kDraws = 1000, kCopies = 20;
 /// On functions of rms 1: those that are nearly the same share what they explain.
 constexpr double kRidge = 0.01;
 
-/// The most probable coordinates by the chosen flights alone.
-VectorXd coordinates_by(const RobotFit& robot, const Fitted& fit, const std::vector<char>& use) {
-  const Linearised& l = *fit.point;
-  return fit.hypothesis.bounded(l.at + l.directions.axes * robot.fitter().posterior(fit.hypothesis, l, use).mean);
-}
-
 /// "level_flight" of level_flight_2: names without a number at their end.
 std::string kind_of(std::string name) {
   while (!name.empty() && std::isdigit(static_cast<unsigned char>(name.back()))) name.pop_back();
@@ -194,18 +188,24 @@ std::vector<Residuals> held_out(const RobotFit& robot, const std::vector<Predict
                                 const std::vector<Fitted>& fits, const std::vector<int>& fold, int threads) {
   const std::size_t folds = static_cast<std::size_t>(*std::ranges::max_element(fold)) + 1;
   std::vector<Candidate> candidates;
+  std::vector<BasisCoefficients> beside;
   for (const Fitted& fit : fits)
     for (std::size_t k = 0; k < folds; ++k) {
       std::vector<char> others(flights.size(), 1);
       for (std::size_t f = 0; folds > 1 && f < flights.size(); ++f) others[f] = fold[f] != static_cast<int>(k) ? 1 : 0;
-      candidates.push_back(fit.hypothesis.candidate(coordinates_by(robot, fit, others)));
+      Fitter::Joint joint = robot.fitter().joint(fit.hypothesis, *fit.point, others);
+      candidates.push_back(fit.hypothesis.candidate(joint.at));
+      beside.push_back(std::move(joint.beside));
     }
   std::vector<Residuals> rows = residuals(flights, candidates, threads);
   std::vector<Residuals> left(fits.size(), Residuals(flights.size()));
   for (std::size_t i = 0; i < fits.size(); ++i)
     for (std::size_t f = 0; f < flights.size(); ++f) {
-      Residuals& s = rows[i * folds + static_cast<std::size_t>(fold[f])];
-      if (!s.empty()) left[i][f] = std::move(s[f]);
+      const std::size_t k = i * folds + static_cast<std::size_t>(fold[f]);
+      Residuals& s = rows[k];
+      if (s.empty()) continue;
+      // of one that is known by the beat, what stands beside a fit is noise
+      left[i][f] = flights[f].within_the_beat() ? robot.evidence().without(f, std::move(s[f]), beside[k]) : std::move(s[f]);
     }
   return left;
 }
@@ -290,7 +290,7 @@ Validation validate(const RobotFit& robot, const std::vector<PredictedFlight>& f
   for (std::size_t i = 0; i < fits.size(); ++i)
     rung(i == 0 ? "parameters" : fits[i].hypothesis.effects().back(), *left[i], by_type[i]);
   const Fitted& last = fits.back();
-  control(flights, last, coordinates_by(robot, last, std::vector<char>(flights.size(), 1)), threads, v);
+  control(flights, last, robot.fitter().joint(last.hypothesis, *last.point, robot.fitter().all_flights()).at, threads, v);
   agree(robot, flights, last, v);
   return v;
 }

@@ -105,13 +105,12 @@ void Evidence::learn_remainder(const Residuals& residual) {
   held_ = true;
 }
 
-Residuals Evidence::without(Residuals residual, const BasisCoefficients& change) const {
-  for (std::size_t f = 0; f < residual.size(); ++f)
-    for (int g = 0; g < kGroups; ++g) {
-      if (!has_rows(g)) continue;
-      const VectorXd smooth = basis_.values(f) * change.row(g).transpose();
-      for (std::size_t j = 0; j < flights_[f].beats(); ++j) residual[f][row_of(j, g)] -= smooth[static_cast<Index>(j)];
-    }
+Rows Evidence::without(std::size_t flight, Rows residual, const BasisCoefficients& change) const {
+  for (int g = 0; g < kGroups; ++g) {
+    if (!has_rows(g)) continue;
+    const VectorXd smooth = basis_.values(flight) * change.row(g).transpose();
+    for (std::size_t j = 0; j < flights_[flight].beats(); ++j) residual[row_of(j, g)] -= smooth[static_cast<Index>(j)];
+  }
   return residual;
 }
 

@@ -129,8 +129,8 @@ class Evidence {
   void set_scales(const Scales& scales) { scales_ = scales; }
   /// From now on all of a residual is noise, smooth or not, and no hypothesis finds scales of its own, but for blocks that are free.
   void learn_remainder(const Residuals& residual);
-  /// A residual less what columns of such coefficients make of it, as far as they are smooth.
-  Residuals without(Residuals residual, const BasisCoefficients& change) const;
+  /// The residual of a flight less what columns of such coefficients make of it, as far as they are smooth.
+  Rows without(std::size_t flight, Rows residual, const BasisCoefficients& change) const;
   const Scales& scales() const { return scales_; }
   static int block_of(int group, BasisFunction function);
   /// Of the chosen columns, whose theta has the given prior means and sd 1; without `covariance` that is empty.

@@ -23,11 +23,13 @@ constexpr int kAround = 8;
 constexpr double kAroundReach = 0.2;
 constexpr double kConverged = 0.02;
 /// Nats that another step has to bring.
-constexpr double kWorthwhile = 0.05;
+constexpr double kWorthwhile = 0.5;
 /// Information in a column of standard normal coefficient below which it changes nothing: its evidence by some hundredths of a nat.
 constexpr double kTelling = 0.05;
 /// How far, in reaches of its differences, columns of another point are trusted.
 constexpr double kFar = 2;
+/// Times that effects are moved where parameters stay.
+constexpr int kMostOwn = 2;
 
 }  // namespace
 
@@ -79,6 +81,7 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
   std::vector<double> spans;
   const auto first = static_cast<Index>(known.size());
   for (Index d = first; d < directions.reach.size(); ++d) {
+    if (line_of(hypothesis, d)) continue;
     const VectorXd axis = directions.axes.col(d);
     const VectorXd up = hypothesis.bounded(at + directions.reach[d] * axis);
     const VectorXd down = hypothesis.bounded(at - directions.reach[d] * axis);
@@ -89,18 +92,30 @@ Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, D
   const std::vector<VectorXd> shifts = around(hypothesis, at, directions, known, candidates);
   std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
   Linearised l{at, std::move(directions), std::move(rows[0]), {}, known};
-  l.columns.resize(known.size() + spans.size());
-  io::parallel_for(spans.size(), threads_, [&](std::size_t d) {
-    Residuals &up = rows[1 + 2 * d], &down = rows[2 + 2 * d];
-    if (up.empty() || down.empty() || !(spans[d] > 0)) return;
+  std::vector<std::size_t> flown;
+  for (Index d = first; d < l.directions.reach.size(); ++d) {
+    const BasisCoefficients* line = line_of(hypothesis, d);
+    if (line == nullptr) flown.push_back(l.columns.size());
+    l.columns.push_back(line == nullptr ? BasisCoefficients() : *line);
+  }
+  io::parallel_for(flown.size(), threads_, [&](std::size_t n) {
+    Residuals &up = rows[1 + 2 * n], &down = rows[2 + 2 * n];
+    if (up.empty() || down.empty() || !(spans[n] > 0)) return;
     for (std::size_t f = 0; f < up.size(); ++f)
-      for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / spans[d];
-    l.columns[known.size() + d] = evidence_.basis_coefficients(up);
+      for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / spans[n];
+    l.columns[flown[n]] = evidence_.basis_coefficients(up);
   });
   if (l.residual.empty()) return l;
   l.statistics = evidence_.statistics(l.residual);
   average({rows.begin() + static_cast<std::ptrdiff_t>(rows.size() - shifts.size()), rows.end()}, shifts, l);
   return l;
+}
+
+const BasisCoefficients* Fitter::line_of(const Hypothesis& hypothesis, Index direction) const {
+  if (direction < hypothesis.shared()) return nullptr;
+  const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(direction)];
+  const auto line = lines_.find({u.effect, u.name});
+  return line == lines_.end() ? nullptr : &line->second;
 }
 
 /// Points around another, as the steps to them along the directions.
@@ -279,9 +294,31 @@ BasisCoefficients Fitter::shape_of(const BasisCoefficients& change) const {
 
 Posterior Fitter::posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const {
   const Columns columns = columns_of(point);
-  const BasisCoefficients sd =
-      (evidence_.discrepancy_sd().cwiseAbs2() + shape_error(hypothesis, point).cwiseAbs2()).cwiseSqrt();
-  return solve(point, columns, evidence_.reduce(point.statistics, columns.columns, use, sd));
+  return solve(point, columns,
+               evidence_.reduce(point.statistics, columns.columns, use, discrepancy_sd(hypothesis, point)));
+}
+
+BasisCoefficients Fitter::discrepancy_sd(const Hypothesis& hypothesis, const Linearised& point) const {
+  return (evidence_.discrepancy_sd().cwiseAbs2() + shape_error(hypothesis, point).cwiseAbs2()).cwiseSqrt();
+}
+
+Fitter::Joint Fitter::joint(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use,
+                            bool alone) const {
+  const Columns all = columns_of(point);
+  Columns columns;
+  for (std::size_t i = 0; i < all.columns.size(); ++i)
+    if (!alone || all.entry[i] < 0) columns.add(*all.columns[i], all.prior_mean[i]);
+  const Posterior p = Evidence::posterior(
+      evidence_.reduce(point.statistics, columns.columns, use, discrepancy_sd(hypothesis, point)), columns.chosen,
+      columns.mean(), false);
+  VectorXd own = VectorXd::Zero(static_cast<Index>(point.columns.size()));
+  Index k = 0;
+  for (std::size_t d = 0; d < point.columns.size(); ++d)
+    if (point.columns[d].size() > 0) own[static_cast<Index>(d)] = p.mean[k++];
+  Joint joint{hypothesis.bounded(point.at + point.directions.axes * own),
+              BasisCoefficients::Zero(kGroups, evidence_.basis().size())};
+  for (; k < p.mean.size(); ++k) joint.beside += p.mean[k] * *columns.columns[static_cast<std::size_t>(k)];
+  return joint;
 }
 
 Reduced Fitter::reduce(const Linearised& point, const Columns& columns) const {
@@ -353,6 +390,22 @@ Fit Fitter::fit(const Hypothesis& hypothesis, const VectorXd& start, const Fit& 
   result.point = linearise(hypothesis, hypothesis.bounded(start), joint_directions(hypothesis, parameters),
                            known(hypothesis, parameters));
   return improve(hypothesis, std::move(result), iterations, &parameters, true);
+}
+
+Fit Fitter::fit_beside(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters) const {
+  Fit result;
+  VectorXd at = hypothesis.bounded(start);
+  const Index own = hypothesis.size() - hypothesis.shared();
+  at.head(hypothesis.shared()) = parameters.point.at.head(hypothesis.shared());
+  for (int n = 0;; ++n) {
+    result.point = linearise(hypothesis, at, joint_directions(hypothesis, parameters), known(hypothesis, parameters));
+    if (result.point.residual.empty()) return result;
+    const Columns columns = columns_of(result.point);
+    result.posterior = solve(result.point, columns, reduce(result.point, columns));
+    const VectorXd there = hypothesis.bounded(result.mean());
+    if (n == kMostOwn || (there - at).tail(own).cwiseAbs().maxCoeff() < kFirstReach) return result;
+    at.tail(own) = there.tail(own);
+  }
 }
 
 Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters,

@@ -2,6 +2,8 @@
 // differences between vehicles that fly side by side as lanes.
 #pragma once
 
+#include <map>
+
 #include "gap/evidence/evidence.hpp"
 #include "gap/evidence/hypothesis.hpp"
 
@@ -50,6 +52,8 @@ class Fitter {
   /// Columns that may take what they can beside every hypothesis: first those that are the same for every robot, then what every vehicle
   /// has of the entries, which hypotheses that name the entry do without. Of which the flights tell nothing, beside a fit's, are left out.
   void set_background(const Columns& same, const std::vector<Background>& of_entries, const Fit& beside);
+  /// Sizes whose change is the same wherever they stand, which so need not be flown: [effect, name].
+  void set_lines(std::map<std::pair<std::string, std::string>, BasisCoefficients> lines) { lines_ = std::move(lines); }
   /// What a point leaves for a column of those that are the same for every robot: its place among them, and its coefficient.
   struct Beside {
     std::size_t place;
@@ -72,6 +76,14 @@ class Fitter {
   Columns unscaled_columns_of(const Linearised& point) const;
   /// What some of the flights say alone, along all directions of a point.
   Posterior posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const;
+  /// The most probable coordinates by the chosen flights alone, and what the columns beside them then change.
+  struct Joint {
+    Eigen::VectorXd at;
+    BasisCoefficients beside;
+  };
+  /// `alone`: of a robot that has nothing of any entry but what the hypothesis names.
+  Joint joint(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use,
+              bool alone = false) const;
   /// Of its effects that act by the place, how far their laws may be others than their entries'.
   BasisCoefficients shape_error(const Hypothesis& hypothesis, const Linearised& point) const {
     return shape_error(hypothesis, point, point.shape);
@@ -89,6 +101,8 @@ class Fitter {
   Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int iterations) const;
   /// From `start` on, beside another fit: its parameters keep their directions and derivatives.
   Fit fit(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters, int iterations) const;
+  /// The same, but that the parameters stay where that fit has them, so that both are judged by the same columns.
+  Fit fit_beside(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters) const;
   /// The same, from where another fit ended, along its directions.
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const;
   /// Without any effect's size, taken as linear in the hypothesis' own unknowns, whose columns are given (empty: unseen), beside
@@ -98,6 +112,9 @@ class Fitter {
  private:
   std::map<std::string, BasisCoefficients> changes(const Hypothesis& hypothesis, const Linearised& point) const;
   BasisCoefficients shape_of(const BasisCoefficients& change) const;
+  BasisCoefficients discrepancy_sd(const Hypothesis& hypothesis, const Linearised& point) const;
+  /// Of a size that is a line; null: of none.
+  const BasisCoefficients* line_of(const Hypothesis& hypothesis, Eigen::Index direction) const;
   static Directions joint_directions(const Hypothesis& hypothesis, const Fit& parameters);
   static std::vector<BasisCoefficients> known(const Hypothesis& hypothesis, const Fit& parameters);
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
@@ -117,6 +134,7 @@ class Fitter {
   const Evidence& evidence_;
   int threads_;
   void add_background(const std::vector<BasisCoefficients>& list, Columns& to) const;
+  std::map<std::pair<std::string, std::string>, BasisCoefficients> lines_;
   std::vector<BasisCoefficients> background_, scaled_;
   std::vector<double> means_;         ///< of background_
   std::vector<int> entry_;            ///< of background_: in entries_, or -1

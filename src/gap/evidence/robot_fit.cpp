@@ -25,6 +25,8 @@ constexpr double kWorthwhile = 2;
 /// How far another law than the entry's may go: sd of the log of its factor, and the largest.
 constexpr double kShapeSd = 1, kMostShape = 32;
 
+constexpr const char* kDelay = "delay_s";
+
 /// Whether an entry has a size for each wing, and no other.
 bool of_sides(const model::EffectEntry& entry) {
   return entry.info.sizes == 2 && std::string_view(entry.parameters[0].name).starts_with("left_") &&
@@ -161,7 +163,9 @@ void RobotFit::learn_remainder() {
                             c.chosen, c.mean());
     BasisCoefficients all = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
     for (std::size_t k = 0; k < c.columns.size(); ++k) all += p.mean[static_cast<Eigen::Index>(k)] * *c.columns[k];
-    evidence_.learn_remainder(evidence_.without(parameters_.point.residual, all));
+    Residuals left = parameters_.point.residual;
+    for (std::size_t f = 0; f < left.size(); ++f) left[f] = evidence_.without(f, std::move(left[f]), all);
+    evidence_.learn_remainder(left);
   }
   parameters_.point.statistics = evidence_.statistics(parameters_.point.residual);
   nominal_.statistics = evidence_.statistics(nominal_.residual);
@@ -318,6 +322,18 @@ void RobotFit::find_sizes() {
       sizes_.back().large.push_back({at, along[n] / at, (along[n + 1] - along[n - 1]) / (2 * kSizeReach)});
     }
   }
+  set_lines();
+}
+
+/// What a sensor adds is a line; how late it is turns what it says of a beat.
+void RobotFit::set_lines() {
+  std::map<std::pair<std::string, std::string>, BasisCoefficients> lines;
+  for (const SizeColumn& s : sizes_) {
+    const Hypothesis h(uncertain_, {s.effect});
+    const Unknown& u = h.unknowns()[static_cast<std::size_t>(h.shared() + s.unknown)];
+    if (u.log && u.name != kDelay) lines[{u.effect, u.name}] = s.change;
+  }
+  fitter_.set_lines(std::move(lines));
 }
 
 void RobotFit::find_lines() {

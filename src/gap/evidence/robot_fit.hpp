@@ -60,6 +60,7 @@ class RobotFit {
  private:
   void learn_remainder();
   void find_sizes();
+  void set_lines();
   void find_lines();
   void set_background();
   void set_scales(const Scales& scales);
