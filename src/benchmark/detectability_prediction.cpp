@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Quaterniond, Eigen::Vector3d;
 
-constexpr int kSubsteps = 5;  // of the robot, in one of the record
+constexpr int kSubsteps = 10;  // of the robot, in one of the record
 static_assert(kSubsteps * blind::kRobotStep_s == gap::kPredictionStep_s);
 /// Torques and forces.
 constexpr std::size_t kSignals = gap::kStrokeLeft;

@@ -102,8 +102,13 @@ class Diagnoser {
         io::parallel_for(more.size(), threads_, [&](std::size_t i) {
           std::vector<Screened> set = screened_of(best);
           set.push_back(further[i]);
-          more[i] = fit_effects(set, true);
+          more[i] = fit_effects(set, false);
         });
+        if (const auto first = std::ranges::max_element(more, {}, explained); first != more.end()) {
+          std::vector<Screened> set = screened_of(best);
+          set.push_back(further[static_cast<std::size_t>(first - more.begin())]);
+          *first = fit_effects(set, true);
+        }
         std::erase_if(more, [&](const ScoredHypothesis& a) { return vanished(a); });
         std::erase_if(more, [&](const ScoredHypothesis& a) {
           return explained(a) < explained(best) + rule_.gain.by_chance_nats;
