@@ -13,8 +13,8 @@
 
 namespace flappy::gap {
 
-/// As the robots' default. At half of it, and twice the time, flights held out are predicted no better; of a robot with nothing wrong that
-/// flew by other steps, the parameters make up for 0.1 % of its thrust.
+/// At half of it, and twice the time, flights held out are predicted no better. Of a robot with nothing wrong that flew by other steps the
+/// parameters make up for less than 0.1 % of its thrust.
 inline constexpr double kPredictionStep_s = 2e-4;
 /// Beats until wings that were at rest have forgotten it: after three, thirty times the noise remains.
 inline constexpr double kSpinUpBeats = 6;

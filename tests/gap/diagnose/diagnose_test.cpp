@@ -196,7 +196,7 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   const sim::Randomisation prior = uncertain();
   const Hypothesis plain(prior, {});
   Evidence evidence(flights, read_model_discrepancy(), 2);
-  const Fitter fitter(flights, evidence, 2);
+  Fitter fitter(flights, evidence, 2);
   const Linearised start =
       fitter.linearise(plain, plain.start(), {Eigen::MatrixXd(plain.size(), 0), Eigen::VectorXd(0)});
   evidence.learn_weights(start.residual);
@@ -243,6 +243,20 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   for (Index i = 0; i < plain.shared(); ++i)
     if (plain.unknowns()[static_cast<std::size_t>(i)].name.find("rest_angle") != std::string::npos)
       EXPECT_LT(std::sqrt(covariance(i, i)), 0.1);
+  // an effect that changes nothing, here a wall where there is none, explains just as much beside the same parameters
+  const Hypothesis wall(prior, {"wall_effect"});
+  Eigen::VectorXd at = wall.start();
+  at[wall.shared()] = 1;
+  const Fit beside = fitter.fit_beside(wall, at, fit);
+  EXPECT_EQ(beside.point.at.head(plain.size()), fit.point.at);
+  EXPECT_NEAR(beside.posterior.log_evidence, fit.posterior.log_evidence, 1);
+  // what a line says of a size is not flown
+  const BasisCoefficients line = BasisCoefficients::Constant(kGroups, evidence.basis().size(), 0.5);
+  fitter.set_lines({{{"mocap_tilt", "x_rad"}, line}});
+  const Hypothesis tilt(prior, {"mocap_tilt"});
+  const Linearised l = fitter.fit_beside(tilt, tilt.start(), fit).point;
+  EXPECT_EQ(l.columns[static_cast<std::size_t>(tilt.shared())], line);
+  EXPECT_NE(l.columns[static_cast<std::size_t>(tilt.shared() + 1)], line);
 }
 
 TEST(SensorEffects, AreTakenBack) {
@@ -391,6 +405,20 @@ TEST(Diagnose, NamesNoEffectForWhatAnyRobotMayHave) {
   ASSERT_NE(clock, d.sensors.end());
   EXPECT_NEAR(clock->value, 6e-5, 4 * clock->sd);
   EXPECT_LT(clock->sd, 1e-5);
+  // what stands beside the parameters belongs to their prediction, which is better than the file's, to 1.5 sd of noise
+  const auto left = [&](const Residuals& residual) {
+    double sum = 0, n = 0;
+    for (std::size_t j = 0; j < flights[0].beats(); ++j)
+      for (int g = kTorqueX * kCoefficients; g < (kForceZ + 1) * kCoefficients; ++g)
+        if (flights[0].covers(j, g / kCoefficients)) {
+          const auto row = static_cast<std::size_t>(g);
+          sum += std::pow(residual[0][j * kRowsPerBeat + row] / d.noise_sd[row], 2);
+          n += 1;
+        }
+    return sum / n;
+  };
+  EXPECT_LT(left(d.refit), left(d.nominal));
+  EXPECT_LT(left(d.refit), 1.5 * 1.5);
 }
 
 TEST(Screening, StepsAsFarAsRobotsGoAnyway) {
