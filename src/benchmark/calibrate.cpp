@@ -1,5 +1,6 @@
 #include "benchmark/calibrate.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -28,11 +29,12 @@ struct Constant {
   bool by_factors;
 };
 
-const std::array<Constant, 5>& constants() {
-  static const std::array<Constant, 5> kAll = {{
+const std::array<Constant, 6>& constants() {
+  static const std::array<Constant, 6> kAll = {{
       {"doubt", "nats", [](VerdictRule& r) -> double& { return r.doubt.nats; }, 0.1, 100, true},
       {"doubt", "freedom", [](VerdictRule& r) -> double& { return r.doubt.freedom; }, 0.3, 30, true},
       {"gain", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.by_chance_nats; }, 0, 300, false},
+      {"prior", "parameters", [](VerdictRule& r) -> double& { return r.prior.parameters; }, 0.01, 0.9, true},
       {"prior", "unknown", [](VerdictRule& r) -> double& { return r.prior.unknown; }, 0.01, 0.8, true},
       {"prior", "remainder", [](VerdictRule& r) -> double& { return r.prior.remainder; }, 0.001, 1, true},
   }};
@@ -142,7 +144,7 @@ class Calibration {
             VerdictRule there = rule;
             double& x = c.of(there);
             x = std::clamp(c.by_factors ? x * std::exp(way) : x + 40 * way, c.low, c.high);
-            if (std::string(c.key) == "unknown") share(there, rule);
+            if (std::ranges::count(shared(there), &x)) share(there, x);
             const double now = score(there);
             if (now > value + 1e-6) rule = there, value = now, better = true;
           }
@@ -151,10 +153,17 @@ class Calibration {
   }
 
  private:
-  /// The others have what an unknown cause leaves.
-  static void share(VerdictRule& rule, const VerdictRule& before) {
-    const double factor = (1 - rule.prior.unknown) / (1 - before.prior.unknown);
-    for (double* p : {&rule.prior.none, &rule.prior.parameters, &rule.prior.effect}) *p *= factor;
+  /// What adds up to 1.
+  static std::array<double*, 4> shared(VerdictRule& rule) {
+    return {&rule.prior.none, &rule.prior.parameters, &rule.prior.effect, &rule.prior.unknown};
+  }
+  /// The others have what one of these leaves.
+  static void share(VerdictRule& rule, const double& one) {
+    double others = 0;
+    for (const double* p : shared(rule))
+      if (p != &one) others += *p;
+    for (double* p : shared(rule))
+      if (p != &one) *p *= (1 - one) / others;
   }
 
   VerdictRule rule_;
@@ -193,8 +202,7 @@ Json calibrate(const CalibrateCommand& command) {
     json[c.key] = c.of(after);
     std::printf("%-7s %-24s %10.4g, was %.4g\n", c.table, c.key, c.of(after), c.of(before));
   }
-  for (const auto& [key, value] :
-       {std::pair{"none", after.prior.none}, {"parameters", after.prior.parameters}, {"effect", after.prior.effect}})
+  for (const auto& [key, value] : {std::pair{"none", after.prior.none}, {"effect", after.prior.effect}})
     set_figure(text, "prior", key, io::shortest_digits(value));
   std::printf("mean log probability of what is right: %.3f, was %.3f, of %zu cases\n", json["score"].get<double>(),
               json["score_before"].get<double>(), calibration.cases());
