@@ -321,7 +321,8 @@ class Diagnoser {
     if (freely) {
       Fit other = fitter_.fit(h, h.bounded(start), parameters_, 6);
       std::optional<Weighed> own = weighed(h, other);
-      if (own && (!w || own->posterior.log_evidence > w->posterior.log_evidence)) fit = std::move(other), w = std::move(own);
+      if (own && (!w || own->posterior.log_evidence > w->posterior.log_evidence))
+        fit = std::move(other), w = std::move(own);
     }
     ScoredHypothesis a;
     a.kind = ScoredHypothesis::Kind::effect;

@@ -127,7 +127,7 @@ std::vector<int> read_channels(const DiagnoseCommand& command, bool by_the_beat)
 Asked read_asked(const DiagnoseCommand& command) {
   model::Vehicle vehicle = model::read_any_vehicle(command.vehicle);
   const bool by_the_beat = vehicle.beat_averaged.has_value();
-  if (!by_the_beat) vehicle = model::read_vehicle_for_steps(command.vehicle, kPredictionStep_s);
+  if (!by_the_beat) vehicle = model::read_vehicle_for_steps(command.vehicle, kHoldStep_s);
   if (!by_the_beat && !vehicle.effects.empty())
     io::Config::load(command.vehicle)
         .root()

@@ -205,7 +205,8 @@ std::vector<Residuals> held_out(const RobotFit& robot, const std::vector<Predict
       Residuals& s = rows[k];
       if (s.empty()) continue;
       // of one that is known by the beat, what stands beside a fit is noise
-      left[i][f] = flights[f].within_the_beat() ? robot.evidence().without(f, std::move(s[f]), beside[k]) : std::move(s[f]);
+      left[i][f] =
+          flights[f].within_the_beat() ? robot.evidence().without(f, std::move(s[f]), beside[k]) : std::move(s[f]);
     }
   return left;
 }
@@ -290,7 +291,8 @@ Validation validate(const RobotFit& robot, const std::vector<PredictedFlight>& f
   for (std::size_t i = 0; i < fits.size(); ++i)
     rung(i == 0 ? "parameters" : fits[i].hypothesis.effects().back(), *left[i], by_type[i]);
   const Fitted& last = fits.back();
-  control(flights, last, robot.fitter().joint(last.hypothesis, *last.point, robot.fitter().all_flights()).at, threads, v);
+  control(flights, last, robot.fitter().joint(last.hypothesis, *last.point, robot.fitter().all_flights()).at, threads,
+          v);
   agree(robot, flights, last, v);
   return v;
 }

@@ -31,7 +31,7 @@ std::vector<fs::path> flights_of(const fs::path& robot) {
 
 void run_learn_discrepancy(const LearnCommand& command) {
   io::check_output(command.out);
-  const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kPredictionStep_s);
+  const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kHoldStep_s);
   const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors).root());
   const ModelDiscrepancy start = read_model_discrepancy(command.discrepancy);
   std::vector<std::vector<PredictedFlight>> flights;

@@ -308,9 +308,9 @@ Fitter::Joint Fitter::joint(const Hypothesis& hypothesis, const Linearised& poin
   Columns columns;
   for (std::size_t i = 0; i < all.columns.size(); ++i)
     if (!alone || all.entry[i] < 0) columns.add(*all.columns[i], all.prior_mean[i]);
-  const Posterior p = Evidence::posterior(
-      evidence_.reduce(point.statistics, columns.columns, use, discrepancy_sd(hypothesis, point)), columns.chosen,
-      columns.mean(), false);
+  const Posterior p =
+      Evidence::posterior(evidence_.reduce(point.statistics, columns.columns, use, discrepancy_sd(hypothesis, point)),
+                          columns.chosen, columns.mean(), false);
   VectorXd own = VectorXd::Zero(static_cast<Index>(point.columns.size()));
   Index k = 0;
   for (std::size_t d = 0; d < point.columns.size(); ++d)

@@ -16,6 +16,8 @@ namespace flappy::gap {
 /// At half of it, and twice the time, flights held out are predicted no better. Of a robot with nothing wrong that flew by other steps the
 /// parameters make up for less than 0.1 % of its thrust.
 inline constexpr double kPredictionStep_s = 2e-4;
+/// Of which the hold of a driver is a multiple. Replays have the recorded voltages, whatever held them.
+inline constexpr double kHoldStep_s = 1e-4;
 /// Beats until wings that were at rest have forgotten it: after three, thirty times the noise remains.
 inline constexpr double kSpinUpBeats = 6;
 /// Lower than this over its stand a vehicle may still be touching the ground, which no hypothesis knows.

@@ -238,16 +238,19 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
   const Recording& r = recording_;
   const ResetBlock reset = *reset_block_kernels[sim::place_of("")];
   const ProjectBlock project = *project_block_kernels[sim::place_of("")];
-  sim::Batch<Flown> batch(kVehicles, candidates.front()->vehicle, {kPredictionStep_s, 1, r.world, {}});
+  const auto driven = [&](std::size_t i) {
+    model::Vehicle vehicle = candidates[std::min(i, candidates.size() - 1)]->vehicle;
+    vehicle.air_density_kg_m3 *= r.density_ratio;
+    vehicle.driver.hold_s = kPredictionStep_s;
+    return vehicle;
+  };
+  sim::Batch<Flown> batch(kVehicles, driven(0), {kPredictionStep_s, 1, r.world, {}});
   if (r.log.power) sim::storage_of(batch).keep_effects(0);  // the meter needs their rows
   std::vector<ShiftedVoltage> shifted;
   for (std::size_t i = 0; i < kVehicles; ++i) {
-    const Candidate& c = *candidates[std::min(i, candidates.size() - 1)];
-    model::Vehicle vehicle = c.vehicle;
-    vehicle.air_density_kg_m3 *= r.density_ratio;
-    batch.set_vehicle(i, vehicle);
+    batch.set_vehicle(i, driven(i));
     batch.reset(i, {});
-    shifted.emplace_back(c.lag_s / kPredictionStep_s);
+    shifted.emplace_back(candidates[std::min(i, candidates.size() - 1)]->lag_s / kPredictionStep_s);
   }
   auto& storage = sim::storage_of(batch);
   sim::Block<Flown>& block = storage.blocks[0];

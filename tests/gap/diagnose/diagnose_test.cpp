@@ -83,6 +83,9 @@ TEST(ResetPrediction, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
                               "log.power.voltage_noise_V=0.02", "log.power.current_noise_A=0.01"});
   const Candidate it{nominal(), 0};
   const Rows predicted = flights[0].predict({&it})[0];
+  Candidate held = it;  // by a driver whose updates are no multiple of the steps here: voltages are those of the log
+  held.vehicle.driver.hold_s = 5e-4;
+  EXPECT_EQ(flights[0].predict({&held})[0], predicted);
   const Rows noise = flights[0].declared_noise(1);
   Rows left = flights[0].measured();
   for (std::size_t i = 0; i < left.size(); ++i) left[i] -= predicted[i];
