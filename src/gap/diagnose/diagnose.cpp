@@ -66,13 +66,13 @@ class Diagnoser {
     if (progress(0.4, "fitting effects")) {
       // also those that promise nothing: beside parameters that make up for an effect, a line sees nothing of it
       std::vector<ScoredHypothesis> fits(finalists.size());
-      io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}, false); });
+      io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}); });
       std::vector<std::size_t> order(fits.size());
       std::iota(order.begin(), order.end(), std::size_t{0});
       std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) { return fits[i].log_evidence; });
       order.resize(std::min(order.size(), kFreely));
       io::parallel_for(order.size(), threads_,
-                       [&](std::size_t i) { fits[order[i]] = fit_effects({finalists[order[i]]}, true); });
+                       [&](std::size_t i) { move_parameters({finalists[order[i]]}, fits[order[i]]); });
       for (std::size_t i = 0; i < fits.size(); ++i)
         // a fit that flew to where less is explained than a line from the parameters promises found nothing
         if (vanished(fits[i]) || fits[i].log_evidence < leave_open(finalists[i]).log_evidence)
@@ -99,16 +99,13 @@ class Diagnoser {
         std::erase_if(further, [&](const Screened& s) { return s.gain < rule_.gain.further_screened_nats; });
         further.resize(std::min(further.size(), evidence_.discrepancy().spread.beside_all ? 1 : kFurther));
         std::vector<ScoredHypothesis> more(further.size());
+        std::vector<std::vector<Screened>> sets(further.size(), screened_of(best));
         io::parallel_for(more.size(), threads_, [&](std::size_t i) {
-          std::vector<Screened> set = screened_of(best);
-          set.push_back(further[i]);
-          more[i] = fit_effects(set, false);
+          sets[i].push_back(further[i]);
+          more[i] = fit_effects(sets[i]);
         });
-        if (const auto first = std::ranges::max_element(more, {}, explained); first != more.end()) {
-          std::vector<Screened> set = screened_of(best);
-          set.push_back(further[static_cast<std::size_t>(first - more.begin())]);
-          *first = fit_effects(set, true);
-        }
+        if (const auto first = std::ranges::max_element(more, {}, explained); first != more.end())
+          move_parameters(sets[static_cast<std::size_t>(first - more.begin())], *first);
         std::erase_if(more, [&](const ScoredHypothesis& a) { return vanished(a); });
         std::erase_if(more, [&](const ScoredHypothesis& a) {
           return explained(a) < explained(best) + rule_.gain.by_chance_nats;
@@ -118,7 +115,7 @@ class Diagnoser {
           const Screened last = screened_of(a).back();
           const auto single = std::ranges::find(singles, std::vector{last.effect}, &ScoredHypothesis::effects);
           if (single == singles.end() || single->fitted()) continue;
-          if (ScoredHypothesis fitted = fit_effects({last}, false); fitted.fitted()) *single = std::move(fitted);
+          if (ScoredHypothesis fitted = fit_effects({last}); fitted.fitted()) *single = std::move(fitted);
         }
         singles.insert(singles.end(), more.begin(), more.end());
         best = *std::ranges::max_element(more, {}, explained);
@@ -298,17 +295,8 @@ class Diagnoser {
     return std::log(rule_.prior.effect / static_cast<double>(model::catalogue_of(uncertain_.nominal()).size()));
   }
 
-  /// None where it comes apart.
-  std::optional<Weighed> weighed(const Hypothesis& h, const Fit& fit) const {
-    if (fit.point.residual.empty()) return std::nullopt;
-    return robot_.weigh(h, fit.point);
-  }
-
-  /// Beside the parameters where they are; `freely`: or where these move to, if that explains more.
-  ScoredHypothesis fit_effects(const std::vector<Screened>& set, bool freely) const {
-    std::vector<std::string> effects;
-    for (const Screened& s : set) effects.push_back(s.effect);
-    const Hypothesis h(uncertain_, effects);
+  /// From where the effects were screened on, beside the parameters where they are.
+  VectorXd start_of(const Hypothesis& h, const std::vector<Screened>& set) const {
     VectorXd start = h.start();
     start.head(h.shared()) = parameters_.point.at.head(h.shared());
     Index at = h.shared();
@@ -316,32 +304,49 @@ class Diagnoser {
       start.segment(at, s.coordinates.size()) = s.coordinates;
       at += s.coordinates.size();
     }
-    Fit fit = fitter_.fit_beside(h, start, parameters_);
-    std::optional<Weighed> w = weighed(h, fit);
-    if (freely) {
-      Fit other = fitter_.fit(h, h.bounded(start), parameters_, 6);
-      std::optional<Weighed> own = weighed(h, other);
-      if (own && (!w || own->posterior.log_evidence > w->posterior.log_evidence))
-        fit = std::move(other), w = std::move(own);
-    }
+    return h.bounded(start);
+  }
+
+  static std::vector<std::string> effects_of(const std::vector<Screened>& set) {
+    std::vector<std::string> effects;
+    for (const Screened& s : set) effects.push_back(s.effect);
+    return effects;
+  }
+
+  ScoredHypothesis fit_effects(const std::vector<Screened>& set) const {
     ScoredHypothesis a;
     a.kind = ScoredHypothesis::Kind::effect;
-    a.effects = effects;
-    if (!w) return a;
-    double log_prior = log_prior_of_one();
+    a.effects = effects_of(set);
+    a.log_evidence = kRefuted;  // until something flies
+    const Hypothesis h(uncertain_, a.effects);
+    a.log_prior = log_prior_of_one();
     for (std::size_t i = 1; i < set.size(); ++i)
-      log_prior +=
+      a.log_prior +=
           std::log(rule_.prior.further_effect / static_cast<double>(model::catalogue_of(uncertain_.nominal()).size()));
     for (Index i = h.shared(); i < h.size(); ++i) {
       const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
-      if (u.size && u.low >= 0) log_prior += std::log(2.0);
+      if (u.size && u.low >= 0) a.log_prior += std::log(2.0);
     }
-    fit.point.shape = w->shape;
-    a.log_evidence = w->posterior.log_evidence + log_prior;
-    a.log_prior = log_prior;
-    a.fit = std::move(fit);
-    if (w->shape > 1) a.otherwise = most_otherwise(*w);
+    take(h, fitter_.fit_beside(h, start_of(h, set), parameters_), a);
     return a;
+  }
+
+  /// To where the parameters move beside such effects, if that explains more.
+  void move_parameters(const std::vector<Screened>& set, ScoredHypothesis& a) const {
+    const Hypothesis h(uncertain_, a.effects);
+    take(h, fitter_.fit(h, start_of(h, set), parameters_, 6), a);
+  }
+
+  /// Unless the vehicle comes apart, or another fit explains as much.
+  void take(const Hypothesis& h, Fit fit, ScoredHypothesis& a) const {
+    if (fit.point.residual.empty()) return;
+    const Weighed w = robot_.weigh(h, fit.point);
+    if (a.fitted() && w.posterior.log_evidence + a.log_prior <= a.log_evidence) return;
+    fit.point.shape = w.shape;
+    a.log_evidence = w.posterior.log_evidence + a.log_prior;
+    a.fit = std::move(fit);
+    a.otherwise.reset();
+    if (w.shape > 1) a.otherwise = most_otherwise(w);
   }
 
   /// The function of the place that takes most of a free shape.

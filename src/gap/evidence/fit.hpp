@@ -50,7 +50,7 @@ class Fitter {
       : flights_(flights), evidence_(evidence), threads_(threads) {}
 
   /// Columns that may take what they can beside every hypothesis: first those that are the same for every robot, then what every vehicle
-  /// has of the entries, which hypotheses that name the entry do without. Of which the flights tell nothing, beside a fit's, are left out.
+  /// has of the entries, also of those that a hypothesis names. Of which the flights tell nothing, beside a fit's, are left out.
   void set_background(const Columns& same, const std::vector<Background>& of_entries, const Fit& beside);
   /// Sizes whose change is the same wherever they stand, which so need not be flown: [effect, name].
   void set_lines(std::map<std::pair<std::string, std::string>, BasisCoefficients> lines) { lines_ = std::move(lines); }
