@@ -51,7 +51,7 @@ class Diagnoser {
     std::vector<ScoredHypothesis> singles;
     std::vector<Screened> open;
     const std::vector<Screened> screened = screen(evidence_, fitter_, parameters_, robot_.sizes());
-    if (!flights_.front().within_the_beat()) d.untestable = untestable();
+    if (!within_the_beat()) d.untestable = untestable();
     std::vector<Screened> finalists;
     for (const Screened& s : screened) {
       if (std::ranges::count(d.untestable, s.effect)) continue;
@@ -67,7 +67,7 @@ class Diagnoser {
       // also those that promise nothing: beside parameters that make up for an effect, a line sees nothing of it
       std::vector<ScoredHypothesis> fits(finalists.size());
       io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}); });
-      std::vector<std::size_t> order(fits.size());
+      std::vector<std::size_t> order(within_the_beat() ? fits.size() : 0);
       std::iota(order.begin(), order.end(), std::size_t{0});
       std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) { return fits[i].log_evidence; });
       order.resize(std::min(order.size(), kFreely));
@@ -104,7 +104,7 @@ class Diagnoser {
           sets[i].push_back(further[i]);
           more[i] = fit_effects(sets[i]);
         });
-        if (const auto first = std::ranges::max_element(more, {}, explained); first != more.end())
+        if (const auto first = std::ranges::max_element(more, {}, explained); first != more.end() && within_the_beat())
           move_parameters(sets[static_cast<std::size_t>(first - more.begin())], *first);
         std::erase_if(more, [&](const ScoredHypothesis& a) { return vanished(a); });
         std::erase_if(more, [&](const ScoredHypothesis& a) {
@@ -157,7 +157,7 @@ class Diagnoser {
     d.corrected = fitter_.joint(concluded, best.point, fitter_.all_flights(), true).at;
     d.minors = uncertain_.minors();
     d.noise_sd = noise_sd();
-    if (!flights_.front().within_the_beat()) d.validation = validate(robot_, flights_, d, threads_);
+    if (!within_the_beat()) d.validation = validate(robot_, flights_, d, threads_);
     return d;
   }
 
@@ -295,6 +295,8 @@ class Diagnoser {
     return std::log(rule_.prior.effect / static_cast<double>(model::catalogue_of(uncertain_.nominal()).size()));
   }
 
+  bool within_the_beat() const { return flights_.front().within_the_beat(); }
+
   /// From where the effects were screened on, beside the parameters where they are.
   VectorXd start_of(const Hypothesis& h, const std::vector<Screened>& set) const {
     VectorXd start = h.start();
@@ -327,7 +329,8 @@ class Diagnoser {
       const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
       if (u.size && u.low >= 0) a.log_prior += std::log(2.0);
     }
-    take(h, fitter_.fit_beside(h, start_of(h, set), parameters_), a);
+    if (within_the_beat()) take(h, fitter_.fit_beside(h, start_of(h, set), parameters_), a);
+    else move_parameters(set, a);  // nothing is rough, and columns of another point are as good
     return a;
   }
 

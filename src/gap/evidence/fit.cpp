@@ -22,8 +22,8 @@ constexpr double kFirstReach = 0.3, kLeastReach = 0.1, kMostReach = 1, kReachSd 
 constexpr int kAround = 8;
 constexpr double kAroundReach = 0.2;
 constexpr double kConverged = 0.02;
-/// Nats that another step has to bring.
-constexpr double kWorthwhile = 0.5;
+/// Nats that another step has to bring, where steps are flown, and where they cost nothing.
+constexpr double kWorthwhile = 0.5, kWorthwhileByTheBeat = 0.05;
 /// Information in a column of standard normal coefficient below which it changes nothing: its evidence by some hundredths of a nat.
 constexpr double kTelling = 0.05;
 /// How far, in reaches of its differences, columns of another point are trusted.
@@ -492,7 +492,8 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const
         costs[best] = std::numeric_limits<double>::infinity();
         weigh(best, {});
       }
-      improved = costs.back() - costs[best] >= kWorthwhile;
+      improved =
+          costs.back() - costs[best] >= (flights_.front().within_the_beat() ? kWorthwhile : kWorthwhileByTheBeat);
       if (improved) {
         const VectorXd away = l.directions.axes.transpose() * (tries[best] - linearised_at);
         if (away.cwiseAbs().cwiseQuotient(l.directions.reach).maxCoeff() > kFar) {
