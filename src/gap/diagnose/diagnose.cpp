@@ -67,7 +67,7 @@ class Diagnoser {
       // also those that promise nothing: beside parameters that make up for an effect, a line sees nothing of it
       std::vector<ScoredHypothesis> fits(finalists.size());
       io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}); });
-      std::vector<std::size_t> order(within_the_beat() ? fits.size() : 0);
+      std::vector<std::size_t> order(fits.size());
       std::iota(order.begin(), order.end(), std::size_t{0});
       std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) { return fits[i].log_evidence; });
       order.resize(std::min(order.size(), kFreely));
@@ -104,7 +104,7 @@ class Diagnoser {
           sets[i].push_back(further[i]);
           more[i] = fit_effects(sets[i]);
         });
-        if (const auto first = std::ranges::max_element(more, {}, explained); first != more.end() && within_the_beat())
+        if (const auto first = std::ranges::max_element(more, {}, explained); first != more.end())
           move_parameters(sets[static_cast<std::size_t>(first - more.begin())], *first);
         std::erase_if(more, [&](const ScoredHypothesis& a) { return vanished(a); });
         std::erase_if(more, [&](const ScoredHypothesis& a) {
@@ -150,11 +150,15 @@ class Diagnoser {
     if (!robot_.evidence().discrepancy().spread.beside_all) share_backgrounds(d.hypotheses);
     set_probabilities(d.hypotheses, rule_);
     d.conclusion = conclude(d.hypotheses, rule_);
-    const ScoredHypothesis& fit = flown(d);
-    const Fit& best = fit.fitted() ? fit.fit : parameters_;
-    const Hypothesis concluded(uncertain_, fit.fitted() ? fit.effects : std::vector<std::string>());
-    d.sensors = robot_.sensors(concluded, best);
-    d.corrected = fitter_.joint(concluded, best.point, fitter_.all_flights(), true).at;
+    const ScoredHypothesis& answer = flown(d);
+    const Hypothesis h(uncertain_, answer.effects);
+    d.sensors = answer.fitted() ? robot_.sensors(h, answer.fit) : robot_.sensors(plain, parameters_);
+    const auto alone = [&](const Hypothesis& of, const Linearised& point) {
+      return fitter_.joint(of, point, fitter_.all_flights(), true).at;
+    };
+    if (answer.fitted()) d.corrected = alone(h, answer.fit.point);
+    else if (answer.kind == ScoredHypothesis::Kind::effect) d.corrected = h.bounded(answer.fit.mean());
+    else d.corrected = alone(plain, parameters_.point);
     d.minors = uncertain_.minors();
     d.noise_sd = noise_sd();
     if (!within_the_beat()) d.validation = validate(robot_, flights_, d, threads_);
@@ -309,16 +313,10 @@ class Diagnoser {
     return h.bounded(start);
   }
 
-  static std::vector<std::string> effects_of(const std::vector<Screened>& set) {
-    std::vector<std::string> effects;
-    for (const Screened& s : set) effects.push_back(s.effect);
-    return effects;
-  }
-
   ScoredHypothesis fit_effects(const std::vector<Screened>& set) const {
     ScoredHypothesis a;
     a.kind = ScoredHypothesis::Kind::effect;
-    a.effects = effects_of(set);
+    for (const Screened& s : set) a.effects.push_back(s.effect);
     a.log_evidence = kRefuted;  // until something flies
     const Hypothesis h(uncertain_, a.effects);
     a.log_prior = log_prior_of_one();
@@ -329,15 +327,20 @@ class Diagnoser {
       const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
       if (u.size && u.low >= 0) a.log_prior += std::log(2.0);
     }
-    if (within_the_beat()) take(h, fitter_.fit_beside(h, start_of(h, set), parameters_), a);
-    else move_parameters(set, a);  // nothing is rough, and columns of another point are as good
+    take(h, within_the_beat() ? fitter_.fit_beside(h, start_of(h, set), parameters_) : moved(h, set), a);
     return a;
   }
 
-  /// To where the parameters move beside such effects, if that explains more.
+  Fit moved(const Hypothesis& h, const std::vector<Screened>& set) const {
+    return fitter_.fit(h, start_of(h, set), parameters_, 6);
+  }
+
+  /// To where the parameters move beside such effects, if that explains more. Of a robot that is known by the beat they are there already: nothing
+  /// is rough, and columns of another point are as good.
   void move_parameters(const std::vector<Screened>& set, ScoredHypothesis& a) const {
+    if (!within_the_beat()) return;
     const Hypothesis h(uncertain_, a.effects);
-    take(h, fitter_.fit(h, start_of(h, set), parameters_, 6), a);
+    take(h, moved(h, set), a);
   }
 
   /// Unless the vehicle comes apart, or another fit explains as much.

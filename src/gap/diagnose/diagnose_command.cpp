@@ -56,8 +56,8 @@ Diagnosis diagnose_visibly(const std::vector<PredictedFlight>& flights, const si
 model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Diagnosis& d,
                                  const sim::Randomisation& uncertain) {
   const ScoredHypothesis& best = flown(d);
-  const Fit& fit = best.fitted() ? best.fit : d.parameters;
-  const Hypothesis h(uncertain, best.fitted() ? best.effects : std::vector<std::string>());
+  const Hypothesis h(uncertain, best.effects);
+  const Fit& fit = best.kind == ScoredHypothesis::Kind::effect ? best.fit : d.parameters;
   model::Vehicle corrected = vehicle;
   if (best.kind != ScoredHypothesis::Kind::none) {
     const Eigen::VectorXd& mean = d.corrected;

@@ -13,8 +13,8 @@
 
 namespace flappy::gap {
 
-/// At half of it, and twice the time, flights held out are predicted no better. Of a robot with nothing wrong that flew by other steps the
-/// parameters make up for less than 0.1 % of its thrust.
+/// At half of it, and twice the time, flights held out are predicted no better. Of a robot with nothing wrong that flew by finer steps the
+/// parameters make up for the difference, so that it is not called "none".
 inline constexpr double kPredictionStep_s = 2e-4;
 /// Of which the hold of a driver is a multiple. Replays have the recorded voltages, whatever held them.
 inline constexpr double kHoldStep_s = 1e-4;
