@@ -1,151 +1,282 @@
 #include "benchmark/detectability.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <functional>
 #include <limits>
+#include <mutex>
+#include <numbers>
 
-#include "gap/evidence/hypothesis.hpp"
+#include "benchmark/families.hpp"
+#include "io/files.hpp"
+#include "io/parallel.hpp"
+#include "io/program.hpp"
+#include "io/progress.hpp"
+#include "io/statistics.hpp"
 
 namespace flappy::benchmark {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-using gap::BasisCoefficients;
+using Json = nlohmann::ordered_json;
 
-/// Sizes at which effects are tried: few do twice as much at twice the size. Those of sensors do.
-constexpr double kSizes[] = {0.25, 0.5, 1, 4}, kSensorSizes[] = {1, 4}, kDelaySizes[] = {0.01, 0.03, 0.1};
-/// A size is taken for this much, give or take, before any flight.
-constexpr double kSizeSd = 2;
-/// A typical size of the catalogue is a third of the end of its prior, 1.645 of its coordinate.
-constexpr double kTypicalCoordinate = 1.645 / 3;
-constexpr double kLeastSize = 1e-3, kMostSize = 4;
-constexpr double kThird = 1.0 / 3;
+/// Twice the detectable size is flown, and no robot has more than four times the typical.
+constexpr double kMostDetectable = 2, kMostHover = 1000;
+/// What acts in none of these regimes alone does so in hover, too.
+constexpr const char* kOfFlight[] = {"height", "ceiling",      "wall",    "place",      "velocity",
+                                     "rate",   "acceleration", "heading", "difference", "bias"};
+constexpr const char* kChannels[] = {"force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"};
+constexpr const char* kOrders[] = {"mean", "first harmonic", "second harmonic"};
 
-/// Effects that draw a direction, and how many others span what they could have drawn. Those of sensors: the catalogue's axes.
-constexpr std::pair<blind::Effect, int> kDirections[] = {{blind::Effect::com_offset, 2},
-                                                         {blind::Effect::inertia_products, 3},
-                                                         {blind::Effect::wing_damage, 2},
-                                                         {blind::Effect::wind, 2}};
+/// Squares of a beat's coefficients of one order count as the waveform's mean square.
+double power(const double* at, std::size_t order) {
+  return order == 0 ? at[0] * at[0] : (at[2 * order - 1] * at[2 * order - 1] + at[2 * order] * at[2 * order]) / 2;
+}
+
+/// One effect of one robot: the size detectable in rich flight, and in hover.
+struct Found {
+  double rich = 0, hover = 0;
+  Shown where;  ///< at size 1
+};
+
+std::string rounded(double x) {
+  char text[24];
+  std::snprintf(text, sizeof text, "%.3g", x);
+  return text;
+}
+
+struct Size {
+  double detectable = 0, low = 0, high = 0, hover = 0;
+  Shown where;
+  bool undetectable = false, of_sensors = false;
+};
+
+Size size_of(const blind::FamilyEffect& effect, const std::vector<Found>& robots) {
+  std::vector<double> sizes, hovers;
+  Size s;
+  for (const Found& f : robots) {
+    sizes.push_back(f.rich);
+    hovers.push_back(f.hover);
+    if (f.where.share > s.where.share) s.where = f.where;
+  }
+  s.of_sensors = s.where.share == 0 && std::ranges::none_of(effect.channels, [](const std::string& c) {
+                   return c.starts_with("force") || c.starts_with("torque");
+                 });
+  if (s.of_sensors) sizes = {1}, hovers = {1};
+  s.detectable = io::median(sizes);
+  s.low = *std::ranges::min_element(sizes);
+  s.high = *std::ranges::max_element(sizes);
+  s.hover = std::min(io::median(hovers), kMostHover);
+  s.undetectable = !(s.detectable <= kMostDetectable);
+  return s;
+}
+
+std::string shows(const Size& s) {
+  if (s.of_sensors) return "sensors alone";
+  return std::string(kChannels[s.where.channel]) + ", " + kOrders[s.where.order];
+}
 
 }  // namespace
 
-double expected_gain(const MatrixXd& information, const VectorXd& truth, const MatrixXd& hypothesis,
-                     const VectorXd& precision) {
-  const MatrixXd a = hypothesis.transpose() * information * hypothesis;
-  const VectorXd f = hypothesis.transpose() * (information * truth);
-  const Eigen::LLT<MatrixXd> llt(MatrixXd(precision.asDiagonal()) + a);
-  return 0.5 * (f.dot(llt.solve(f)) + llt.solve(a).trace() + precision.array().log().sum()) -
-         llt.matrixLLT().diagonal().array().log().sum();
-}
-
-DetectabilityAnalysis::DetectabilityAnalysis(const Subject& subject, const sim::Randomisation& uncertain) {
-  std::vector<Subject::Added> list;
-  const std::uint64_t seed = subject.flown().seed;
-  for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
-    const auto effect = static_cast<blind::Effect>(e);
-    if (effect == blind::Effect::command_delay)  // straight for a small part of a beat only
-      for (const double size : kDelaySizes) list.push_back({effect, size, seed});
-    if (acts_on_sensors(effect))
-      for (const double size : kSensorSizes) list.push_back({effect, size, seed});
-    else
-      for (const double size : kSizes) list.push_back({effect, size, seed});
-    for (const auto& [turned, others] : kDirections)
-      for (int i = 1; turned == effect && i <= others; ++i)
-        list.push_back({effect, 1, seed + static_cast<std::uint64_t>(i)});
-  }
-  const std::vector<BasisCoefficients> found = subject.added(list);
-  std::vector<BasisCoefficients> columns;
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    if (found[i].size() == 0) continue;
-    Columns& c = effects_[static_cast<std::size_t>(list[i].effect)];
-    if (list[i].seed != seed) {
-      c.further.push_back(static_cast<int>(columns.size()));
-    } else {
-      c.sizes.push_back(list[i].size);
-      c.at.push_back(static_cast<int>(columns.size()));
+Beats beats_of(const flightlog::FlightLog& log, const std::vector<double>& beat_s) {
+  const double beat = 1 / log.header.flapping_Hz, turn = 2 * std::numbers::pi / beat;
+  const flightlog::ImuStream& imu = log.imu;
+  const flightlog::Column* streams[] = {&imu.accel_x_m_s2, &imu.accel_y_m_s2, &imu.accel_z_m_s2,
+                                        &imu.gyro_x_rad_s, &imu.gyro_y_rad_s, &imu.gyro_z_rad_s};
+  constexpr std::ptrdiff_t kLeast = 9;
+  Beats beats;
+  for (const double start : beat_s) {
+    const double late = log.header.imu.latency_s;
+    const auto first = std::ranges::lower_bound(imu.t_s, start + late),
+               last = std::ranges::lower_bound(imu.t_s, start + beat + late);
+    beats.emplace_back();
+    if (last - first < kLeast) continue;
+    const auto from = first - imu.t_s.begin();
+    Eigen::MatrixXd waves(last - first, 6), values(last - first, 6);
+    for (Eigen::Index i = 0; i < waves.rows(); ++i) {
+      const double t = imu.t_s[static_cast<std::size_t>(from + i)] - late - start;
+      waves.row(i) << 1, std::cos(turn * t), std::sin(turn * t), std::cos(2 * turn * t), std::sin(2 * turn * t),
+          t / beat - 0.5;
+      for (Eigen::Index k = 0; k < 6; ++k) values(i, k) = (*streams[k])[static_cast<std::size_t>(from + i)];
     }
-    columns.push_back(found[i]);
-  }
-  for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
-    if (!acts_on_sensors(static_cast<blind::Effect>(e)) || !in_catalogue(static_cast<blind::Effect>(e))) continue;
-    const auto unknowns = static_cast<Index>(gap::unknowns_of(blind::effect_names()[e]).size());
-    std::vector<VectorXd> axes;
-    for (Index i = 0; i < unknowns; ++i)
-      if (gap::unknowns_of(blind::effect_names()[e])[static_cast<std::size_t>(i)].size)
-        axes.emplace_back(kTypicalCoordinate * VectorXd::Unit(unknowns, i));
-    for (BasisCoefficients& axis : subject.catalogue(blind::effect_names()[e], axes)) {
-      if (axis.size() == 0) continue;
-      effects_[e].further.push_back(static_cast<int>(columns.size()));
-      columns.push_back(std::move(axis));
+    const Eigen::MatrixXd fit = waves.colPivHouseholderQr().solve(values);
+    std::array<double, 30>& of = beats.back().emplace();
+    for (std::size_t k = 0; k < 6; ++k) {
+      const auto c = fit.col(static_cast<Eigen::Index>(k));
+      // the rate's slope and the derivatives of its waves are the turning acceleration's
+      const std::array<double, 5> row =
+          k < 3 ? std::array{c[0], c[1], c[2], c[3], c[4]}
+                : std::array{c[5] / beat, turn * c[2], -turn * c[1], 2 * turn * c[4], -2 * turn * c[3]};
+      std::ranges::copy(row, of.begin() + static_cast<std::ptrdiff_t>(5 * k));
     }
   }
-  std::vector<BasisCoefficients> known = subject.parameters(uncertain);
-  for (BasisCoefficients& s : subject.background()) known.push_back(std::move(s));
-  information_ = subject.information(known, columns);
+  return beats;
 }
 
-/// The first size tried that is no smaller; as many as there are where there is none.
-std::size_t DetectabilityAnalysis::tried(blind::Effect effect, double size) const {
-  const Columns& c = effects_[static_cast<std::size_t>(effect)];
-  return static_cast<std::size_t>(std::ranges::lower_bound(c.sizes, size) - c.sizes.begin());
+void Changed::add(const blind::Contrast& contrast, const Beats& of) {
+  for (std::size_t b = 0; b < std::min(contrast.change.size(), of.size()); ++b)
+    if (of[b] && std::ranges::all_of(contrast.change[b], [](double x) { return std::isfinite(x); })) {
+      change.push_back(contrast.change[b]);
+      signal.push_back(*of[b]);
+    }
 }
 
-/// What an effect adds at any size: straight of the next larger one that was tried; empty beyond.
-VectorXd DetectabilityAnalysis::truth_of(blind::Effect effect, double size) const {
-  const Columns& c = effects_[static_cast<std::size_t>(effect)];
-  const std::size_t above = tried(effect, size);
-  if (above == c.sizes.size()) return {};
-  return size / c.sizes[above] * VectorXd::Unit(width(), c.at[above]);
+Shown shown(const Changed& d, double size) {
+  const std::size_t n = d.change.size();
+  if (n == 0) return {};
+  const double beats = static_cast<double>(n);
+  double weight = 0;
+  std::array<double, 2> waveform{};  // mean square of an axis
+  for (const auto& s : d.signal)
+    for (std::size_t c = 0; c < 6; ++c)
+      for (std::size_t order = 0; order < 3; ++order) {
+        const double p = power(s.data() + 5 * c, order) / beats;
+        waveform[c / 3] += p / 3;
+        if (c < 3 && order == 0) weight += p;
+      }
+  Shown most;
+  std::vector<double> left(n);
+  for (std::size_t c = 0; c < 6; ++c)
+    for (std::size_t order = 0; order < 3; ++order) {
+      const double reference = std::sqrt(order == 0 && c < 3 ? weight : waveform[c / 3]);
+      if (!(reference > 0)) continue;
+      // columns: the signal, its slope, a constant of each coefficient; by turns, each within its bound
+      const std::size_t from = 5 * c + (order == 0 ? 0 : 2 * order - 1), width = order == 0 ? 1 : 2;
+      const double turn = 2 * std::numbers::pi * static_cast<double>(order) * d.flapping_Hz;
+      const auto column = [&](std::size_t b, std::size_t k, std::size_t i) {
+        const double* x = d.signal[b].data() + from;
+        if (k == 0) return x[i];
+        if (k == 1) return order == 0 ? 0 : i == 0 ? turn * x[1] : -turn * x[0];
+        return k - 2 == i ? 1.0 : 0.0;
+      };
+      const std::array<double, 4> bound = {kFigures, kLate_s, kConstant * reference, kConstant * reference};
+      std::array<double, 4> at{};
+      const auto rest = [&](std::size_t b, std::size_t i) {
+        double r = size * d.change[b][from + i];
+        for (std::size_t k = 0; k < at.size(); ++k) r -= at[k] * column(b, k, i);
+        return r;
+      };
+      for (int pass = 0; pass < 6; ++pass)
+        for (std::size_t k = 0; k < 2 + width; ++k) {
+          double along = 0, own = 0;
+          for (std::size_t b = 0; b < n; ++b)
+            for (std::size_t i = 0; i < width; ++i) {
+              const double x = column(b, k, i);
+              along += x * rest(b, i);
+              own += x * x;
+            }
+          if (own > 0) at[k] = std::clamp(at[k] + along / own, -bound[k], bound[k]);
+        }
+      for (std::size_t b = 0; b < n; ++b) {
+        left[b] = 0;
+        for (std::size_t i = 0; i < width; ++i) left[b] += rest(b, i) * rest(b, i) / static_cast<double>(width);
+      }
+      std::ranges::sort(left, std::greater{});
+      const std::size_t tenth = std::max<std::size_t>(1, n / 10);
+      double sum = 0;
+      for (std::size_t b = 0; b < tenth; ++b) sum += left[b];
+      const double share = std::sqrt(sum / static_cast<double>(tenth)) / reference;
+      if (share > most.share) most = {share, c, order};
+    }
+  return most;
 }
 
-/// Of the sizes tried of an effect but one, each beside its further directions, the one that explains the truth best.
-double DetectabilityAnalysis::best_gain(const VectorXd& truth, blind::Effect hypothesis, std::size_t but) const {
-  const Columns& c = effects_[static_cast<std::size_t>(hypothesis)];
-  const auto n = static_cast<Index>(c.further.size());
-  MatrixXd m = MatrixXd::Zero(width(), n + 1);
-  VectorXd precision = VectorXd::Constant(n + 1, 1 / (kSizeSd * kSizeSd));
-  for (Index i = 0; i < n; ++i) m(c.further[static_cast<std::size_t>(i)], i + 1) = 1;
-  double best = 0;  // its size may be none
-  for (std::size_t i = 0; i < c.at.size(); ++i) {
-    if (i == but) continue;
-    m.col(0) = VectorXd::Unit(width(), c.at[i]);
-    precision[0] = c.sizes[i] * c.sizes[i] / (kSizeSd * kSizeSd);
-    best = std::max(best, expected_gain(information_, truth, m, precision) * kThird);
-  }
-  return best;
-}
-
-/// The effect itself as a hypothesis. Differences of predicted flights are rough (gap/evidence/fit.hpp), the same way wherever they come
-/// from the same flights; so nothing is held against its own: the hypothesis is of any other size tried than the truth.
-double DetectabilityAnalysis::gain(blind::Effect truth, double size) const {
-  const VectorXd d = truth_of(truth, size);
-  if (d.size() == 0) return 0;
-  const bool alone = effects_[static_cast<std::size_t>(truth)].at.size() == 1;
-  return best_gain(d, truth, alone ? kNone : tried(truth, size));
-}
-
-double DetectabilityAnalysis::gain_over(blind::Effect truth, double size, blind::Effect rival) const {
-  const VectorXd d = truth_of(truth, size);
-  return d.size() == 0 ? 0 : gain(truth, size) - best_gain(d, rival, kNone);
-}
-
-double DetectabilityAnalysis::detectable(blind::Effect effect, double nats) const {
-  // where another size that was tried takes over, the gain may fall
-  const auto enough = [&](double size) {
-    return gain(effect, size) >= nats && (2 * size > kMostSize || gain(effect, 2 * size) >= nats);
-  };
-  constexpr double kStep = 1.1;
-  double high = kLeastSize;
-  while (high < kMostSize && !enough(high)) high = std::min(kMostSize, high * kStep);
-  if (!enough(high)) return std::numeric_limits<double>::infinity();
-  double low = high / kStep;
-  for (int i = 0; i < 20; ++i) {
-    const double middle = std::sqrt(low * high);
-    (enough(middle) ? high : low) = middle;
+double detectable_size(const Changed& changed, double most) {
+  if (!(shown(changed, most).share >= kShare)) return std::numeric_limits<double>::infinity();
+  double low = 0, high = most;
+  for (int i = 0; i < 24; ++i) {
+    const double middle = (low + high) / 2;
+    (shown(changed, middle).share >= kShare ? high : low) = middle;
   }
   return high;
+}
+
+Json run_detectability(const DetectabilityCommand& command) {
+  const blind::Family& family = family_named(command.family);
+  const std::vector<blind::FamilyEffect>& effects = family.effects();
+  io::check_output(command.out, {command.vehicle});
+  struct Robot {
+    blind::Assignment rich, hover;
+    std::vector<flightlog::FlightLog> logs;
+    flightlog::FlightLog hover_log;
+  };
+  std::vector<Robot> robots;
+  for (int i = 0; i < command.vehicles; ++i) {
+    blind::Assignment a;
+    a.vehicle_file = command.vehicle;
+    a.own_figures = true;
+    FlownRobot flown = fly_drawn(family, a, command.seed + static_cast<std::uint64_t>(i));
+    Robot r{flown.assignment, flown.assignment, {}, {}};
+    for (blind::FamilyFlight& f : flown.flights) r.logs.push_back(std::move(f.log));
+    r.hover.hover = true;
+    r.hover_log = family.fly(r.hover, 0).log;
+    robots.push_back(std::move(r));
+  }
+  std::vector<std::vector<Found>> found(effects.size(), std::vector<Found>(robots.size()));
+  io::ProgressLine line("contrasts", 60);
+  std::mutex mutex;
+  double done = 0;
+  io::parallel_for(effects.size() * robots.size(), command.threads, [&](std::size_t k) {
+    const Robot& r = robots[k % robots.size()];
+    const blind::FamilyEffect& effect = effects[k / robots.size()];
+    Found& f = found[k / robots.size()][k % robots.size()];
+    const auto add = [&](Changed& to, const blind::Assignment& a, std::size_t flight, const flightlog::FlightLog& log) {
+      const blind::Contrast c = family.contrast(a, flight, effect.id, 1);
+      to.flapping_Hz = log.header.flapping_Hz;
+      to.add(c, beats_of(log, c.beat_s));
+      return std::ranges::any_of(
+          c.change, [](const auto& row) { return std::ranges::any_of(row, [](double x) { return x != 0; }); });
+    };
+    Changed rich, hover;
+    bool acts = true;
+    for (std::size_t n = 0; n < r.logs.size() && acts; ++n) acts = add(rich, r.rich, n, r.logs[n]) || n > 0;
+    f.rich = detectable_size(rich, kMostDetectable);
+    f.where = shown(rich, 1);
+    f.hover = f.rich;
+    if (std::ranges::all_of(effect.regimes,
+                            [](const std::string& w) { return std::ranges::count(kOfFlight, w) > 0; }) &&
+        acts) {
+      add(hover, r.hover, 0, r.hover_log);
+      f.hover = detectable_size(hover, kMostHover);
+    }
+    const std::scoped_lock lock(mutex);
+    line.show(++done / static_cast<double>(effects.size() * robots.size()));
+  });
+  line.clear();
+
+  std::string text = "# How large the effects of family " + command.family +
+                     " have to be (docs/blind.md), in its own unit: 1 is typical. Written by\n"
+                     "#   flappy-blind detectability --family " +
+                     command.family + " --vehicle " + command.vehicle + " --vehicles " +
+                     std::to_string(command.vehicles) + " --seed " + std::to_string(command.seed) + " --out " +
+                     command.out + "\n# commit " + io::commit() +
+                     "\n#\n"
+                     "# detectable    an effect of this size changes a channel's mean or harmonic by " +
+                     rounded(100 * kShare) +
+                     " % beyond what figures and lateness take over\n"
+                     "#               (src/benchmark/detectability.hpp); median of robots; 1 where it acts on "
+                     "sensors alone\n"
+                     "# undetectable  that is beyond 2\n"
+                     "# hover         the same of calm hover, 1000 for never\n"
+                     "schema = 1\n";
+  std::printf("%-30s %10s %17s %8s  %s\n", "effect", "detectable", "least, most", "hover", "shows in");
+  Json all = Json::object();
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    const Size s = size_of(effects[e], found[e]);
+    std::printf("%-30s %10.3g %8.3g %8.3g %8.3g  %s%s\n", effects[e].id.c_str(), s.detectable, s.low, s.high, s.hover,
+                shows(s).c_str(), s.undetectable ? "; undetectable" : "");
+    text += "\n[" + effects[e].id + "]\n";
+    if (!s.undetectable) text += "detectable = " + rounded(s.detectable) + "\n";
+    text +=
+        std::string("undetectable = ") + (s.undetectable ? "true" : "false") + "\nhover = " + rounded(s.hover) + "\n";
+    all[effects[e].id] = {{"detectable", s.undetectable ? Json(nullptr) : Json(s.detectable)},
+                          {"undetectable", s.undetectable},
+                          {"hover", s.hover},
+                          {"shows", shows(s)}};
+  }
+  io::write_atomically(command.out, text);
+  return {{"family", command.family}, {"vehicles", robots.size()}, {"effects", all}};
 }
 
 }  // namespace flappy::benchmark

@@ -54,8 +54,7 @@ class Maker {
  private:
   static fs::path table_of(const MakeCommand& command) {
     if (!command.detectable.empty()) return command.detectable;
-    return io::config_path(command.family == "a" ? "gap/detectable.toml"
-                                                 : "gap/detectable/" + command.family + ".toml");
+    return io::config_path("gap/detectable/" + command.family + ".toml");
   }
   fs::path label_file(const PlannedCase& p) const { return sealed_ / (number_text(p.number) + ".json"); }
   fs::path case_folder(const PlannedCase& p) const { return command_.out / "cases" / number_text(p.number); }

@@ -18,8 +18,6 @@ constexpr std::size_t kAtLeast = 100;
 constexpr double kOverDetectable = 2, kLargest = 4;
 /// Of effects outside the catalogue of which the table says nothing.
 constexpr double kOutsideSize = 2;
-/// What hover alone does not show, where the table does not say.
-constexpr const char* kHidden[] = {"ground_effect", "ceiling_effect", "body_drag", "tether", "marker_offset"};
 
 using Ids = std::vector<std::string>;
 
@@ -74,7 +72,6 @@ class Planner {
     part("typical", rounds(typical_, kAtLeast), [&](std::size_t k, PlannedCase& c) {
       const std::string& id = typical_[k % typical_.size()];
       c.effects = {{id, 1}};
-      c.inseparable = of_.at(id).inseparable_at_typical;
     });
     const auto harmless = [&](const char* name, bool published, bool own_figures, bool conventions) {
       part(name, kAtLeast, [&](std::size_t, PlannedCase& c) {
@@ -135,7 +132,6 @@ class Planner {
   void single(std::size_t k, PlannedCase& c) const {
     const std::string& id = detectable_[k % detectable_.size()];
     c.effects = {at_twice(id)};
-    c.inseparable = of_.at(id).inseparable;
   }
 
   void pair(PlannedCase& c) {
@@ -185,27 +181,8 @@ std::map<std::string, Detectability> read_detectability(const std::filesystem::p
     if (!d.undetectable || t.has("detectable")) d.detectable = t.number("detectable", io::positive(kLargest));
     if (!d.undetectable && kOverDetectable * d.detectable > kLargest)
       t.fail("detectable", "twice that is beyond size 4", "undetectable = true");
-    d.hidden = std::ranges::count(kHidden, e.id) > 0;
-    if (t.has("hover"))
-      d.hidden = !d.undetectable && t.number("hover", io::positive(1e3)) > kOverDetectable * d.detectable;
-    const auto rivals = [&](const char* key) {
-      Ids list = t.strings(key);
-      for (const std::string& rival : list)
-        if (model::effect_index(rival.c_str()) < 0)
-          t.fail(key, "no effect \"" + rival + "\"", "identifiers of docs/effects.md");
-      return list;
-    };
-    d.inseparable = rivals("inseparable");
-    if (t.has("inseparable_at_typical")) d.inseparable_at_typical = rivals("inseparable_at_typical");
-    else
-      for (const model::EffectEntry& entry : model::effects())
-        if (entry.info.id != e.id) d.inseparable_at_typical.emplace_back(entry.info.id);
-    // for the reader of the file
-    t.number_or("gain_at_typical", 0);
-    t.number_or("misfit", 0);
-    if (const auto values = t.optional_table("catalogue"))
-      for (const std::string& key : values->keys()) values->number(key);
-    all[e.id] = std::move(d);
+    d.hidden = t.number("hover", io::positive(1e3)) > kOverDetectable * d.detectable && !d.undetectable;
+    all[e.id] = d;
   }
   root.finish();
   return all;

@@ -16,10 +16,8 @@ namespace flappy::benchmark {
 /// What flappy-blind detectability found of an effect, in its family's sizes.
 struct Detectability {
   double detectable = 0;
-  bool undetectable = false;  ///< twice the size is beyond what can be, or beyond the prior
+  bool undetectable = false;  ///< twice the size is beyond what can be
   bool hidden = false;        ///< hover does not show twice the size
-  /// Rivals that it cannot be told from at twice the size, and at the typical one.
-  std::vector<std::string> inseparable, inseparable_at_typical;
 };
 
 /// Of every effect of a family that the catalogue has, and of those outside that the table has. InputError where one is missing.
@@ -34,7 +32,6 @@ struct PlannedCase {
   bool hover = false, power = false;
   bool own_figures = false, conventions = false;  ///< as in blind::Assignment
   bool published = false;                         ///< its vehicle is drawn from the published randomisation
-  std::vector<std::string> inseparable;           ///< rivals that these flights do not tell from the truth
   std::vector<std::string> withheld;              ///< from the catalogue
 };
 

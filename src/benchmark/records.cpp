@@ -77,7 +77,7 @@ Manifest read_manifest(const std::filesystem::path& folder) {
 }
 
 CaseTruth Label::truth() const {
-  CaseTruth t{planned.part, {}, planned.inseparable.empty(), true_values, channels, regimes, planned.seed, draw};
+  CaseTruth t{planned.part, {}, true_values, channels, regimes, planned.seed, draw};
   for (const blind::BlindEffect& e : planned.effects) t.effects.push_back(e.id);
   return t;
 }
@@ -94,7 +94,6 @@ Json to_json(const PlannedCase& p) {
           {"own_figures", p.own_figures},
           {"conventions", p.conventions},
           {"published", p.published},
-          {"inseparable", p.inseparable},
           {"withheld", p.withheld}};
 }
 
@@ -119,7 +118,6 @@ Label label_from(const Json& json) {
   p.own_figures = json.at("own_figures");
   p.conventions = json.at("conventions");
   p.published = json.at("published");
-  p.inseparable = json.at("inseparable").get<Names>();
   p.withheld = json.at("withheld").get<Names>();
   l.draw = json.at("draw");
   l.channels = json.at("channels").get<Names>();

@@ -114,11 +114,6 @@ Cases of_parts(const std::vector<ScoredCase>& cases, const std::set<std::string>
   return list;
 }
 
-Cases separable(Cases cases) {
-  std::erase_if(cases, [](const ScoredCase* c) { return !c->truth.separable; });
-  return cases;
-}
-
 template <class Is>
 ScoreValue share(const Cases& cases, const Is& is) {
   return proportion(static_cast<std::size_t>(std::ranges::count_if(cases, [&](const ScoredCase* c) { return is(*c); })),
@@ -202,8 +197,7 @@ ScoreLine coverage_line(const Cases& cases) {
 }
 
 ScoreLine first_line(const char* key, const char* what, double must, double aim, const Cases& cases) {
-  const Cases judged = separable(cases);
-  return line(key, what, Bar::at_least, must, aim, share(judged, named_alone), of_baselines(judged, baseline_first));
+  return line(key, what, Bar::at_least, must, aim, share(cases, named_alone), of_baselines(cases, baseline_first));
 }
 
 /// Each case with the one of `singles` whose robot it is, where both drew the same.

@@ -15,7 +15,6 @@ namespace flappy::benchmark {
 struct CaseTruth {
   std::string part;                            ///< of kParts
   std::vector<std::string> effects;            ///< that the robot had
-  bool separable = true;                       ///< whether flappy-blind detectability could tell it from every rival
   std::map<std::string, double> true_values;   ///< by "effect.parameter", where the catalogue's form has one
   std::vector<std::string> channels, regimes;  ///< where they act, as blind::FamilyEffect has it
   std::uint64_t seed = 0, draw = 0;            ///< of the robot

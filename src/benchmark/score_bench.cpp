@@ -252,8 +252,8 @@ std::string case_lines(const Bench& bench) {
       sizes += (sizes.empty() ? "" : "+") + io::shortest_digits(e.size);
     const std::optional<double> closed = c.truth.part == "singles" ? closure(c) : std::nullopt;
     text += std::to_string(number) + "," + c.truth.part + "," + io::joined(c.truth.effects, "+") + "," + sizes + "," +
-            (c.truth.separable ? "1" : "0") + "," + p.kind + "," + io::joined(p.effects, "+") + "," +
-            figure(p.probability) + "," + (right(c.truth, p) ? "1" : "0") + "," + (closed ? figure(closed) : "") + "," +
+            p.kind + "," + io::joined(p.effects, "+") + "," + figure(p.probability) + "," +
+            (right(c.truth, p) ? "1" : "0") + "," + (closed ? figure(closed) : "") + "," +
             io::shortest_digits(prediction.at("seconds").get<double>()) + "," + (p.where ? p.where->channel : "") +
             "," + (p.where ? p.where->regime : "") + "," + std::to_string(c.truth.seed) + "," +
             std::to_string(c.truth.draw) + "," + bench.manifest.family + "," + bench.manifest.set + "," +
@@ -288,7 +288,7 @@ Json score_bench(const ScoreCommand& command) {
   std::set<std::string> sets, commits, undetectable;
   std::size_t never = 0, drawn_again = 0;
   std::string lines =
-      "case,part,effects,sizes,separable,verdict,named,probability,right,closure,seconds,channel,regime,seed,draw,"
+      "case,part,effects,sizes,verdict,named,probability,right,closure,seconds,channel,regime,seed,draw,"
       "family,set,commit\n";
   std::set<std::string> families;
   for (const auto& b : benches)

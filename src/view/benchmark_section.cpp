@@ -20,7 +20,7 @@ constexpr std::size_t kBins = 10, kRivals = 8;
 struct Case {
   std::string number, part, truth, verdict, named;
   double probability = 0;
-  bool right = false, separable = true;
+  bool right = false;
 };
 
 std::vector<Case> cases_of(const TextTable& table) {
@@ -28,8 +28,7 @@ std::vector<Case> cases_of(const TextTable& table) {
   for (const TextRow& row : table.rows) {
     const std::string effects = table.cell(row, "effects");
     cases.push_back({table.cell(row, "case"), table.cell(row, "part"), effects, table.cell(row, "verdict"),
-                     table.cell(row, "named"), table.number(row, "probability"), table.cell(row, "right") == "1",
-                     table.cell(row, "separable") == "1"});
+                     table.cell(row, "named"), table.number(row, "probability"), table.cell(row, "right") == "1"});
   }
   return cases;
 }
@@ -203,14 +202,13 @@ Section benchmark_section(const fs::path& path) {
   std::size_t right = 0, single = 0, single_right = 0;
   for (const Case& c : cases) {
     right += c.right;
-    if (c.part == "singles" && c.separable) ++single, single_right += c.right;
+    if (c.part == "singles") ++single, single_right += c.right;
   }
   std::string lead = format("Of %zu blind cases %zu verdicts are right", cases.size(), right);
   if (single > 0) {
     const io::Interval i = io::wilson_interval(single_right, single);
-    lead += format(
-        "; of robots with one effect that flights can tell, the right one is named first in %.3f (%.3f to %.3f of %zu)",
-        static_cast<double>(single_right) / static_cast<double>(single), i.low, i.high, single);
+    lead += format("; of robots with one effect, the right one is named first in %.3f (%.3f to %.3f of %zu)",
+                   static_cast<double>(single_right) / static_cast<double>(single), i.low, i.high, single);
   }
   section.say(lead + ".", "lead");
   add_parts(section, cases);

@@ -1,5 +1,4 @@
-// The formula of detectability against draws, its search on hand-made information, and the robot's reset predictions against its own
-// flights.
+// How large effects have to be, the robot's reset predictions of its own flights, and true sizes.
 #include "benchmark/detectability.hpp"
 
 #include <gtest/gtest.h>
@@ -7,99 +6,15 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <random>
 
-#include "benchmark/family_detectability.hpp"
+#include "benchmark/robot_prediction.hpp"
+#include "benchmark/true_values.hpp"
 #include "full.hpp"
-#include "gap/evidence/hypothesis.hpp"
-#include "model/effects/registry.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::benchmark {
 using namespace blind;
 namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-double log_normal(const VectorXd& r, const MatrixXd& covariance) {
-  const Eigen::LLT<MatrixXd> llt(covariance);
-  return -0.5 * r.dot(llt.solve(r)) - llt.matrixLLT().diagonal().array().log().sum();
-}
-
-// Twelve rows, two parameters; the truth is beside both columns of the hypothesis. Of 20,000 draws the mean of the differences,
-// each worked out from whole covariances, within four of its standard errors.
-TEST(DetectabilityAnalysis, ExpectsWhatDrawsGive) {
-  constexpr Index kRows = 12;
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> normal;
-  const auto draw = [&](Index rows, Index columns) {
-    return MatrixXd(MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }));
-  };
-  // little is known of the second coefficient, so that what learning it costs shows
-  const MatrixXd parameters = 2 * draw(kRows, 2), both = 0.4 * draw(kRows, 2);
-  const MatrixXd covariance = MatrixXd::Identity(kRows, kRows) + parameters * parameters.transpose();
-  const VectorXd precision = Eigen::Vector2d(0.2, 1), weights = Eigen::Vector2d(4, 1);
-  MatrixXd columns(kRows, 3);
-  columns << both, both * weights + 0.3 * draw(kRows, 1);
-  const VectorXd truth = Eigen::Vector3d::UnitZ();
-  const MatrixXd hypothesis = MatrixXd::Identity(3, 2);
-  const MatrixXd wide = covariance + both * precision.cwiseInverse().asDiagonal() * both.transpose();
-
-  const MatrixXd information = columns.transpose() * covariance.llt().solve(columns);
-
-  const Eigen::LLT<MatrixXd> llt(covariance);
-  double sum = 0, squares = 0;
-  constexpr int kDraws = 20000;
-  for (int n = 0; n < kDraws; ++n) {
-    const VectorXd r = columns.col(2) + llt.matrixL() * draw(kRows, 1);
-    const double gain = log_normal(r, wide) - log_normal(r, covariance);
-    sum += gain, squares += gain * gain;
-  }
-  const double mean = sum / kDraws, error = std::sqrt((squares / kDraws - mean * mean) / kDraws);
-  EXPECT_NEAR(expected_gain(information, truth, hypothesis, precision), mean, 4 * error);
-  EXPECT_GT(mean, 20 * error) << "nothing was tested";
-}
-
-TEST(DetectabilityAnalysis, FindsTheSizeAndTheRivals) {
-  std::array<DetectabilityAnalysis::Columns, kBlindEffects> effects;
-  const auto give = [&](Effect e) -> DetectabilityAnalysis::Columns& { return effects[static_cast<std::size_t>(e)]; };
-  give(Effect::added_mass) = {{1, 2}, {0, 1}, {}};
-  give(Effect::body_drag) = {{1}, {2}, {3}};
-  give(Effect::tether) = {{1}, {4}, {}};
-  give(Effect::wall_effect) = {{1, 2}, {5, 6}, {}};
-  // rows: added_mass goes along x, at size 2 three times as far; body_drag along x + y, further along x - y; tether along z,
-  // and wall_effect, which is smaller at size 2
-  MatrixXd rows(3, 7);
-  rows << 1, 3, 1, 1, 0, 0, 0,  //
-      0, 0, 1, -1, 0, 0, 0,     //
-      0, 0, 0, 0, 1, 1, 0.9;
-  const DetectabilityAnalysis analysis(effects, 300 * rows.transpose() * rows);
-  // the truth is straight of the next larger size tried, 1 or 3 along x; the hypothesis, of the other one, m, with prior
-  // precision of its coefficient size^2/4
-  const auto expected = [](double size) {
-    const double d = size <= 1 ? size : 1.5 * size;
-    const double m = size <= 1 ? 3 : 1, tried = size <= 1 ? 2 : 1;
-    const double prior = tried * tried / 4, a = 300 * m * m, f = 300 * m * d;
-    return 0.5 * (f * f / (a + prior) + a / (a + prior) - std::log1p(a / prior)) / 3;
-  };
-  for (const double size : {0.2, 1.0, 1.5, 2.0})
-    EXPECT_NEAR(analysis.gain(Effect::added_mass, size), expected(size), 1e-9 * expected(size)) << size;
-  EXPECT_EQ(analysis.gain(Effect::added_mass, 2.1), 0) << "not tried";
-  EXPECT_EQ(analysis.gain(Effect::wind, 1), 0) << "not tried";
-  const double found = analysis.detectable(Effect::added_mass, 10);
-  EXPECT_NEAR(expected(found), 10, 1e-3);
-  EXPECT_TRUE(std::isinf(analysis.detectable(Effect::added_mass, 1e6)));
-  const double lasting = analysis.detectable(Effect::wall_effect, 20);
-  EXPECT_GT(analysis.gain(Effect::wall_effect, lasting), 22);
-  EXPECT_NEAR(analysis.gain(Effect::wall_effect, 2 * lasting), 20, 1e-3);
-  // body_drag and its direction together are as good, but for what one more coefficient costs; tether says nothing of it
-  // a third of 1/2 log(1 + 600 / 0.25)
-  for (const double size : {1.0, 1.5})
-    EXPECT_LT(std::abs(analysis.gain_over(Effect::added_mass, size, Effect::body_drag)), 1.3) << size;
-  EXPECT_NEAR(analysis.gain_over(Effect::added_mass, 1, Effect::tether), analysis.gain(Effect::added_mass, 1), 0.5);
-}
 
 Case flown(const std::vector<BlindEffect>& effects) {
   Case c{.vehicle = test::identified(), .sizes = Sizes(effects), .seed = 11};
@@ -157,19 +72,7 @@ TEST(ResetPrediction, KnowsItsOwnFlight) {
   }
 }
 
-TEST(ResetPrediction, LagsByWholeSteps) {
-  const Case c = flown({});
-  const gap::PredictedFlight flight = predicted(c, 0);
-  const gap::Rows expected = predict_perturbed(flight, {c.vehicle, {}, c.seed, 1}, 0);
-  gap::Recording late = flight.recording();
-  for (std::vector<double>* v : {&late.left_V, &late.right_V}) {
-    v->insert(v->begin(), v->front());
-    v->pop_back();
-  }
-  EXPECT_EQ(predict_perturbed(gap::PredictedFlight(std::move(late)), {c.vehicle, {}, c.seed, 0}, 0), expected);
-}
-
-TEST(Subject, SensorsDoNotChangeTheFlight) {
+TEST(TrueValues, SensorsDoNotChangeTheFlight) {
   const RobotFlight plain = fly(flown({}), 0);
   std::vector<BlindEffect> all;
   for (std::size_t e = 0; e < kBlindEffects; ++e)
@@ -179,35 +82,6 @@ TEST(Subject, SensorsDoNotChangeTheFlight) {
   EXPECT_NE(f.log.imu, plain.log.imu);
   EXPECT_NE(f.log.mocap, plain.log.mocap);
   for (std::size_t k = 0; k < 22; ++k) EXPECT_EQ(f.truth[k], plain.truth[k]) << k;
-}
-
-// With j = b' C^-1 b of a column b of the background, what is known of a coefficient of b beside one of variance 1 is
-// j/(1 + j), and less beside others: less than the little that every vehicle has says nothing.
-TEST(Subject, LessThanEveryVehicleHasSaysNothing) {
-  if (!test::full()) GTEST_SKIP() << "all effects' sizes on all flights: with --full";
-  const Case c = flown({});
-  const Subject subject(c, fly_all(c, 2), 2);
-  const std::vector<gap::BasisCoefficients> background = subject.background();
-  std::size_t sizes = 0;
-  for (const model::EffectEntry& e : model::effects()) sizes += static_cast<std::size_t>(e.info.sizes);
-  ASSERT_EQ(background.size(), sizes);
-  const std::vector<gap::BasisCoefficients> some = {background.front(), background[sizes / 2], background.back()};
-  const MatrixXd alone = subject.information({}, some), beside = subject.information(background, some);
-  for (Index i = 0; i < 3; ++i) {
-    EXPECT_GT(alone(i, i), beside(i, i));
-    const std::vector<gap::BasisCoefficients> b = {some[static_cast<std::size_t>(i)]};
-    const double j = alone(i, i), known = subject.information(b, b)(0, 0);
-    EXPECT_NEAR(known, j / (1 + j), 1e-9);
-    EXPECT_LT(beside(i, i), known * (1 + 1e-9));
-    EXPECT_GT(beside(i, i), 0);
-  }
-  // a column is as large as the catalogue's entry at that coordinate
-  const std::string first = model::effects().front().info.id;
-  const auto unknowns = static_cast<Index>(gap::unknowns_of(first).size());
-  const double sd = gap::read_model_discrepancy().background_sd(first), reach = 0.4;
-  const std::vector<VectorXd> at = {reach * VectorXd::Unit(unknowns, 0)};
-  const gap::BasisCoefficients there = subject.catalogue(first, at)[0];
-  EXPECT_LT((background.front() - sd / reach * there).norm(), 1e-12 * there.norm());
 }
 
 // Effects whose size both sides state in the same units: the entry comes out as what was put in. Poses

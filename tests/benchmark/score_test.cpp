@@ -123,17 +123,16 @@ TEST(CalibrationError, OfACalibratedPredictorIsNearNothing) {
   EXPECT_NEAR(calibration_error(claims), 0.2, 0.03);
 }
 
-TEST(Score, RightEffectFirstIsJudgedWhereRivalsAreSeparable) {
+TEST(Score, RightEffectFirstAndRightGroup) {
   std::vector<ScoredCase> cases = {
       judged("singles", {"tether"}, "effect", {"tether"}, 0.9, {fitted({"tether"}, 0.9)}),
       judged("singles", {"tether"}, "effect", {"wind"}, 0.9, {fitted({"wind"}, 0.9), fitted({"tether"}, 0.1)}),
       judged("singles", {"tether"}, "group", {"wind", "tether"}, 0.9, {fitted({"wind"}, 0.5), fitted({"tether"}, 0.4)}),
       judged("singles", {"tether"}, "effect", {"tether", "wind"}, 0.9, {fitted({"tether", "wind"}, 0.9)}),
       judged("singles", {"tether"}, "effect", {"body_drag"}, 0.9, {fitted({"body_drag"}, 0.9)})};
-  cases.back().truth.separable = false;
   const ScoreValue first = main_score(cases, "top1_mocap_imu");
-  EXPECT_EQ(first.count, 4U);
-  EXPECT_DOUBLE_EQ(*first.value, 0.25);
+  EXPECT_EQ(first.count, 5U);
+  EXPECT_DOUBLE_EQ(*first.value, 0.2);
   EXPECT_FALSE(main_score(cases, "top1_current").value);
   // tether and wind are of one group
   const ScoreValue group = main_score(cases, "group_top1");

@@ -82,5 +82,4 @@ expect_refused("--family d: no such family; accepted: a, b or c" make --family d
 expect_refused("flappy-blind: --part: nonsense not in {singles,singles_current,redeclared,typical,none,parameters,own_figures,conventions,withheld,outside,pairs,hover}; see flappy-blind --help"
   make --set development --part nonsense --out ${WORK}/c)
 expect_refused("${WORK}/gone/sizes.toml: cannot be written: No such file or directory"
-  detectability --vehicle ${vehicle} --randomise ${SOURCE}/configs/randomisation/published.toml --priors ${SOURCE}/configs/gap/priors.toml
-  --out ${WORK}/gone/sizes.toml)
+  detectability --family a --vehicle ${vehicle} --out ${WORK}/gone/sizes.toml)

@@ -5,11 +5,10 @@
 
 #include "benchmark/calibrate.hpp"
 #include "benchmark/detectability.hpp"
-#include "benchmark/detectability_table.hpp"
 #include "benchmark/families.hpp"
-#include "benchmark/family_detectability.hpp"
 #include "benchmark/make.hpp"
 #include "benchmark/score_bench.hpp"
+#include "benchmark/true_values.hpp"
 #include "blind/family_a.hpp"
 #include "escapes.hpp"
 #include "flappy/vehicle_file.hpp"
@@ -108,11 +107,8 @@ int main(int argc, char** argv) {
   escape.option("--out", escapes.robot.out, "folder for the logs: escape_1, escape_2, ...");
   io::Command detectability = program.app().command("detectability", "finds how large effects have to be to be found");
   benchmark::DetectabilityCommand command;
-  detectability.option("--family", command.family,
-                       "a, b or c, by what effects change; none: a, as a diagnosis sees it");
+  detectability.option("--family", command.family, "a, b or c").required();
   detectability.option("--vehicle", command.vehicle, "the vehicle as declared").shows_default();
-  detectability.option("--randomise", command.randomise, "what robots are drawn from").shows_default();
-  detectability.option("--priors", command.priors, "what is uncertain of them").shows_default();
   detectability.option("--vehicles", command.vehicles, "how many").range(1, 1000).shows_default();
   detectability.option("--seed", command.seed, "of the first")
       .range(std::uint64_t{0}, std::uint64_t{1} << 53)
@@ -178,9 +174,7 @@ int main(int argc, char** argv) {
     else if (list.given())
       for (const std::string& name : blind::effect_names()) std::printf("%s\n", name.c_str());
     else if (escape.given()) program.write_json(blind::fly_escapes(escapes));
-    else if (detectability.given())
-      program.write_json(command.family.empty() ? benchmark::run_detectability(command)
-                                                : benchmark::run_family_detectability(command));
+    else if (detectability.given()) program.write_json(benchmark::run_detectability(command));
     else {
       of.hover = of.hover || programme == "hover";
       if (of.family.empty() && (of.own_figures || of.conventions))

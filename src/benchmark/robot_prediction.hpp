@@ -15,7 +15,6 @@ struct Perturbation {
   model::Vehicle vehicle;
   blind::Sizes sizes;
   std::uint64_t seed = 0;
-  int late_steps = 0;  ///< of gap::kPredictionStep_s, by which voltages arrive later
 };
 
 /// As the sensors of a perturbed robot would have shown flight `flight` of its case, noise-free, in the rows of gap/replay/reset_prediction.hpp: torques

@@ -1,4 +1,4 @@
-#include "benchmark/detectability_prediction.hpp"
+#include "benchmark/robot_prediction.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -45,7 +45,6 @@ class Carrier {
  public:
   Carrier(const gap::Recording& recording, const Perturbation& perturbation, std::uint64_t flight)
       : r_(recording),
-        late_(perturbation.late_steps),
         robot_(perturbation.vehicle, room_of(recording.world), perturbation.sizes, perturbation.seed, flight),
         imu_m_(recording.log.header.imu.position_m.data()) {
     if (remembers(perturbation.sizes)) live_until_start();
@@ -89,7 +88,7 @@ class Carrier {
   }
   void advance(std::ptrdiff_t step) {
     const std::size_t i = static_cast<std::size_t>(
-        std::clamp<std::ptrdiff_t>(step - late_, 0, static_cast<std::ptrdiff_t>(r_.left_V.size()) - 1));
+        std::clamp<std::ptrdiff_t>(step, 0, static_cast<std::ptrdiff_t>(r_.left_V.size()) - 1));
     for (int n = 0; n < kSubsteps; ++n) robot_.step(r_.left_V[i], r_.right_V[i]);
   }
   /// It has flown since it began to trim: its clock and weather are those of the flight, its heat and charge nearly so.
@@ -104,7 +103,6 @@ class Carrier {
   }
 
   const gap::Recording& r_;
-  int late_;
   blind::Robot robot_;
   Vector3d imu_m_;
 };
