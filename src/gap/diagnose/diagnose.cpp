@@ -124,10 +124,17 @@ class Diagnoser {
     }
     // what leaves more than that entry's equation may
     std::ranges::sort(singles, std::greater{}, explained);
-    for (std::size_t i = 0, n = singles.size(); i < std::min<std::size_t>(n, kMostRemainders); ++i) {
-      const ScoredHypothesis a = singles[i];
-      if (!a.fitted() || explained(a) < plain_) break;
-      ScoredHypothesis more = explain_freely(Hypothesis(uncertain_, a.effects), a.fit.point, 0);
+    std::size_t asked = 0;
+    while (asked < std::min(singles.size(), kMostRemainders) && singles[asked].fitted() &&
+           explained(singles[asked]) >= plain_)
+      ++asked;
+    std::vector<ScoredHypothesis> remainders(asked);
+    io::parallel_for(asked, threads_, [&](std::size_t i) {
+      remainders[i] = explain_freely(Hypothesis(uncertain_, singles[i].effects), singles[i].fit.point, 0);
+    });
+    for (std::size_t i = 0; i < asked; ++i) {
+      const ScoredHypothesis& a = singles[i];
+      ScoredHypothesis more = std::move(remainders[i]);
       if (more.terms.empty()) continue;
       more.kind = ScoredHypothesis::Kind::effect;
       more.effects = a.effects;
@@ -137,8 +144,10 @@ class Diagnoser {
       more.fit.point.shape = shape;
       more.log_evidence += a.log_prior + std::log(rule_.prior.remainder);
       more.log_prior = a.log_prior + std::log(rule_.prior.remainder);
-      singles.push_back(std::move(more));
+      remainders[i] = std::move(more);
     }
+    for (ScoredHypothesis& more : remainders)
+      if (!more.terms.empty()) singles.push_back(std::move(more));
     for (ScoredHypothesis& a : singles) {
       if (a.fitted()) widen(a.fit, Hypothesis(uncertain_, a.effects), rule_);
       d.hypotheses.push_back(std::move(a));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 
 #include "gap/replay/sensor_correction.hpp"
 #include "io/parallel.hpp"
@@ -63,10 +64,17 @@ std::vector<Residuals> residuals(const std::vector<PredictedFlight>& flights, co
     if (sensors.empty()) compare(flights, which, threads);
     else corrected.emplace_back(sensors, which);
   }
+  // few logs leave threads to their flights
+  const int at_once =
+      std::max(1, io::thread_count(threads) / static_cast<int>(std::max<std::size_t>(1, corrected.size())));
   io::parallel_for(corrected.size(), threads, [&](std::size_t k) {
+    std::vector<std::optional<PredictedFlight>> logs(flights.size());
+    io::parallel_for(flights.size(), at_once, [&](std::size_t f) {
+      logs[f] = flights[f].with_log(without(corrected[k].first, flights[f].recording().log));
+    });
     std::vector<PredictedFlight> seen;
-    for (const PredictedFlight& f : flights) seen.push_back(f.with_log(without(corrected[k].first, f.recording().log)));
-    compare(seen, corrected[k].second, 1);
+    for (std::optional<PredictedFlight>& log : logs) seen.push_back(std::move(*log));
+    compare(seen, corrected[k].second, at_once);
   });
   return list;
 }
