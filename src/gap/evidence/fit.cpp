@@ -29,6 +29,8 @@ constexpr double kWorthwhile = 0.5, kWorthwhileByTheBeat = 0.05;
 constexpr double kTelling = 0.05;
 /// How far, in reaches of its differences, columns of another point are trusted.
 constexpr double kFar = 2;
+/// A function of the place is an effect's own where its change follows it by so much of the square by which it follows any.
+constexpr double kNatural = 0.1;
 /// Times that effects are moved where parameters stay.
 constexpr int kMostOwn = 2;
 
@@ -277,7 +279,8 @@ bool Fitter::has_shape(const Hypothesis& hypothesis, const Linearised& point) co
 }
 
 /// Laws of what acts by the place (near surfaces, at a line, in time) differ in more than size: along the functions of the place that this change
-/// follows, every load of the body may have as much of it as they have on average.
+/// follows, every load of the body may have as much of it as they have on average. What it follows by little is not its own: a shape may be many
+/// times the entry's, and a heating motor would else explain what turns with the heading.
 BasisCoefficients Fitter::shape_of(const BasisCoefficients& change) const {
   const RegimeBasis& basis = evidence_.basis();
   BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
@@ -285,18 +288,22 @@ BasisCoefficients Fitter::shape_of(const BasisCoefficients& change) const {
   const auto of_place = [&](int i) { return regimes_of(basis.kind(i)) == Regimes::place; };
   const auto load = [](int g) { return g / kCoefficients <= kForceZ; };
   VectorXd squares = VectorXd::Zero(change.cols());
-  double groups = 0, place = 0, all = 0;
+  double groups = 0, place = 0, all = 0, most = 0;
   for (int g = 0; g < kGroups; ++g) {
     const double signal = evidence_.signal(g);
     if (!load(g) || !(signal > 0)) continue;
     squares += (change.row(g).transpose() / signal).cwiseAbs2();
     ++groups;
   }
-  for (int i = 1; i < basis.size(); ++i) all += squares[i], place += of_place(i) ? squares[i] : 0;
+  for (int i = 1; i < basis.size(); ++i) {
+    all += squares[i];
+    if (of_place(i)) place += squares[i], most = std::max(most, squares[i]);
+  }
   if (!(place > all / 2)) return sd;
   for (int g = 0; g < kGroups; ++g)
     for (int i = 1; i < basis.size(); ++i)
-      if (load(g) && of_place(i)) sd(g, i) = std::sqrt(squares[i] / groups) * evidence_.signal(g);
+      if (load(g) && of_place(i) && squares[i] > kNatural * most)
+        sd(g, i) = std::sqrt(squares[i] / groups) * evidence_.signal(g);
   return sd;
 }
 
