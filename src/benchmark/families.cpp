@@ -40,11 +40,13 @@ const Family& family_named(const std::string& name) {
 
 bool in_catalogue(const blind::FamilyEffect& effect) { return !effect.id.starts_with("outside_"); }
 
+std::uint64_t seed_of_draw(std::uint64_t seed, std::uint64_t draw) { return seed * blind::kTries + draw; }
+
 FlownRobot fly_drawn(const Family& family, blind::Assignment a, std::uint64_t seed,
                      const std::function<void(blind::Assignment&)>& prepare) {
   FlownRobot robot;
   for (; robot.draw < blind::kTries; ++robot.draw) {
-    a.seed = seed * blind::kTries + robot.draw;
+    a.seed = seed_of_draw(seed, robot.draw);
     if (prepare) prepare(a);
     robot.flights.clear();
     while (robot.flights.size() < Family::kFlights && (robot.flights.empty() || !robot.flights.back().crashed))

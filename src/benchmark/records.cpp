@@ -151,10 +151,8 @@ Json to_json(const Prediction& p) {
           {"unknown", p.unknown},
           {"weights", weights},
           {"gap", {{"nominal", optional(p.nominal)}, {"refit", optional(p.refit)}, {"noise_floor", optional(p.floor)}}},
-          {"next", p.next},
+          {"manoeuvre", p.manoeuvre},
           {"where", p.where ? Json{{"channel", p.where->channel}, {"regime", p.where->regime}} : Json(nullptr)},
-          {"after_next",
-           p.after_next ? Json{{"kind", p.after_next->kind}, {"effects", p.after_next->effects}} : Json(nullptr)},
           {"baselines", baselines},
           {"features", p.features}};
 }
@@ -181,9 +179,8 @@ Prediction prediction_from(const Json& json) {
   p.nominal = optional_from(gap.at("nominal"));
   p.refit = optional_from(gap.at("refit"));
   p.floor = optional_from(gap.at("noise_floor"));
-  p.next = json.at("next").get<Names>();
+  p.manoeuvre = json.value("manoeuvre", "");  // those of old had none
   if (const Json& w = json.at("where"); !w.is_null()) p.where = {w.at("channel"), w.at("regime")};
-  if (const Json& a = json.at("after_next"); !a.is_null()) p.after_next = {a.at("kind"), a.at("effects").get<Names>()};
   for (const auto& [name, b] : json.at("baselines").items())
     p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
   p.features = json.at("features").get<std::vector<double>>();

@@ -222,7 +222,7 @@ bool described(const ScoredCase& c) {
 }
 
 bool next_brings_truth(const ScoredCase& c) {
-  const std::optional<Verdict>& v = c.prediction.after_next;
+  const std::optional<Prediction>& v = c.after_next;
   return v && names_set(v->kind) && same(v->effects, c.truth.effects);
 }
 

@@ -38,6 +38,8 @@ struct ScoredCase {
   Prediction prediction;
   /// With the true effect alone in the catalogue, where `prediction` has not fitted it.
   std::optional<Prediction> true_fit;
+  /// Of the flights, and of the one that `prediction` proposed, flown.
+  std::optional<Prediction> after_next;
 };
 
 /// One line of the table.

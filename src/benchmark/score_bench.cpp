@@ -6,6 +6,8 @@
 #include <set>
 
 #include "benchmark/black_box.hpp"
+#include "benchmark/families.hpp"
+#include "benchmark/proposal.hpp"
 #include "benchmark/records.hpp"
 #include "benchmark/work.hpp"
 #include "io/append_file.hpp"
@@ -163,6 +165,53 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
   return true;
 }
 
+/// Flies what was proposed for robots of the part hover, and diagnoses all their flights.
+bool fly_proposals(const ScoreCommand& command, Bench& bench) {
+  const auto file_of = [&](std::size_t i) {
+    return bench.folder / "proposed" / (number_text(bench.manifest.cases[i].number) + ".json");
+  };
+  std::vector<std::size_t> proposed, open;
+  for (std::size_t i = 0; i < bench.cases.size(); ++i) {
+    if (bench.cases[i].truth.part != "hover" || bench.cases[i].prediction.manoeuvre.empty()) continue;
+    proposed.push_back(i);
+    if (!fs::exists(file_of(i))) open.push_back(i);
+  }
+  const std::vector<gap::Manoeuvre> manoeuvres = gap::read_manoeuvres(command.experiments);
+  io::make_folder(bench.folder / "proposed");
+  const bool all =
+      work_through("flying what was proposed", open.size(), command.threads, command.ranks, [&](std::size_t k) {
+        const PublicCase& c = bench.manifest.cases[open[k]];
+        const Label& label = bench.labels.at(c.number);
+        Question q = bench.predictions.question(c, c.withheld);
+        q.baselines = false;
+        q.experiments.clear();
+        const std::string& name = bench.cases[open[k]].prediction.manoeuvre;
+        const auto manoeuvre = std::ranges::find(manoeuvres, name, &gap::Manoeuvre::name);
+        if (manoeuvre == manoeuvres.end()) refuse(file_of(open[k]), "no manoeuvre \"" + name + "\"");
+        blind::Assignment a;
+        a.vehicle_file = q.vehicle;
+        for (const blind::BlindEffect& e : label.planned.effects) a.effects.emplace_back(e.id, e.size);
+        a.own_figures = label.planned.own_figures, a.conventions = label.planned.conventions;
+        a.power = label.planned.power;
+        a.seed = seed_of_draw(label.planned.seed, label.draw);
+        const blind::ProposedFlight flight =
+            proposed_flight(*manoeuvre, flightlog::read_flight_log(q.flights.front()).header);
+        a.proposed = &flight;
+        const blind::FamilyFlight flown = family_named(bench.manifest.family).fly(a, kProposedFlight);
+        Prediction p;
+        p.kind = "crashed";
+        if (!flown.crashed) {
+          q.flights.push_back(bench.folder / "proposed" / number_text(c.number));
+          flightlog::write_flight_log(q.flights.back(), flown.log);
+          p = command.predictor(q);
+        }
+        io::write_atomically(file_of(open[k]), to_json(p).dump(1) + "\n");
+      });
+  if (!all) return false;
+  for (const std::size_t i : proposed) bench.cases[i].after_next = prediction_from(read_json(file_of(i)));
+  return true;
+}
+
 /// The black box, learnt on robots of other families among those that are scored with these; none where there are too few.
 void ask_black_box(const std::vector<std::unique_ptr<Bench>>& benches, const std::string& family) {
   constexpr std::size_t kFewest = 20;
@@ -277,7 +326,7 @@ Json score_bench(const ScoreCommand& command) {
     }
   for (const auto& b : benches) {
     b->open();
-    if (!fit_truths(command, *b)) {
+    if (!fit_truths(command, *b) || !fly_proposals(command, *b)) {
       std::printf("stopped; predictions are sealed: the same command goes on\n");
       return nullptr;
     }

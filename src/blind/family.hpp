@@ -23,6 +23,14 @@ struct FamilyEffect {
   std::vector<std::string> channels, regimes;
 };
 
+/// A flight that somebody proposes, on the clock of its log.
+struct ProposedFlight {
+  double lasts_s = 0;
+  std::function<std::array<double, 4>(double t_s)> goal;  ///< x, y, z in m and heading in rad, smooth
+  std::function<std::array<double, 4>(double t_s)>
+      excitation;  ///< to be added to the pilot's inputs: V, V, V, split cycle
+};
+
 /// One robot and what is wrong with it.
 struct Assignment {
   std::filesystem::path vehicle_file;                   ///< as declared; a family reads it in its own way
@@ -32,6 +40,7 @@ struct Assignment {
   bool own_figures = false;           ///< each figure of each body is drawn apart; else they are those of the file
   bool conventions = false;           ///< declarations are drawn within what laboratories do; else they are exact
   bool power = false, wings = false;  ///< logs of currents, of strokes
+  const ProposedFlight* proposed = nullptr;  ///< what it flies in place of hover and rich flights
 };
 
 struct FamilyFlight {
@@ -77,7 +86,7 @@ class Family {
   virtual const std::vector<FamilyEffect>& effects() const = 0;
   static constexpr std::size_t kFlights = 3;
   static constexpr double kFlight_s = 10;
-  /// Flight 0, 1 or 2 of an assignment, after some seconds in which the robot finds its trim. The same bytes for the same arguments,
+  /// Flight 0, 1 or 2 of an assignment, or 3, the one that is proposed, after some seconds in which the robot finds its trim. The same bytes for the same arguments,
   /// on any number of threads, of any processor of one kind.
   virtual FamilyFlight fly(const Assignment& a, std::size_t flight) const = 0;
   virtual Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const = 0;

@@ -103,20 +103,38 @@ flightlog::FlightHeader header_of(const Case& c, const SensorSet& sensors, const
 
 Room flight_room() { return {}; }
 
+namespace {
+
+Aim aim_of(const ProposedFlight& flight, double t_s) {
+  constexpr double kStep_s = 1e-3;
+  const auto before = flight.goal(t_s - kStep_s), now = flight.goal(t_s), after = flight.goal(t_s + kStep_s);
+  Aim aim{Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), now[3], (after[3] - before[3]) / (2 * kStep_s)};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<int>(i);
+    aim.position_m(axis) = now[i];
+    aim.velocity_m_s(axis) = (after[i] - before[i]) / (2 * kStep_s);
+    aim.acceleration_m_s2(axis) = (after[i] - 2 * now[i] + before[i]) / (kStep_s * kStep_s);
+  }
+  return aim;
+}
+
+}  // namespace
+
 RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch) {
   const Plan plan(c.programme, flight, flight_room(), c.seed);
   RobotController pilot(c.vehicle.driver, c.seed, flight);
 
   // It learns to trim a metre up, in two fifths of the time, and goes where the log begins.
-  const Waypoint home = plan.start();
+  const auto asked = [&](double t_s) { return c.proposed ? aim_of(*c.proposed, t_s) : plan.at(t_s); };
+  const Vector3d home_m = asked(0).position_m;
   constexpr double kTrimHeight_m = 1;
   Torso start;
-  start.position_m = {home.position_m.x(), home.position_m.y(), kTrimHeight_m};
+  start.position_m = {home_m.x(), home_m.y(), kTrimHeight_m};
   const auto aim_at = [&](double t_s) {
-    Aim aim = plan.at(std::max(t_s, 0.0));
+    Aim aim = asked(std::max(t_s, 0.0));
     if (t_s < 0) {
       const double s = std::clamp((t_s + 0.6 * kTrim_s) / (0.3 * kTrim_s), 0.0, 1.0);
-      aim.position_m.z() = kTrimHeight_m + s * s * (3 - 2 * s) * (home.position_m.z() - kTrimHeight_m);
+      aim.position_m.z() = kTrimHeight_m + s * s * (3 - 2 * s) * (home_m.z() - kTrimHeight_m);
     }
     return aim;
   };
@@ -124,9 +142,11 @@ RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch) {
   const auto steer = [&](double t_s, double, const Torso& torso) {
     const Aim aim = aim_at(t_s);
     if (t_s >= 0) farthest_m = std::max(farthest_m, std::sqrt((torso.position_m - aim.position_m).squaredNorm()));
-    return pilot.steer(torso, aim, plan.excitation(t_s));
+    if (!c.proposed || t_s < 0) return pilot.steer(torso, aim, plan.excitation(t_s));
+    const auto u = c.proposed->excitation(t_s);
+    return pilot.steer(torso, aim, {u[0], u[1], u[2], u[3]});
   };
-  RobotFlight f = fly(c, flight, start, kFlight_s, kLeastUpright, steer, watch);
+  RobotFlight f = fly(c, flight, start, c.proposed ? c.proposed->lasts_s : kFlight_s, kLeastUpright, steer, watch);
   f.farthest_m = farthest_m;
   return f;
 }

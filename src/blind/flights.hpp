@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "blind/family.hpp"
 #include "blind/robot_controller.hpp"
 #include "blind/robot_sensors.hpp"
 
@@ -20,7 +21,8 @@ struct Case {
   std::uint64_t seed = 0;
   Programme programme = Programme::rich;
   bool power = false, wings = false;
-  std::optional<SensorSet> sensors;  ///< where they are not those of the seed
+  std::optional<SensorSet> sensors;          ///< where they are not those of the seed
+  const ProposedFlight* proposed = nullptr;  ///< in place of a programme
 };
 
 struct RobotFlight {

@@ -356,6 +356,74 @@ TEST_F(Benchmark, ScoresSeveralFoldersTogether) {
   EXPECT_EQ(std::ranges::count(list, '\n'), 3);
 }
 
+// Robots of every family follow a flight that is proposed: half a metre along x and a quarter of a turn in two seconds, and hold there.
+TEST_F(Benchmark, FamiliesFlyWhatIsProposed) {
+  const blind::ProposedFlight flight{3,
+                                     [](double t_s) {
+                                       const double s = std::clamp(t_s / 2, 0.0, 1.0),
+                                                    way = s * s * s * (10 + s * (-15 + 6 * s));
+                                       return std::array<double, 4>{0.5 * way, 0, 0.6, 1.57 * way};
+                                     },
+                                     [](double t_s) {
+                                       return std::array<double, 4>{t_s < 0.5 ? 0.3 * std::sin(40 * t_s) : 0, 0, 0, 0};
+                                     }};
+  for (const char* name : kFamilies) {
+#ifndef FLAPPY_FAMILIES
+    if (name != std::string("a")) continue;
+#endif
+    blind::Assignment a;
+    a.vehicle_file = kConfigs + "vehicles/hummingbird_nominal.toml";
+    a.seed = 3;
+    a.proposed = &flight;
+    const blind::FamilyFlight flown = family_named(name).fly(a, kProposedFlight);
+    ASSERT_FALSE(flown.crashed) << name << ": " << flown.how;
+    const flightlog::MocapStream& m = flown.log.mocap;
+    EXPECT_NEAR(flown.log.command.t_s.back(), 3, 0.01) << name;
+    EXPECT_NEAR(m.x_m.back(), 0.5, 0.12) << name;
+    EXPECT_NEAR(m.z_m.back(), 0.6, 0.12) << name;
+    EXPECT_NEAR(2 * std::atan2(m.qz.back(), m.qw.back()), 1.57, 0.2) << name;
+    // the excitation is there, and ends
+    const auto shaken = [&](double from_s) {
+      const auto& c = flown.log.command;
+      double least = 1e9, most = -1e9;
+      for (std::size_t i = 0; i < c.t_s.size(); ++i)
+        if (c.t_s[i] >= from_s && c.t_s[i] < from_s + 0.4) {
+          least = std::min(least, c.inputs->amplitude_V[i]);
+          most = std::max(most, c.inputs->amplitude_V[i]);
+        }
+      return most - least;
+    };
+    EXPECT_GT(shaken(0.05), shaken(2.5) + 0.3) << name;
+  }
+}
+
+// A diagnosis that abstains proposes a manoeuvre; the robot flies it, as near to the ceiling of its room as that is to its own, and all flights are
+// diagnosed.
+TEST_F(Benchmark, FliesWhatADiagnosisProposes) {
+  ASSERT_TRUE(make(1, "hover"));
+  ScoreCommand c = command();
+  double highest_m = 0, lasts_s = 0;
+  c.predictor = [&](const Question& q) {
+    Prediction p;
+    p.kind = "parameters";
+    p.probability = 0.4;
+    p.manoeuvre = "ceiling_steps";
+    if (q.flights.size() == 4) {
+      const auto log = flightlog::read_flight_log(q.flights.back());
+      highest_m = std::ranges::max(log.mocap.z_m);
+      lasts_s = log.command.t_s.back();
+      p.kind = "effect";
+      p.effects = {"ceiling_effect"};
+    }
+    return p;
+  };
+  const nlohmann::ordered_json json = score_bench(c);
+  EXPECT_EQ(json.at("hover_abstain"), 1.0);
+  EXPECT_EQ(json.at("hover_next"), 1.0);
+  EXPECT_NEAR(highest_m, 2 - 0.09, 0.08) << "in its own room the manoeuvre goes up to 0.71 m";
+  EXPECT_NEAR(lasts_s, 5.5, 0.01);
+}
+
 TEST_F(Benchmark, RefusesWhatThereIsNot) {
   EXPECT_EQ(test::refusal([] { family_named("d"); }), "--family d: no such family; accepted: a, b or c");
 #ifndef FLAPPY_FAMILIES

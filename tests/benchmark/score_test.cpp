@@ -280,8 +280,8 @@ TEST(Score, HoverAbstains) {
   EXPECT_DOUBLE_EQ(*main_score(cases, "hover_abstain").value, 0.5);
   EXPECT_DOUBLE_EQ(*main_score(cases, "hover_next").value, 0);
   std::vector<ScoredCase> flown = cases;
-  flown[0].prediction.after_next = {"effect", {"tether"}};
-  flown[1].prediction.after_next = {"effect", {"wind"}};
+  flown[0].after_next = judged("hover", {"tether"}, "effect", {"tether"}, 0.9).prediction;
+  flown[1].after_next = judged("hover", {"tether"}, "effect", {"wind"}, 0.9).prediction;
   EXPECT_DOUBLE_EQ(*main_score(flown, "hover_next").value, 0.25);
 }
 

@@ -57,8 +57,9 @@ Prediction predict(const Question& q) {
   }
   if (!q.experiments.empty() && abstains(p)) {
     const auto ranked =
-        rank_experiments(d, uncertain, gap::read_manoeuvres(q.experiments), {.threads = options.threads});
-    if (!ranked.empty()) p.next = ranked.front().separates;
+        rank_experiments(d, uncertain, gap::read_manoeuvres(q.experiments),
+                         {.threads = options.threads, .discrepancy = options.discrepancy, .rule = options.rule});
+    if (!ranked.empty()) p.manoeuvre = ranked.front().manoeuvre;
   }
   if (q.baselines) {
     p.baselines = baselines(flights, uncertain, d, q.withheld, options.threads);

@@ -42,11 +42,6 @@ struct Where {
   std::string channel, regime;
 };
 
-struct Verdict {
-  std::string kind;
-  std::vector<std::string> effects;
-};
-
 /// What a diagnosis said of a case before its label was opened.
 struct Prediction {
   std::string kind =
@@ -59,10 +54,8 @@ struct Prediction {
   std::optional<double> nominal, refit, floor;  ///< E
   std::map<std::string, Baseline> baselines;    ///< by kBaselines
   std::vector<double> features;                 ///< what the residuals look like, for the black box (baselines.hpp)
-  /// Of a verdict that abstains: the two answers that the manoeuvre proposed tells apart, effects joined by +; or none.
-  std::vector<std::string> next;
-  std::optional<Where> where;         ///< of an unknown cause
-  std::optional<Verdict> after_next;  ///< with the flight proposed, flown
+  std::string manoeuvre;                        ///< proposed by a verdict that abstains; or none
+  std::optional<Where> where;                   ///< of an unknown cause
 };
 /// Whether a verdict names no one answer as the likelier one: `group`, or less than one half.
 bool abstains(const Prediction& prediction);

@@ -21,6 +21,7 @@ class FamilyB final : public Family {
   std::string name() const override { return "b"; }
   const std::vector<FamilyEffect>& effects() const override { return family_effects(); }
   FamilyFlight fly(const Assignment& a, std::size_t flight) const override {
+    if (a.proposed) return fly_programme(a, flight, {kTrim_s, a.proposed->lasts_s});
     check_flight(flight);
     return fly_programme(a, flight);
   }

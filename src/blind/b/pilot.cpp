@@ -117,7 +117,13 @@ Beat Pilot::steer(const View& view, const Target& target) {
   return b;
 }
 
-Programme::Programme(const Assignment& a, std::uint64_t flight, const Figures& f, const Surroundings& room) {
+Programme::Programme(const Assignment& a, std::uint64_t flight, const Figures& f, const Surroundings& room)
+    : proposed_(a.proposed) {
+  if (proposed_) {
+    const auto [x, y, z, facing] = proposed_->goal(0);
+    legs_.push_back({-1e3, 1, Vector3d(x, y, z), facing});
+    return;
+  }
   Random random(a.seed, flight, Stream::kProgramme);
   const double heading = random.uniform(-kPi, kPi);
   double now = 0, facing = heading;
@@ -186,6 +192,13 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const Figures& f
 }
 
 Target Programme::target(double time) const {
+  if (proposed_) {
+    constexpr double kApart_s = 2e-3;
+    const double now = std::max(0.0, time);
+    const auto goal = proposed_->goal(now), next = proposed_->goal(now + kApart_s);
+    const Vector3d at(goal[0], goal[1], goal[2]), to(next[0], next[1], next[2]);
+    return {at, time < 0 ? Vector3d::Zero() : Vector3d((to - at) / kApart_s), goal[3]};
+  }
   const Leg* leg = &legs_.front();
   const Leg* before = leg;
   for (const Leg& next : legs_)
@@ -199,6 +212,10 @@ Target Programme::target(double time) const {
 }
 
 Beat Programme::excitation(double time) const {
+  if (proposed_) {
+    const auto [amplitude, difference, bias, split] = proposed_->excitation(time);
+    return {amplitude, difference, bias, split};
+  }
   std::array<double, 4> u{};
   const double fade = std::clamp(time, 0.0, 1.0);
   for (std::size_t i = 0; i < 4; ++i)

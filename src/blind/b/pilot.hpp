@@ -91,6 +91,7 @@ class Programme {
     std::size_t input;
     double size;
   };
+  const ProposedFlight* proposed_;  ///< or none
   std::vector<Leg> legs_;
   std::array<std::vector<Tone>, 4> tones_;
   std::vector<Pulse> pulses_;

@@ -12,7 +12,10 @@ class FamilyC final : public Family {
  public:
   std::string name() const override { return "c"; }
   const std::vector<FamilyEffect>& effects() const override { return effect_table(); }
-  FamilyFlight fly(const Assignment& a, std::size_t flight) const override { return fly_one(a, flight).flight; }
+  FamilyFlight fly(const Assignment& a, std::size_t flight) const override {
+    if (!a.proposed) return fly_one(a, flight).flight;
+    return fly_one(a, flight, false, {.flight_s = a.proposed->lasts_s}).flight;
+  }
   Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const override {
     return contrast_of(a, flight, effect, size);
   }

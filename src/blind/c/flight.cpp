@@ -34,7 +34,8 @@ std::string trouble(const Robot& robot, bool may_tumble) {
 }
 
 Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path, Length length) {
-  if (flight >= Family::kFlights) throw io::InputError("flight " + std::to_string(flight) + ": accepted: 0 to 2");
+  if (flight >= Family::kFlights && !a.proposed)
+    throw io::InputError("flight " + std::to_string(flight) + ": accepted: 0 to 2");
   Robot robot(a, flight);
   const Figures& f = robot.figures();
   Programme programme(a, flight, f);

@@ -19,7 +19,14 @@ double smooth_bend(double x) { return 60 * x * (1 - x) * (1 - 2 * x); }
 
 }  // namespace
 
-Programme::Programme(const Assignment& a, std::size_t flight, const Figures& figures) : hover_(a.hover) {
+Programme::Programme(const Assignment& a, std::size_t flight, const Figures& figures)
+    : proposed_(a.proposed), hover_(a.hover) {
+  if (proposed_) {
+    const auto goal = proposed_->goal(0);
+    const Eigen::Vector3d at(goal[0], goal[1], goal[2]);
+    legs_.push_back({-1e3, 0, at, at, goal[3], goal[3]});
+    return;
+  }
   Random random(a.seed, "programme", flight);
   const double height = random.uniform(0.5, 1.0), heading = random.uniform(-0.6, 0.6);
   Eigen::Vector3d start(random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.2),
@@ -71,6 +78,20 @@ void Programme::add_leg(const Eigen::Vector3d& to_W, double heading, double spee
 }
 
 Target Programme::target(double t_s) const {
+  if (proposed_ && t_s >= 0) {
+    constexpr double kApart_s = 1e-3;
+    const auto at = [&](double t) {
+      const auto goal = proposed_->goal(t);
+      return Eigen::Vector4d(goal[0], goal[1], goal[2], goal[3]);
+    };
+    const Eigen::Vector4d now = at(t_s), after = at(t_s + kApart_s), later = at(t_s + 2 * kApart_s);
+    Target target;
+    target.position_W = now.head<3>();
+    target.velocity_W = (after - now).head<3>() / kApart_s;
+    target.acceleration_W = (later - 2 * after + now).head<3>() / (kApart_s * kApart_s);
+    target.heading_rad = now[3];
+    return target;
+  }
   const Leg* leg = &legs_.back();
   for (const Leg& one : legs_)
     if (t_s < one.until_s) {
@@ -87,7 +108,12 @@ Target Programme::target(double t_s) const {
 }
 
 Inputs Programme::excitation(double t_s) const {
-  if (hover_ || t_s < 0) return {};
+  if (t_s < 0) return {};
+  if (proposed_) {
+    const auto [amplitude, difference, bias, split] = proposed_->excitation(t_s);
+    return {amplitude, difference, bias, split};
+  }
+  if (hover_) return {};
   std::array<double, 4> sum{};
   for (std::size_t input = 0; input < 4; ++input) {
     const std::size_t level = std::min(static_cast<std::size_t>(t_s / kLevel_s), levels_[input].size() - 1);

@@ -25,6 +25,7 @@ class Programme {
 
   void add_leg(const Eigen::Vector3d& to_W, double heading, double speed_m_s);
 
+  const ProposedFlight* proposed_;  ///< or none
   std::vector<Leg> legs_;
   bool hover_;
   std::array<std::vector<Tone>, 4> tones_;

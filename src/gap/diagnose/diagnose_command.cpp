@@ -184,6 +184,7 @@ void look_ahead(const DiagnoseCommand& command, const Asked& asked, const std::v
   NextOptions next;
   next.threads = command.threads;
   next.discrepancy = asked.options.discrepancy;
+  next.rule = asked.options.rule;
   const auto ranked = rank_experiments(d, asked.uncertain, asked.manoeuvres, next);
   if (!ranked.empty()) report.next = ranked.front();
 }

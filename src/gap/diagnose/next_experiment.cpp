@@ -1,7 +1,9 @@
 #include "gap/diagnose/next_experiment.hpp"
 
 #include <algorithm>
+#include <cmath>
 
+#include "gap/diagnose/verdict.hpp"
 #include "io/parallel.hpp"
 #include "rollout/simulated_flight.hpp"
 
@@ -32,19 +34,35 @@ std::string name_of(const ScoredHypothesis& a) {
   return name;
 }
 
-std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncertain, std::size_t most) {
+/// Of the most probable rivals so many have to survive a manoeuvre.
+constexpr std::size_t kSurvive = 4;
+
+/// Where a fit leaves a vehicle; a size that the flights leave open is one that it may well have, beside `parameters`.
+VectorXd place_of(const Hypothesis& h, const ScoredHypothesis& a, const Fit& fit, const VectorXd& parameters) {
+  VectorXd at = fit.mean();
+  if (a.kind == ScoredHypothesis::Kind::effect && !a.fitted()) {
+    at.head(h.shared()) = parameters;
+    const MatrixXd covariance = fit.covariance();
+    for (Index i = h.shared(); i < h.size(); ++i)
+      if (h.unknowns()[static_cast<std::size_t>(i)].size)
+        at[i] = std::copysign(std::hypot(at[i], std::sqrt(covariance(i, i))), at[i]);
+  }
+  return h.bounded(at);
+}
+
+std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncertain, double least) {
   std::vector<Rival> rivals;
   for (const ScoredHypothesis& a : d.hypotheses) {
-    if (rivals.size() == most) break;
-    if (a.kind == ScoredHypothesis::Kind::unknown) continue;
+    if (a.probability < least) break;
+    if (a.kind == ScoredHypothesis::Kind::unknown || !a.terms.empty()) continue;
     const Hypothesis h(uncertain, a.effects);
     if (a.kind == ScoredHypothesis::Kind::none) {
       rivals.push_back({name_of(a), a.probability, h, h.start(), {MatrixXd(h.size(), 0), VectorXd(0)}, MatrixXd(0, 0)});
       continue;
     }
     const Fit& fit = a.kind == ScoredHypothesis::Kind::parameters ? d.parameters : a.fit;
-    rivals.push_back(
-        {name_of(a), a.probability, h, h.bounded(fit.mean()), fit.point.directions, fit.posterior.covariance});
+    rivals.push_back({name_of(a), a.probability, h, place_of(h, a, fit, d.parameters.mean()), fit.point.directions,
+                      fit.posterior.covariance});
   }
   return rivals;
 }
@@ -165,43 +183,50 @@ std::vector<Course> courses_of(const std::vector<std::vector<double>>& first,
 }
 
 std::optional<NextExperiment> expected_separation(const Manoeuvre& m, const std::vector<Rival>& rivals,
-                                                  const ModelDiscrepancy& discrepancy) {
+                                                  const NextOptions& options) {
+  const auto fly = [&](const Rival& r) {
+    return std::move(simulate(m.config, r.candidate().vehicle, 1, m.config.settle_s)[0]);
+  };
   std::vector<rollout::SimulatedFlight> flown;
-  std::vector<std::vector<std::vector<double>>> shown;
-  for (const Rival& r : rivals) {
-    flown.push_back(std::move(simulate(m.config, r.candidate().vehicle, 1, m.config.settle_s)[0]));
+  for (std::size_t i = 0; i < std::min(rivals.size(), kSurvive); ++i) {
+    flown.push_back(fly(rivals[i]));
     if (flown.back().lost || !flown.back().log) return {};
-    shown.push_back(course_of(*flown.back().log));
   }
   const std::vector<PredictedFlight> flight = [&] {
     std::vector<PredictedFlight> list;
-    list.emplace_back(Recording(m.name, std::move(*flown.front().log), rivals.front().candidate().vehicle));
+    list.emplace_back(Recording(m.name, *flown.front().log, rivals.front().candidate().vehicle));
     return list;
   }();
-  const Evidence evidence(flight, discrepancy, 1);
+  const Evidence evidence(flight, options.discrepancy, 1);
   const Fitter fitter(flight, evidence, 1);
-  std::vector<Expected> expected;
+  std::vector<std::optional<Expected>> expected;
   std::optional<Linearised> first;
-  for (const Rival& r : rivals) {
-    std::optional<Expected> e = expect(r, fitter, first);
-    if (!e) return {};
-    expected.push_back(std::move(*e));
+  double all = 0;
+  for (std::size_t i = 0; i < rivals.size(); ++i) {
+    expected.push_back(expect(rivals[i], fitter, first));
+    if (!expected.back() && i < kSurvive) return {};
+    if (expected.back()) all += rivals[i].probability;
   }
-  NextExperiment result{m.name, {}, 0, {}};
-  double weights = 0, most = -1;
-  for (std::size_t a = 0; a < rivals.size(); ++a)
-    for (std::size_t b = a + 1; b < rivals.size(); ++b) {
-      const double weight = std::max(rivals[a].probability * rivals[b].probability, 1e-300);
-      const double both = 0.5 * (nats(evidence, expected[a], expected[b]) + nats(evidence, expected[b], expected[a]));
-      result.expected_nats += weight * both;
-      weights += weight;
-      if (weight * both > most) {
-        most = weight * both;
-        result.separates = {rivals[a].name, rivals[b].name};
-        result.courses = courses_of(shown[a], shown[b]);
-      }
-    }
-  result.expected_nats /= weights;
+  const auto information = [&](std::size_t a, double brought) {
+    const double p = rivals[a].probability / all;
+    return -p * std::log(p + (1 - p) * kept_against(std::max(0.0, brought), options.rule));
+  };
+  NextExperiment result{m.name, {}, 0, 0, {}};
+  std::size_t other = 1;
+  double most = -1;
+  for (std::size_t a = 1; a < rivals.size(); ++a) {
+    if (!expected[a]) continue;
+    const double own = information(a, nats(evidence, *expected[a], *expected[0]));
+    result.information += own;
+    if (own > most) most = own, other = a;
+  }
+  result.information += information(0, nats(evidence, *expected[0], *expected[1]));
+  result.expected_nats =
+      0.5 * (nats(evidence, *expected[0], *expected[other]) + nats(evidence, *expected[other], *expected[0]));
+  result.separates = {rivals[0].name, rivals[other].name};
+  if (other >= flown.size()) flown.push_back(fly(rivals[other]));
+  if (const auto& log = flown[std::min(other, flown.size() - 1)].log)
+    result.courses = courses_of(course_of(*flown[0].log), course_of(*log));
   return result;
 }
 
@@ -221,15 +246,15 @@ std::vector<Manoeuvre> read_manoeuvres(const fs::path& folder) {
 
 std::vector<NextExperiment> rank_experiments(const Diagnosis& diagnosis, const sim::Randomisation& uncertain,
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options) {
-  const std::vector<Rival> rivals = rivals_of(diagnosis, uncertain, options.most_rivals);
+  const std::vector<Rival> rivals = rivals_of(diagnosis, uncertain, options.least_probability);
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
   io::parallel_for(manoeuvres.size(), options.threads,
-                   [&](std::size_t i) { found[i] = expected_separation(manoeuvres[i], rivals, options.discrepancy); });
+                   [&](std::size_t i) { found[i] = expected_separation(manoeuvres[i], rivals, options); });
   std::vector<NextExperiment> list;
   for (std::optional<NextExperiment>& e : found)
     if (e) list.push_back(std::move(*e));
-  std::ranges::stable_sort(list, std::greater{}, &NextExperiment::expected_nats);
+  std::ranges::stable_sort(list, std::greater{}, &NextExperiment::information);
   return list;
 }
 

@@ -6,7 +6,11 @@
 //                                            the equations of their effects get wrong, and what is uncertain of B still
 // is what such a flight is expected to bring for A over B where A is true: parameters and sizes of B may adjust themselves,
 // as far as the flights so far allow. That B's errors in old and new flights are the same ones is left out, so it is a
-// lower bound. Pairs count by the product of their probabilities.
+// lower bound. Of what the flights so far leave open, A has a size that it may well have: its root mean square.
+// With N_A the nats of A over the most probable rival (of that one over the next), and D what the verdict keeps of a rival against which so many
+// nats speak (verdict.hpp), A of probability p is then thought of as p / (p + (1 - p) D(N_A)), and the information to be expected of a manoeuvre is
+//   I = - sum over A of p_A log(p_A + (1 - p_A) D(N_A))
+// at most the entropy of what is thought now: a manoeuvre that shows many rivals a little beats one that shows a single one well.
 #pragma once
 
 #include <filesystem>
@@ -14,6 +18,7 @@
 #include <vector>
 
 #include "gap/diagnose/diagnose.hpp"
+#include "gap/diagnose/verdict_rule.hpp"
 #include "rollout/fly_config.hpp"
 
 namespace flappy::gap {
@@ -37,20 +42,22 @@ inline constexpr double kCourseStep_s = 0.1;
 struct NextExperiment {
   std::string manoeuvre;
   std::vector<std::string>
-      separates;             ///< the two hypotheses that it tells apart most: effects joined by +, or their kind
-  double expected_nats = 0;  ///< mean over pairs
+      separates;  ///< the most probable hypothesis and the one that it parts most from it: effects joined by +, or their kind
+  double expected_nats = 0;  ///< between these two, mean of both ways
+  double information = 0;    ///< I, of all rivals, nats
   std::vector<Course>
       courses;  ///< as each of the two would fly it; first what differs most beside what it does in the flight
 };
 
 struct NextOptions {
   int threads = 0;
-  std::size_t most_rivals = 4;
+  double least_probability = 0.01;  ///< of a rival
   ModelDiscrepancy discrepancy = read_model_discrepancy();
+  VerdictRule rule = read_verdict_rule();
 };
 
-/// Best first. Rivals are the most probable hypotheses that can fly: an unknown cause cannot. Without two of them, and for a
-/// manoeuvre that one of their vehicles would not survive, there is nothing.
+/// Most informative first. Rivals are the probable hypotheses that can fly: an unknown cause cannot. Without two of them, and for a
+/// manoeuvre that one of the four most probable vehicles would not survive, there is nothing.
 std::vector<NextExperiment> rank_experiments(const Diagnosis& diagnosis, const sim::Randomisation& uncertain,
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options = {});
 

@@ -46,6 +46,10 @@ double beyond_chance(const ScoredHypothesis& a, double plain, const VerdictRule&
   return a.log_prior + plain + std::max(gain - chance, std::min(gain, 0.0));
 }
 
+double kept_against(double nats, const VerdictRule& rule) {
+  return std::exp(-rule.doubt.freedom / 2 * std::log1p(2 * nats / (rule.doubt.nats * rule.doubt.freedom)));
+}
+
 void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule) {
   const auto parameters = std::ranges::find(hypotheses, ScoredHypothesis::Kind::parameters, &ScoredHypothesis::kind);
   const double plain = parameters == hypotheses.end() ? 0 : parameters->log_evidence - parameters->log_prior;
@@ -53,8 +57,7 @@ void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictR
   for (const ScoredHypothesis& a : hypotheses) most = std::max(most, beyond_chance(a, plain, rule) - a.log_prior);
   for (ScoredHypothesis& a : hypotheses) {
     const double behind = most + a.log_prior - beyond_chance(a, plain, rule);
-    a.probability = std::exp(a.log_prior -
-                             rule.doubt.freedom / 2 * std::log1p(2 * behind / (rule.doubt.nats * rule.doubt.freedom)));
+    a.probability = std::exp(a.log_prior) * kept_against(behind, rule);
     sum += a.probability;
   }
   for (ScoredHypothesis& a : hypotheses) a.probability /= sum;

@@ -20,6 +20,9 @@ double beyond_chance(const ScoredHypothesis& hypothesis, double plain, const Ver
 ///   (1 + 2 d / (n f))^(-f / 2)       n, f: doubt.nats, doubt.freedom
 /// of what was thought before: nats are right up to a factor that is as uncertain as the variance of Student's t (exp(-d / n) for
 /// f -> infinity), for no making's errors are quite those that the evidence takes for granted.
+/// Of what was thought of a hypothesis beforehand, what is left where so many nats speak for another one.
+double kept_against(double nats, const VerdictRule& rule);
+
 void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule);
 
 /// The largest mass, rivals that such flights often cannot separate (EffectInfo::group) pooled: a set of effects pools with those whose

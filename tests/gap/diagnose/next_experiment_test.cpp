@@ -111,6 +111,31 @@ TEST(NextExperiment, PairsCountByTheirProbabilities) {
   EXPECT_EQ(rank(0.01, 0.09)[0].manoeuvre, "ceiling_steps");
 }
 
+// The flights so far say nothing of any of these; each has a size of 0.5, give or take, and a manoeuvre of its own. What shows all of them is worth more
+// than what shows the most probable one best, and brings less than what is not known yet.
+TEST(NextExperiment, PrefersWhatShowsManyRivals) {
+  const sim::Randomisation prior = uncertain();
+  const auto open = [&](const char* effect, double probability) {
+    ScoredHypothesis a = hypothesis(prior, {effect}, {}, probability, 0.01);
+    const Hypothesis h(prior, {effect});
+    for (Eigen::Index i = h.shared(); i < h.size(); ++i) a.fit.posterior.covariance(i, i) = 0.25;
+    a.fit.point.residual.clear();
+    return a;
+  };
+  const Diagnosis d = diagnosis(prior, {hypothesis(prior, {}, {}, 0.4, 0.01), open("ground_effect", 0.22),
+                                        open("ceiling_effect", 0.2), open("wall_effect", 0.18)});
+  const auto ranked = rank_experiments(d, prior, library({"ceiling_steps", "ground_steps", "tour", "wall_approach"}));
+  ASSERT_EQ(ranked.size(), 4u);
+  EXPECT_EQ(ranked[0].manoeuvre, "tour");
+  EXPECT_EQ(ranked[1].manoeuvre, "ground_steps");
+  double entropy = 0;
+  for (const ScoredHypothesis& a : d.hypotheses) entropy -= a.probability * std::log(a.probability);
+  for (const NextExperiment& e : ranked) {
+    EXPECT_GT(e.information, 0) << e.manoeuvre;
+    EXPECT_LT(e.information, entropy) << e.manoeuvre;
+  }
+}
+
 TEST(NextExperiment, ProposesNothingWithoutRivalsOrWhereOneIsLost) {
   const sim::Randomisation prior = uncertain();
   auto choice = library({"ground_steps"});
