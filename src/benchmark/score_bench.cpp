@@ -200,7 +200,9 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
         const blind::FamilyFlight flown = family_named(bench.manifest.family).fly(a, kProposedFlight);
         Prediction p;
         p.kind = "crashed";
-        if (!flown.crashed) {
+        if (flown.crashed) {
+          std::printf("case %zu in %s: %s\n", c.number, name.c_str(), flown.how.c_str());
+        } else {
           q.flights.push_back(bench.folder / "proposed" / number_text(c.number));
           flightlog::write_flight_log(q.flights.back(), flown.log);
           p = command.predictor(q);

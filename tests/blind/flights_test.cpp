@@ -38,7 +38,13 @@ TEST(BlindFlights, PassTheCheckAndReadBack) {
 }
 
 TEST(BlindFlights, SameSeedSameBytes) {
+  const ProposedFlight hold{2,
+                            [](double) {
+                              return std::array<double, 4>{0, 0, 0.5, 0};
+                            },
+                            [](double) { return std::array<double, 4>{}; }};
   Case c = identified(2, Programme::hover);
+  c.proposed = &hold;
   c.sizes = Sizes({{"wind", 1}, {"command_delay", 0.5}, {"gyro_bias", 1}});
   const RobotFlight a = fly(c, 0), b = fly(c, 0);
   ASSERT_FALSE(a.crashed) << a.how;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "full.hpp"
 #include "identify/force_sensor.hpp"
 #include "identify/linear_map.hpp"
 #include "refusal.hpp"
@@ -209,6 +210,7 @@ TEST(ForceFit, KeepsTheUnseenWhoseNominalValueDoesNotFit) {
 // Thirteen amplitudes and eight differences see some directions 30 times worse than all 37 inputs: slopes over short steps
 // take kinks for knowledge there, and intervals then hold 29 of 48.
 TEST(ForceFit, IntervalsHoldTheTruthWhereDirectionsAreWeak) {
+  if (!test::full()) GTEST_SKIP() << "two fits of a quarter of a minute: with --full";
   model::Vehicle truth = test::identified();
   std::vector<sim::Input> inputs = default_inputs();
   std::erase_if(inputs, [](const sim::Input& u) { return u.bias_V != 0 || u.split_cycle != 0; });

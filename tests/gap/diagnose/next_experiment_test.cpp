@@ -124,7 +124,7 @@ TEST(NextExperiment, PrefersWhatShowsManyRivals) {
   };
   const Diagnosis d = diagnosis(prior, {hypothesis(prior, {}, {}, 0.4, 0.01), open("ground_effect", 0.22),
                                         open("ceiling_effect", 0.2), open("wall_effect", 0.18)});
-  const auto ranked = rank_experiments(d, prior, library({"ceiling_steps", "ground_steps", "tour", "wall_approach"}));
+  const auto ranked = rank_experiments(d, prior, library({"ceiling_steps", "dash", "ground_steps", "tour"}));
   ASSERT_EQ(ranked.size(), 4u);
   EXPECT_EQ(ranked[0].manoeuvre, "tour");
   EXPECT_EQ(ranked[1].manoeuvre, "ground_steps");
