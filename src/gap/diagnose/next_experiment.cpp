@@ -23,6 +23,7 @@ struct Rival {
   VectorXd at;
   Directions directions;
   MatrixXd covariance;  ///< along the directions
+  bool open;            ///< its effect is left open by the flights so far: it is the parameters' vehicle but for a size
   Candidate candidate() const { return hypothesis.candidate(at); }
 };
 
@@ -57,12 +58,13 @@ std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncer
     if (a.kind == ScoredHypothesis::Kind::unknown || !a.terms.empty()) continue;
     const Hypothesis h(uncertain, a.effects);
     if (a.kind == ScoredHypothesis::Kind::none) {
-      rivals.push_back({name_of(a), a.probability, h, h.start(), {MatrixXd(h.size(), 0), VectorXd(0)}, MatrixXd(0, 0)});
+      rivals.push_back(
+          {name_of(a), a.probability, h, h.start(), {MatrixXd(h.size(), 0), VectorXd(0)}, MatrixXd(0, 0), false});
       continue;
     }
     const Fit& fit = a.kind == ScoredHypothesis::Kind::parameters ? d.parameters : a.fit;
     rivals.push_back({name_of(a), a.probability, h, place_of(h, a, fit, d.parameters.mean()), fit.point.directions,
-                      fit.posterior.covariance});
+                      fit.posterior.covariance, a.kind == ScoredHypothesis::Kind::effect && !a.fitted()});
   }
   return rivals;
 }
@@ -136,6 +138,39 @@ double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
   return Evidence::posterior(reduced, chosen, prior_mean).log_evidence - with;
 }
 
+/// Of rivals that the flights so far leave open: what the most probable one leaves, but for what their sizes change. They differ from one and the
+/// same vehicle by these alone, so nothing of it is rough, and nothing else has to be flown.
+void add_open(const std::vector<Rival>& rivals, const std::vector<PredictedFlight>& flight, const Evidence& evidence,
+              std::vector<std::optional<Expected>>& expected) {
+  std::vector<std::size_t> open;
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < rivals.size(); ++i) {
+    if (expected[i] || !rivals[i].open) continue;
+    const Rival& r = rivals[i];
+    if (open.empty()) {
+      VectorXd without = r.hypothesis.start();
+      without.head(r.hypothesis.shared()) = r.at.head(r.hypothesis.shared());
+      candidates.push_back(r.hypothesis.candidate(without));
+    }
+    candidates.push_back(r.candidate());
+    open.push_back(i);
+  }
+  if (open.empty()) return;
+  std::vector<Residuals> left = residuals(flight, candidates, 1);
+  if (left[0].empty()) return;
+  const SufficientStatistics without = evidence.statistics(left[0]);
+  for (std::size_t k = 0; k < open.size(); ++k) {
+    if (left[k + 1].empty()) continue;
+    Expected e = *expected[0];
+    e.form.setZero();
+    const SufficientStatistics with = evidence.statistics(left[k + 1]);
+    for (std::size_t f = 0; f < with.sums.size(); ++f)
+      for (std::size_t g = 0; g < with.sums[f].size(); ++g)
+        e.residual.sums[f][g] += with.sums[f][g] - without.sums[f][g];
+    expected[open[k]] = std::move(e);
+  }
+}
+
 constexpr const char* kCourses[] = {"x_m", "y_m", "z_m", "amplitude_V", "difference_V", "bias_V", "split_cycle"};
 
 /// Of each of kCourses, means over kCourseStep_s; where a step has no sample, that before.
@@ -199,14 +234,15 @@ std::optional<NextExperiment> expected_separation(const Manoeuvre& m, const std:
   }();
   const Evidence evidence(flight, options.discrepancy, 1);
   const Fitter fitter(flight, evidence, 1);
-  std::vector<std::optional<Expected>> expected;
+  std::vector<std::optional<Expected>> expected(rivals.size());
   std::optional<Linearised> first;
+  for (std::size_t i = 0; i < rivals.size(); ++i)
+    if (i < 2 || !rivals[i].open) expected[i] = expect(rivals[i], fitter, first);
+  if (!expected[0] || !expected[1]) return {};
+  add_open(rivals, flight, evidence, expected);
   double all = 0;
-  for (std::size_t i = 0; i < rivals.size(); ++i) {
-    expected.push_back(expect(rivals[i], fitter, first));
-    if (!expected.back() && i < kSurvive) return {};
-    if (expected.back()) all += rivals[i].probability;
-  }
+  for (std::size_t i = 0; i < rivals.size(); ++i)
+    if (expected[i]) all += rivals[i].probability;
   const auto information = [&](std::size_t a, double brought) {
     const double p = rivals[a].probability / all;
     return -p * std::log(p + (1 - p) * kept_against(std::max(0.0, brought), options.rule));
