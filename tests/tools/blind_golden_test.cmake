@@ -14,7 +14,7 @@ expect_keys(${WORK}/bench.json cases=NUMBER top1_mocap_imu=NUMBER group_top1=NUM
 file(STRINGS ${WORK}/bench/score.csv lines)
 set(verdicts "")
 foreach(line IN LISTS lines)
-  string(REGEX REPLACE "^([^,]*,[^,]*,[^,]*),[^,]*,[^,]*,([^,]*,[^,]*),.*" "\\1,\\2" verdict "${line}")
+  string(REGEX REPLACE "^([^,]*,[^,]*,[^,]*),[^,]*,([^,]*,[^,]*),.*" "\\1,\\2" verdict "${line}")
   string(APPEND verdicts "${verdict}\n")
 endforeach()
 file(WRITE ${WORK}/${GOLDEN} "${verdicts}")

@@ -217,7 +217,7 @@ std::vector<Course> courses_of(const std::vector<std::vector<double>>& first,
   return courses;
 }
 
-std::optional<NextExperiment> expected_separation(const Manoeuvre& m, const std::vector<Rival>& rivals,
+std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std::vector<Rival>& rivals,
                                                   const NextOptions& options) {
   const auto fly = [&](const Rival& r) {
     return std::move(simulate(m.config, r.candidate().vehicle, 1, m.config.settle_s)[0]);
@@ -227,11 +227,8 @@ std::optional<NextExperiment> expected_separation(const Manoeuvre& m, const std:
     flown.push_back(fly(rivals[i]));
     if (flown.back().lost || !flown.back().log) return {};
   }
-  const std::vector<PredictedFlight> flight = [&] {
-    std::vector<PredictedFlight> list;
-    list.emplace_back(Recording(m.name, *flown.front().log, rivals.front().candidate().vehicle));
-    return list;
-  }();
+  std::vector<PredictedFlight> flight;
+  flight.emplace_back(Recording(m.name, *flown.front().log, rivals.front().candidate().vehicle));
   const Evidence evidence(flight, options.discrepancy, 1);
   const Fitter fitter(flight, evidence, 1);
   std::vector<std::optional<Expected>> expected(rivals.size());
@@ -286,7 +283,7 @@ std::vector<NextExperiment> rank_experiments(const Diagnosis& diagnosis, const s
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
   io::parallel_for(manoeuvres.size(), options.threads,
-                   [&](std::size_t i) { found[i] = expected_separation(manoeuvres[i], rivals, options); });
+                   [&](std::size_t i) { found[i] = expected_information(manoeuvres[i], rivals, options); });
   std::vector<NextExperiment> list;
   for (std::optional<NextExperiment>& e : found)
     if (e) list.push_back(std::move(*e));
