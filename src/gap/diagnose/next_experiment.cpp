@@ -218,7 +218,7 @@ std::vector<Course> courses_of(const std::vector<std::vector<double>>& first,
 }
 
 std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std::vector<Rival>& rivals,
-                                                  const NextOptions& options) {
+                                                   const NextOptions& options) {
   const auto fly = [&](const Rival& r) {
     return std::move(simulate(m.config, r.candidate().vehicle, 1, m.config.settle_s)[0]);
   };
