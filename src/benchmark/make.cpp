@@ -72,11 +72,7 @@ class Maker {
   }
 
   void make(const PlannedCase& p) const {
-    blind::Assignment a;
-    a.vehicle_file = command_.vehicle;
-    for (const blind::BlindEffect& e : p.effects) a.effects.emplace_back(e.id, e.size);
-    a.hover = p.hover, a.power = p.power;
-    a.own_figures = p.own_figures, a.conventions = p.conventions;
+    const blind::Assignment a = assignment_of(p, command_.vehicle);
     // what its own file says of a robot of the published randomisation stays with it
     const fs::path drawn = sealed_ / ("vehicle_" + number_text(p.number));
     const auto prepare = [&](blind::Assignment& now) {

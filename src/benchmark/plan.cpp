@@ -188,6 +188,15 @@ std::map<std::string, Detectability> read_detectability(const std::filesystem::p
   return all;
 }
 
+blind::Assignment assignment_of(const PlannedCase& planned, const std::filesystem::path& vehicle) {
+  blind::Assignment a;
+  a.vehicle_file = vehicle;
+  for (const blind::BlindEffect& e : planned.effects) a.effects.emplace_back(e.id, e.size);
+  a.hover = planned.hover, a.power = planned.power;
+  a.own_figures = planned.own_figures, a.conventions = planned.conventions;
+  return a;
+}
+
 std::vector<PlannedCase> plan_cases(const blind::Family& family,
                                     const std::map<std::string, Detectability>& detectability,
                                     const PlanOptions& options) {

@@ -35,6 +35,9 @@ struct PlannedCase {
   std::vector<std::string> withheld;              ///< from the catalogue
 };
 
+/// What its family flies, but for the seed.
+blind::Assignment assignment_of(const PlannedCase& planned, const std::filesystem::path& vehicle);
+
 struct PlanOptions {
   bool reported = false;           ///< seeds of the reported figures; otherwise those of development
   std::vector<std::string> parts;  ///< empty: all

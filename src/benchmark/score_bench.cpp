@@ -188,11 +188,7 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
         const std::string& name = bench.cases[open[k]].prediction.manoeuvre;
         const auto manoeuvre = std::ranges::find(manoeuvres, name, &gap::Manoeuvre::name);
         if (manoeuvre == manoeuvres.end()) refuse(file_of(open[k]), "no manoeuvre \"" + name + "\"");
-        blind::Assignment a;
-        a.vehicle_file = q.vehicle;
-        for (const blind::BlindEffect& e : label.planned.effects) a.effects.emplace_back(e.id, e.size);
-        a.own_figures = label.planned.own_figures, a.conventions = label.planned.conventions;
-        a.power = label.planned.power;
+        blind::Assignment a = assignment_of(label.planned, q.vehicle);
         a.seed = seed_of_draw(label.planned.seed, label.draw);
         const blind::ProposedFlight flight =
             proposed_flight(*manoeuvre, flightlog::read_flight_log(q.flights.front()).header);

@@ -134,7 +134,7 @@ class Diagnoser {
     });
     for (std::size_t i = 0; i < asked; ++i) {
       const ScoredHypothesis& a = singles[i];
-      ScoredHypothesis more = std::move(remainders[i]);
+      ScoredHypothesis& more = remainders[i];
       if (more.terms.empty()) continue;
       more.kind = ScoredHypothesis::Kind::effect;
       more.effects = a.effects;
@@ -144,7 +144,6 @@ class Diagnoser {
       more.fit.point.shape = shape;
       more.log_evidence += a.log_prior + std::log(rule_.prior.remainder);
       more.log_prior = a.log_prior + std::log(rule_.prior.remainder);
-      remainders[i] = std::move(more);
     }
     for (ScoredHypothesis& more : remainders)
       if (!more.terms.empty()) singles.push_back(std::move(more));

@@ -38,17 +38,15 @@ std::string name_of(const ScoredHypothesis& a) {
 /// Of the most probable rivals so many have to survive a manoeuvre.
 constexpr std::size_t kSurvive = 4;
 
-/// Where a fit leaves a vehicle; a size that the flights leave open is one that it may well have, beside `parameters`.
-VectorXd place_of(const Hypothesis& h, const ScoredHypothesis& a, const Fit& fit, const VectorXd& parameters) {
+/// Of an effect that the flights leave open: beside the parameters where they are, sizes that it may well have.
+VectorXd open_place(const Hypothesis& h, const Fit& fit, const VectorXd& parameters) {
   VectorXd at = fit.mean();
-  if (a.kind == ScoredHypothesis::Kind::effect && !a.fitted()) {
-    at.head(h.shared()) = parameters;
-    const MatrixXd covariance = fit.covariance();
-    for (Index i = h.shared(); i < h.size(); ++i)
-      if (h.unknowns()[static_cast<std::size_t>(i)].size)
-        at[i] = std::copysign(std::hypot(at[i], std::sqrt(covariance(i, i))), at[i]);
-  }
-  return h.bounded(at);
+  at.head(h.shared()) = parameters;
+  const MatrixXd covariance = fit.covariance();
+  for (Index i = h.shared(); i < h.size(); ++i)
+    if (h.unknowns()[static_cast<std::size_t>(i)].size)
+      at[i] = std::copysign(std::hypot(at[i], std::sqrt(covariance(i, i))), at[i]);
+  return at;
 }
 
 std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncertain, double least) {
@@ -63,8 +61,10 @@ std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncer
       continue;
     }
     const Fit& fit = a.kind == ScoredHypothesis::Kind::parameters ? d.parameters : a.fit;
-    rivals.push_back({name_of(a), a.probability, h, place_of(h, a, fit, d.parameters.mean()), fit.point.directions,
-                      fit.posterior.covariance, a.kind == ScoredHypothesis::Kind::effect && !a.fitted()});
+    const bool open = a.kind == ScoredHypothesis::Kind::effect && !a.fitted();
+    const VectorXd at = open ? open_place(h, fit, d.parameters.mean()) : fit.mean();
+    rivals.push_back(
+        {name_of(a), a.probability, h, h.bounded(at), fit.point.directions, fit.posterior.covariance, open});
   }
   return rivals;
 }
