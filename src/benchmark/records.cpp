@@ -4,6 +4,7 @@
 #include <set>
 
 #include "io/schema.hpp"
+#include "io/sha256.hpp"
 
 namespace flappy::benchmark {
 namespace {
@@ -15,6 +16,10 @@ std::optional<double> optional_from(const Json& json) {
 }
 
 using Names = std::vector<std::string>;
+
+[[noreturn]] void refuse_changed(const std::filesystem::path& file) {
+  throw io::InputError(file.string() + ": has changed; accepted: what was sealed");
+}
 
 }  // namespace
 
@@ -74,6 +79,29 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   } catch (const Json::exception& e) {
     throw io::InputError(file.string() + ": " + e.what() + "; accepted: what flappy-blind make wrote");
   }
+}
+
+std::filesystem::path prediction_file(const std::filesystem::path& folder, std::size_t number) {
+  return folder / "predictions" / (number_text(number) + ".json");
+}
+
+void check_predictions(const std::filesystem::path& folder, const Manifest& manifest) {
+  const std::string sums = io::read_text(folder / kSums);
+  for (const PublicCase& c : manifest.cases) {
+    const std::filesystem::path file = prediction_file(folder, c.number);
+    if (sums.find(sum_line(folder, c.number)) == std::string::npos) refuse_changed(file);
+  }
+}
+
+std::string sum_line(const std::filesystem::path& folder, std::size_t number) {
+  const std::filesystem::path file = prediction_file(folder, number);
+  return io::sha256(io::read_text(file)) + "  " + file.lexically_relative(folder).string() + "\n";
+}
+
+Json open_labels(const std::filesystem::path& folder, const Manifest& manifest) {
+  const std::filesystem::path sealed = folder / "sealed" / "labels.json";
+  if (io::sha256(io::read_text(sealed)) != manifest.labels_sha256) refuse_changed(sealed);
+  return read_json(sealed);
 }
 
 CaseTruth Label::truth() const {
@@ -154,7 +182,8 @@ Json to_json(const Prediction& p) {
           {"manoeuvre", p.manoeuvre},
           {"where", p.where ? Json{{"channel", p.where->channel}, {"regime", p.where->regime}} : Json(nullptr)},
           {"baselines", baselines},
-          {"features", p.features}};
+          {"features", p.features},
+          {"corrected", p.corrected}};
 }
 
 Prediction prediction_from(const Json& json) {
@@ -184,6 +213,7 @@ Prediction prediction_from(const Json& json) {
   for (const auto& [name, b] : json.at("baselines").items())
     p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
   p.features = json.at("features").get<std::vector<double>>();
+  p.corrected = json.value("corrected", "");  // nor this
   return p;
 }
 

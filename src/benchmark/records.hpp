@@ -36,6 +36,16 @@ struct Manifest {
 Json to_json(const Manifest& manifest);
 Manifest read_manifest(const std::filesystem::path& folder);
 
+/// Hashes of all predictions, as sha256sum writes and checks them: made once none is open any more.
+inline constexpr const char* kSums = "predictions.sha256";
+std::filesystem::path prediction_file(const std::filesystem::path& folder, std::size_t number);
+/// The line of a prediction.
+std::string sum_line(const std::filesystem::path& folder, std::size_t number);
+/// InputError where they are not sealed, or one has changed since.
+void check_predictions(const std::filesystem::path& folder, const Manifest& manifest);
+/// sealed/labels.json. InputError where it has changed.
+Json open_labels(const std::filesystem::path& folder, const Manifest& manifest);
+
 struct Label {
   PlannedCase planned;
   std::uint64_t draw = 0;                      ///< of the robots of its seed, the first that did not crash

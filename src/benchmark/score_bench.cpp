@@ -37,7 +37,7 @@ class Predictions {
         folder_(folder),
         manifest_(manifest),
         vehicle_(command.vehicle.empty() ? fs::path(manifest.vehicle) : command.vehicle),
-        sums_(folder / "predictions.sha256") {}
+        sums_(folder / kSums) {}
 
   void check_inputs() const {
     if (io::sha256(io::read_text(vehicle_)) != manifest_.vehicle_sha256)
@@ -54,21 +54,21 @@ class Predictions {
   /// False where it was interrupted.
   bool make() const {
     if (fs::exists(sums_)) {
-      check();
+      check_predictions(folder_, manifest_);
       return true;
     }
     if (fs::exists(true_fits(folder_))) refuse(sums_, "is missing, though labels were opened");
     io::make_folder(folder_ / "predictions");
     std::vector<const PublicCase*> open;
     for (const PublicCase& c : manifest_.cases)
-      if (!fs::exists(file_of(c.number))) open.push_back(&c);
+      if (!fs::exists(prediction_file(folder_, c.number))) open.push_back(&c);
     const bool all = work_through("diagnosing", open.size(), command_.threads, command_.ranks, [&](std::size_t i) {
       const PublicCase& c = *open[i];
       const auto start = std::chrono::steady_clock::now();
       Json json = to_json(command_.predictor(question(c, c.withheld)));
       json["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       json["commit"] = io::commit();
-      io::write_atomically(file_of(c.number), json.dump(1) + "\n");
+      io::write_atomically(prediction_file(folder_, c.number), json.dump(1) + "\n");
     });
     if (!all) return false;
     if (io::writes(command_.ranks)) seal();
@@ -76,7 +76,7 @@ class Predictions {
     return true;
   }
 
-  Json read(std::size_t number) const { return read_json(file_of(number)); }
+  Json read(std::size_t number) const { return read_json(prediction_file(folder_, number)); }
 
   Question question(const PublicCase& c, const std::vector<std::string>& withheld) const {
     return {c.flights(folder_), vehicle_, command_.priors,     command_.discrepancy, command_.verdict,
@@ -85,19 +85,9 @@ class Predictions {
 
  private:
   void seal() const {
-    std::string sums;  // as sha256sum writes and checks them
-    for (const PublicCase& c : manifest_.cases) sums += sum_of(c.number) + "  " + name_of(c.number) + "\n";
+    std::string sums;
+    for (const PublicCase& c : manifest_.cases) sums += sum_line(folder_, c.number);
     io::write_atomically(sums_, sums);
-  }
-  static std::string name_of(std::size_t number) { return "predictions/" + number_text(number) + ".json"; }
-  fs::path file_of(std::size_t number) const { return folder_ / name_of(number); }
-  std::string sum_of(std::size_t number) const { return io::sha256(io::read_text(file_of(number))); }
-
-  void check() const {
-    const std::string sums = io::read_text(sums_);
-    for (const PublicCase& c : manifest_.cases)
-      if (sums.find(sum_of(c.number) + "  " + name_of(c.number) + "\n") == std::string::npos)
-        refuse(file_of(c.number), "has changed");
   }
 
   const ScoreCommand& command_;
@@ -118,10 +108,8 @@ struct Bench {
   Bench& operator=(const Bench&) = delete;
 
   void open() {
-    const fs::path sealed = folder / "sealed" / "labels.json";
-    if (io::sha256(io::read_text(sealed)) != manifest.labels_sha256) refuse(sealed, "has changed");
+    truths = open_labels(folder, manifest);
     io::make_folder(true_fits(folder));
-    truths = read_json(sealed);
     for (const Json& json : truths.at("cases")) {
       Label l = label_from(json);
       labels.emplace(l.planned.number, std::move(l));

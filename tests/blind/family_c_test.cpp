@@ -364,9 +364,10 @@ TEST(FamilyC, EscapeKeepsItsRules) {
   EscapeAssignment rules;
   rules.observation = {"goal_rotation", "position_error", "velocity", "body_rate",
                        "beat_phase",    "time",           "trim",     "previous_action"};
-  std::size_t width = 0, calls = 0;
+  std::vector<double> first;
+  std::size_t calls = 0;
   rules.policy = [&](const std::vector<double>& observation) {
-    width = observation.size();
+    if (calls == 0) first = observation;
     ++calls;
     return std::array<double, 4>{};
   };
@@ -380,7 +381,9 @@ TEST(FamilyC, EscapeKeepsItsRules) {
   rules.keep_until_s = 0.5;
   const FamilyEscape escape = escape_of(plain(), 0, rules, 1);
   EXPECT_TRUE(escape.success);
-  EXPECT_EQ(width, 23U);
+  ASSERT_EQ(first.size(), 9U + 3 + 3 + 3 + 2 + 1 + 4 + 4) << "numbers as a task has them (flight/task.cpp)";
+  for (const std::size_t diagonal : {0, 4, 8}) EXPECT_NEAR(first[diagonal], 1, 0.05) << "upright, heading for the goal";
+  EXPECT_NEAR(first[9], -0.02, 0.01) << "behind the goal";
   EXPECT_LE(calls, 10U);
   EXPECT_LT(escape.captured_s, 0.02);
   EXPECT_EQ(escape.log.header.ambient.ground_z_m, -1);

@@ -1,86 +1,21 @@
 #include "escapes.hpp"
 
 #include <cstdio>
-#include <memory>
 #include <mutex>
 
-#include "blind/escape.hpp"
-#include "flight/constants.hpp"
+#include "escape_rules.hpp"
 #include "io/parallel.hpp"
 #include "io/progress.hpp"
-#include "io/toml_writer.hpp"
-#include "policy/policy.hpp"
-#include "rollout/fly_config.hpp"
 #include "rollout/outcome.hpp"
 
 namespace flappy::blind {
 namespace {
-
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-/// A trained actor as it is on disk, or a policy from elsewhere.
-ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& config) {
-  if (const auto& actor = config.actor) {
-    return [actor, task = config.fleet.task.constants](const std::vector<double>& observation) {
-      const auto view = policy::view_of(*actor, actor->weights.data(), actor->mean.data(), actor->scale.data());
-      double action[flight::kMaxActions];
-      policy::evaluate(view, observation.data(), action);
-      std::array<double, flight::kMaxActions> adds{};
-      for (int i = 0; i < flight::kMaxActions; ++i)
-        adds[static_cast<std::size_t>(i)] = flight::scaled_action(task, i, action[i]);
-      return adds;
-    };
-  }
-  const std::shared_ptr<const policy::Policy> policy =
-      policy::load_policy(path, static_cast<int>(config.fleet.task.observation().size()), flight::kMaxActions);
-  const auto one_at_a_time = std::make_shared<std::mutex>();
-  return [policy, one_at_a_time, task = config.fleet.task.constants](const std::vector<double>& observation) {
-    const std::vector<float> row(observation.begin(), observation.end());
-    float action[flight::kMaxActions];
-    {
-      const std::scoped_lock lock(*one_at_a_time);
-      policy->act(1, row.data(), action);
-    }
-    std::array<double, flight::kMaxActions> adds{};
-    for (std::size_t i = 0; i < adds.size(); ++i)
-      adds[i] = std::clamp<double>(action[i], task.action_low[i], task.action_high[i]);
-    return adds;
-  };
-}
-
-EscapeRules rules_of(const EscapeOptions& o) {
-  const fs::path path = o.policy;
-  const std::string kind = path.extension().string();
-  io::read_text(path);  // or a complaint that names it
-  if (kind != ".json" && kind != ".pt" && kind != ".h")
-    throw io::InputError(o.policy + ": is no policy; accepted: an actor (.json), TorchScript (.pt) or a C header (.h)");
-  std::vector<std::string> overrides;
-  if (kind == ".json") overrides.push_back("actor=" + io::toml_string(fs::absolute(path).string()));
-  const rollout::FlyConfig config = rollout::read_fly_config(o.config, overrides);
-  const flight::FleetOptions& fleet = config.fleet;
-  const bool sees_wings = fleet.task.parts >> static_cast<int>(flight::Part::wings) & 1;
-  if (fleet.controller.kind != flight::kind_of<flight::PidController>() || fleet.task.path.size() != 1 || sees_wings ||
-      fleet.task.constants.success.by_s <= 0 || std::abs(fleet.control_hz * kControl_s - 1) > 1e-9)
-    throw io::InputError(o.config +
-                         ": is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal "
-                         "that stands still and a success");
-  const flight::FlightConstants k = flight::flight_constants(fleet);
-  return {fleet.task, k.task, k.controller.of<flight::PidController>(), policy_of(path, config)};
-}
-
-rollout::Outcome outcome_of(const Escape& e) {
-  rollout::Outcome outcome;
-  outcome.captured_s = e.captured_s, outcome.lost_s = e.lost_s;
-  outcome.ended = e.ended;
-  outcome.status = e.flight.crashed ? std::uint32_t{sim::kFrozen} : 0;
-  return outcome;
-}
-
 }  // namespace
 
 Json fly_escapes(const EscapeOptions& o) {
-  const EscapeRules rules = rules_of(o);
+  const EscapeRules rules = read_escape_rules(o.policy, o.config);
   const Case robot = Robots(o.robot).robot(o.draw);
   if (!o.robot.out.empty()) io::make_folder(o.robot.out);
   std::vector<Escape> escapes(o.count);

@@ -15,6 +15,7 @@
 #include "io/config.hpp"
 #include "io/installation.hpp"
 #include "io/sha256.hpp"
+#include "loop.hpp"
 
 namespace flappy::blind {
 namespace {
@@ -146,6 +147,18 @@ int main(int argc, char** argv) {
   calibrate.option("folders", calibrated.folders, "of flappy-blind score").required();
   calibrate.option("--verdict", calibrated.verdict, "constants to start from").shows_default();
   calibrate.option("--out", calibrated.out, "file for the constants").required();
+  io::Command loop =
+      program.app().command("loop", "trains on with what was diagnosed, and flies robots with it and without");
+  blind::LoopCommand looped;
+  loop.option("folders", looped.folders, "of flappy-blind score").required();
+  loop.option("--run", looped.run, "run folder of flappy-train, whose best policy is trained on").required();
+  loop.option("--out", looped.out, "folder for what is trained, loop.csv and loop.md").required();
+  loop.option("--train", looped.train, "how it is trained on").shows_default();
+  loop.option("--set", looped.overrides, "override a key of that: learn.updates=20000").one_at_a_time();
+  loop.option("--config", looped.config, "task and controller that it was trained with").shows_default();
+  loop.option("--robots", looped.robots, "of each folder at most").range(1, 1000);
+  loop.option("--escapes", looped.escapes, "of each robot and policy").range(1, 10000).shows_default();
+  loop.option("--threads", looped.threads, "robots at a time; 0: one for each processor").range(0, 1024);
   program.app().expect_commands(1, 1);
   program.takes_ranks();
   return program.run(argc, argv, [&] {
@@ -167,6 +180,9 @@ int main(int argc, char** argv) {
                                    ", verdict: " + io::sha256(io::read_text(scored.verdict)) + "\n");
       const nlohmann::ordered_json scores = benchmark::score_bench(scored);
       if (!scores.is_null()) program.write_json(scores);
+    } else if (loop.given()) {
+      const nlohmann::ordered_json found = blind::run_loop(looped);
+      if (!found.is_null()) program.write_json(found);
     } else if (calibrate.given()) program.write_json(benchmark::calibrate(calibrated));
     else if (list.given() && !of.family.empty())
       for (const blind::FamilyEffect& e : benchmark::family_named(of.family).effects())

@@ -56,6 +56,7 @@ struct Prediction {
   std::vector<double> features;                 ///< what the residuals look like, for the black box (baselines.hpp)
   std::string manoeuvre;                        ///< proposed by a verdict that abstains; or none
   std::optional<Where> where;                   ///< of an unknown cause
+  std::string corrected;                        ///< vehicle file with what was concluded; none of faulty data
 };
 /// Whether a verdict names no one answer as the likelier one: `group`, or less than one half.
 bool abstains(const Prediction& prediction);

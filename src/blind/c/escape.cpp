@@ -2,12 +2,12 @@
 //
 // The robot trims itself in hover, is set to where the episode begins, and holds its trim while the policy adds to it. The policy
 // sees the pilot's view, by names:
-//   goal_rotation      rotation vector, in B, that takes the body to the goal's attitude
+//   goal_rotation      body to the goal's heading frame, which is that of W: as the next
 //   rotation_matrix    body to world, row by row
 //   position_error     position minus goal, W
 //   velocity           W            body_rate        B
-//   heading_error      heading minus the goal's, within +-pi
-//   beat_phase         sine and cosine
+//   heading_error      heading minus the goal's: sine and cosine, as the next
+//   beat_phase
 //   time               since the start
 //   trim               V, V, V, split cycle           previous_action  the same units
 #include "blind/c/escape.hpp"
@@ -36,13 +36,12 @@ std::vector<double> observed(const std::vector<std::string>& names, const View& 
                                                  "body_rate",     "heading_error",   "beat_phase",     "time",
                                                  "trim",          "previous_action"};
   for (const std::string& name : names) {
-    if (name == "goal_rotation") add3(rotation_between(view.R_WB, Eigen::Matrix3d::Identity()));
-    else if (name == "rotation_matrix")
+    if (name == "goal_rotation" || name == "rotation_matrix")
       for (int i = 0; i < 3; ++i) add({view.R_WB(i, 0), view.R_WB(i, 1), view.R_WB(i, 2)});
     else if (name == "position_error") add3(view.position_W - kGoal_W);
     else if (name == "velocity") add3(view.velocity_W);
     else if (name == "body_rate") add3(view.rate_B);
-    else if (name == "heading_error") add({heading_of(view.R_WB)});
+    else if (name == "heading_error") add({std::sin(heading_of(view.R_WB)), std::cos(heading_of(view.R_WB))});
     else if (name == "beat_phase") add({std::sin(2 * M_PI * phase), std::cos(2 * M_PI * phase)});
     else if (name == "time") add({t_s});
     else if (name == "trim") add({trim.amplitude_V, trim.difference_V, trim.bias_V, trim.split_cycle});

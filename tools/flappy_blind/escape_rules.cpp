@@ -1,0 +1,103 @@
+#include "escape_rules.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <mutex>
+
+#include "flight/constants.hpp"
+#include "io/files.hpp"
+#include "io/toml_writer.hpp"
+#include "policy/policy.hpp"
+#include "rollout/fly_config.hpp"
+
+namespace flappy::blind {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A trained actor as it is on disk, or a policy from elsewhere.
+ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& config) {
+  if (const auto& actor = config.actor) {
+    return [actor, task = config.fleet.task.constants](const std::vector<double>& observation) {
+      const auto view = policy::view_of(*actor, actor->weights.data(), actor->mean.data(), actor->scale.data());
+      double action[flight::kMaxActions];
+      policy::evaluate(view, observation.data(), action);
+      std::array<double, flight::kMaxActions> adds{};
+      for (int i = 0; i < flight::kMaxActions; ++i)
+        adds[static_cast<std::size_t>(i)] = flight::scaled_action(task, i, action[i]);
+      return adds;
+    };
+  }
+  const std::shared_ptr<const policy::Policy> policy =
+      policy::load_policy(path, static_cast<int>(config.fleet.task.observation().size()), flight::kMaxActions);
+  const auto one_at_a_time = std::make_shared<std::mutex>();
+  return [policy, one_at_a_time, task = config.fleet.task.constants](const std::vector<double>& observation) {
+    const std::vector<float> row(observation.begin(), observation.end());
+    float action[flight::kMaxActions];
+    {
+      const std::scoped_lock lock(*one_at_a_time);
+      policy->act(1, row.data(), action);
+    }
+    std::array<double, flight::kMaxActions> adds{};
+    for (std::size_t i = 0; i < adds.size(); ++i)
+      adds[i] = std::clamp<double>(action[i], task.action_low[i], task.action_high[i]);
+    return adds;
+  };
+}
+
+/// A limit whose cosine is -2 is none.
+double angle(double cosine) { return std::acos(std::max(-1.0, cosine)); }
+
+}  // namespace
+
+EscapeRules read_escape_rules(const fs::path& policy, const fs::path& config_file) {
+  const std::string kind = policy.extension().string();
+  io::read_text(policy);  // or a complaint that names it
+  if (kind != ".json" && kind != ".pt" && kind != ".h")
+    throw io::InputError(policy.string() +
+                         ": is no policy; accepted: an actor (.json), TorchScript (.pt) or a C header (.h)");
+  std::vector<std::string> overrides;
+  if (kind == ".json") overrides.push_back("actor=" + io::toml_string(fs::absolute(policy).string()));
+  const rollout::FlyConfig config = rollout::read_fly_config(config_file, overrides);
+  const flight::FleetOptions& fleet = config.fleet;
+  const bool sees_wings = fleet.task.parts >> static_cast<int>(flight::Part::wings) & 1;
+  if (fleet.controller.kind != flight::kind_of<flight::PidController>() || fleet.task.path.size() != 1 || sees_wings ||
+      fleet.task.constants.success.by_s <= 0 || std::abs(fleet.control_hz * kControl_s - 1) > 1e-9)
+    throw io::InputError(config_file.string() +
+                         ": is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal "
+                         "that stands still and a success");
+  const flight::FlightConstants k = flight::flight_constants(fleet);
+  return {fleet.task, k.task, k.controller.of<flight::PidController>(), policy_of(policy, config)};
+}
+
+EscapeAssignment escape_assignment(const EscapeRules& r) {
+  EscapeAssignment a;
+  for (const auto& [name, signals] : r.task.observed_parts()) a.observation.push_back(name);
+  a.policy = r.policy;
+  a.action_period_s = r.task.action_repeat * kControl_s;
+  const flight::StartRange& start = r.task.start;
+  for (std::size_t i = 0; i < 3; ++i)
+    a.start_m[i] = start.position_m[i].centre, a.start_half_m[i] = start.position_m[i].half;
+  a.heading_rad = start.rotation_rad[2].centre, a.heading_half_rad = start.rotation_rad[2].half;
+  a.x_low_m = start.x_low_m, a.x_high_m = start.x_high_m;
+  const flight::HandBack<double>& h = r.constants.hand_back;
+  a.hand_back = {h.distance_m, h.speed_m_s, h.body_rate_rad_s, angle(h.tilt_cos), angle(h.heading_cos)};
+  a.hand_back_at_s = h.at_s;
+  const flight::Success<double>& s = r.constants.success;
+  a.capture = {s.distance_m, s.speed_m_s, s.body_rate_rad_s, angle(s.tilt_cos), angle(s.heading_cos)};
+  a.capture_by_s = s.by_s;
+  a.keep = {s.keep_distance_m, 0, 0, angle(s.keep_tilt_cos), angle(s.keep_heading_cos)};
+  a.keep_from_s = s.keep_from_s, a.keep_until_s = s.keep_until_s;
+  return a;
+}
+
+rollout::Outcome outcome_of(const Escape& escape) {
+  rollout::Outcome outcome;
+  outcome.captured_s = escape.captured_s, outcome.lost_s = escape.lost_s;
+  outcome.ended = escape.ended;
+  outcome.status = escape.flight.crashed ? std::uint32_t{sim::kFrozen} : 0;
+  return outcome;
+}
+
+}  // namespace flappy::blind

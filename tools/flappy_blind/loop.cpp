@@ -1,0 +1,218 @@
+#include "loop.hpp"
+
+#include <cstdio>
+#include <map>
+
+#include "benchmark/families.hpp"
+#include "benchmark/records.hpp"
+#include "benchmark/work.hpp"
+#include "blind/family_a.hpp"
+#include "escape_rules.hpp"
+#include "io/append_file.hpp"
+#include "io/files.hpp"
+#include "io/program.hpp"
+#include "io/progress.hpp"
+#include "io/schema.hpp"
+#include "io/sha256.hpp"
+#include "io/toml_writer.hpp"
+#include "learn/trainer.hpp"
+
+namespace flappy::blind {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// Policies that every robot flies, in this order.
+constexpr const char* kPolicies[] = {"as_shipped", "file", "corrected"};
+
+/// A scored benchmark.
+struct Scored {
+  explicit Scored(const fs::path& at) : folder(at), manifest(benchmark::read_manifest(at)) {
+    benchmark::check_predictions(folder, manifest);
+    for (const Json& json : benchmark::open_labels(folder, manifest).at("cases")) {
+      benchmark::Label l = benchmark::label_from(json);
+      if (l.planned.published)
+        throw io::InputError(folder.string() +
+                             ": robots of the part parameters have files of their own, which are gone; accepted: "
+                             "other parts");
+      labels.emplace(l.planned.number, std::move(l));
+    }
+  }
+  benchmark::Prediction prediction(std::size_t number) const {
+    return benchmark::prediction_from(benchmark::read_json(benchmark::prediction_file(folder, number)));
+  }
+  fs::path folder;
+  benchmark::Manifest manifest;
+  std::map<std::size_t, benchmark::Label> labels;  ///< by number
+};
+
+struct Robot {
+  const Scored* of;
+  std::size_t number;
+  fs::path own;            ///< its folder
+  bool corrected = false;  ///< its diagnosis handed back a vehicle
+};
+
+class Loop {
+ public:
+  explicit Loop(const LoopCommand& command) : command_(command) {
+    for (const std::string& folder : command.folders) {
+      const Scored& s = *scored_.emplace_back(std::make_unique<Scored>(folder));
+      for (std::size_t i = 0; i < s.manifest.cases.size() && (command.robots == 0 || i < command.robots); ++i) {
+        const std::size_t number = s.manifest.cases[i].number;
+        robots_.push_back(
+            {&s, number, command.out / fs::path(s.manifest.family + "_" + benchmark::number_text(number))});
+      }
+    }
+    const fs::path shipped = fs::path(command.run) / "best.json";
+    start_ = std::make_shared<policy::Actor>(policy::read_actor(shipped));
+    start_sha256_ = io::sha256(io::read_text(shipped));
+  }
+
+  Json run() {
+    io::make_folder(command_.out);
+    const io::FolderLock lock(command_.out);
+    if (!train() || !fly()) {
+      std::printf("stopped; what is done stays: the same command goes on\n");
+      return nullptr;
+    }
+    return told();
+  }
+
+ private:
+  fs::path without() const { return fs::path(command_.out) / "file"; }
+
+  /// By what was predicted alone.
+  bool train() {
+    io::stop_on_interrupt();
+    const fs::path declared = scored_.front()->manifest.vehicle;
+    for (const auto& s : scored_)
+      if (s->manifest.vehicle_sha256 != scored_.front()->manifest.vehicle_sha256)
+        throw io::InputError(s->folder.string() + ": is of another vehicle; accepted: benchmarks of one vehicle");
+    if (!train_on(declared, without(), 0)) return false;
+    for (Robot& r : robots_) {
+      const std::string text = r.of->prediction(r.number).corrected;
+      r.corrected = !text.empty();
+      io::make_folder(r.own);
+      if (r.corrected) io::write_atomically(r.own / "vehicle_corrected.toml", text);
+    }
+    std::vector<const Robot*> open;
+    for (const Robot& r : robots_)
+      if (r.corrected) open.push_back(&r);
+    return benchmark::work_through("training", open.size(), command_.threads, nullptr, [&](std::size_t i) {
+      train_on(open[i]->own / "vehicle_corrected.toml", open[i]->own / "corrected", 1);
+    });
+  }
+
+  /// Goes on with what is there; false where it was interrupted.
+  bool train_on(const fs::path& vehicle, const fs::path& folder, int threads) const {
+    std::vector<std::string> overrides = command_.overrides;
+    overrides.push_back("vehicle=" + io::toml_string(fs::absolute(vehicle).string()));
+    if (threads > 0) overrides.push_back("threads=" + std::to_string(threads));
+    const learn::TrainConfig config = learn::read_train_config(command_.train, overrides);
+    learn::refuse_other_run_in(folder, config, start_sha256_);
+    learn::TrainOptions options;
+    options.folder = folder;
+    options.from = learn::unfinished_run_in(folder);
+    if (fs::exists(folder / "summary.json") && !options.from) return true;
+    options.init = start_, options.init_sha256 = start_sha256_;
+    options.commit = io::commit();
+    options.keep_going = [](const learn::TrainProgress&) { return !io::interrupted(); };
+    return !learn::train(config, options).stopped;
+  }
+
+  bool fly() {
+    std::vector<const Robot*> open;
+    for (const Robot& r : robots_)
+      if (!fs::exists(r.own / "result.json")) open.push_back(&r);
+    return benchmark::work_through("flying", open.size(), command_.threads, nullptr,
+                                   [&](std::size_t i) { fly(*open[i]); });
+  }
+
+  void fly(const Robot& r) const {
+    const benchmark::Label& label = r.of->labels.at(r.number);
+    Assignment a = benchmark::assignment_of(label.planned, r.of->manifest.vehicle);
+    a.seed = benchmark::seed_of_draw(label.planned.seed, label.draw);
+    const fs::path policies[] = {fs::path(command_.run) / "best.json", without() / "best.json",
+                                 (r.corrected ? r.own / "corrected" : without()) / "best.json"};
+    Json json = {{"escapes", command_.escapes}};
+    for (std::size_t p = 0; p < std::size(policies); ++p) {
+      const EscapeRules rules = read_escape_rules(policies[p], command_.config);
+      std::size_t succeeded = 0;
+      for (std::size_t n = 0; n < command_.escapes; ++n) {
+        if (io::interrupted()) return;
+        succeeded += succeeds(r.of->manifest.family, a, n, rules);
+      }
+      json[kPolicies[p]] = succeeded;
+    }
+    io::write_atomically(r.own / "result.json", json.dump(1) + "\n");
+  }
+
+  static bool succeeds(const std::string& family, const Assignment& a, std::size_t number, const EscapeRules& rules) {
+    if (family == "a") return outcome_of(escape(case_of(a), number, rules)).success();
+    return benchmark::family_named(family).escape(a, number, escape_assignment(rules)).success;
+  }
+
+  struct Row {
+    std::size_t robots = 0, better = 0, worse = 0, escapes = 0;
+    std::array<std::size_t, std::size(kPolicies)> succeeded{};
+  };
+
+  Json told() const {
+    std::map<std::string, Row> rows;
+    std::string lines = "family,case,part,effects,verdict,named,escapes,as_shipped,file,corrected,seed,draw\n";
+    for (const Robot& r : robots_) {
+      const Json json = benchmark::read_json(r.own / "result.json");
+      const benchmark::Label& label = r.of->labels.at(r.number);
+      const benchmark::Prediction said = r.of->prediction(r.number);
+      const std::string& family = r.of->manifest.family;
+      lines += family + "," + std::to_string(r.number) + "," + label.planned.part + "," +
+               io::joined(label.truth().effects, "+") + "," + said.kind + "," + io::joined(said.effects, "+") + "," +
+               std::to_string(json.at("escapes").get<std::size_t>());
+      for (Row* row : {&rows[family], &rows["all"]}) {
+        ++row->robots;
+        row->escapes += json.at("escapes").get<std::size_t>();
+        for (std::size_t p = 0; p < std::size(kPolicies); ++p)
+          row->succeeded[p] += json.at(kPolicies[p]).get<std::size_t>();
+        row->better += json.at("corrected") > json.at("file");
+        row->worse += json.at("corrected") < json.at("file");
+      }
+      for (const char* policy : kPolicies) lines += "," + std::to_string(json.at(policy).get<std::size_t>());
+      lines += "," + std::to_string(label.planned.seed) + "," + std::to_string(label.draw) + "\n";
+    }
+    std::string text =
+        "| family | robots | better with the diagnosis (95 %) | as good | worse | success as shipped | trained on with "
+        "the file | with the corrected vehicle |\n|---|---|---|---|---|---|---|---|\n";
+    Json all;
+    for (const auto& [family, row] : rows) {
+      const rollout::Rate better = rollout::rate_of(row.better, row.robots);
+      char line[300];
+      const auto share = [&](std::size_t p) {
+        return static_cast<double>(row.succeeded[p]) / static_cast<double>(row.escapes);
+      };
+      std::snprintf(line, sizeof line, "| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f | %.3f | %.3f |\n",
+                    family.c_str(), row.robots, better.value, better.low, better.high,
+                    row.robots - row.better - row.worse, row.worse, share(0), share(1), share(2));
+      text += line;
+      all[family] = {{"robots", row.robots},   {"better", row.better}, {"worse", row.worse},
+                     {"as_shipped", share(0)}, {"file", share(1)},     {"corrected", share(2)}};
+    }
+    std::fputs(text.c_str(), stdout);
+    io::write_atomically(fs::path(command_.out) / "loop.csv", lines);
+    io::write_atomically(fs::path(command_.out) / "loop.md", text);
+    return all;
+  }
+
+  const LoopCommand& command_;
+  std::vector<std::unique_ptr<Scored>> scored_;
+  std::vector<Robot> robots_;
+  std::shared_ptr<const policy::Actor> start_;
+  std::string start_sha256_;
+};
+
+}  // namespace
+
+Json run_loop(const LoopCommand& command) { return Loop(command).run(); }
+
+}  // namespace flappy::blind
