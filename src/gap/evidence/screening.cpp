@@ -98,19 +98,23 @@ class Screening {
       if (instead.log_evidence > p.log_evidence) p = std::move(instead);
       const auto at = [&](std::size_t k) { return p.mean.size() - static_cast<Index>(own.size() - k); };
       const auto coordinate = [&](std::size_t k) { return columns_[own[k].column].from + own[k].from + p.mean[at(k)]; };
-      if (whole) {
-        s.gain = p.log_evidence - without_;
-        for (std::size_t k = 0; k < own.size(); ++k)
-          if (one_sided(own[k])) s.gain += log_twice_positive(coordinate(k), std::sqrt(p.covariance(at(k), at(k))));
-      }
-      // of sizes with one sign, the one that comes out farthest on the other is none
+      const auto positive = [&](std::size_t k) {
+        return log_twice_positive(coordinate(k), std::sqrt(p.covariance(at(k), at(k))));
+      };
+      if (whole) s.gain = p.log_evidence - without_;
+      // of sizes with one sign, the one that comes out farthest on the other is none: its half of the prior counts beside those that are
+      // left, for two that make up for one another are both far on the other side
       std::size_t worst = own.size();
       for (std::size_t k = 0; k < own.size(); ++k)
         if (one_sided(own[k]) && coordinate(k) < (worst == own.size() ? 0 : coordinate(worst))) worst = k;
       if (worst == own.size()) {
-        for (std::size_t k = 0; k < own.size(); ++k) s.coordinates[columns_[own[k].column].unknown] = coordinate(k);
+        for (std::size_t k = 0; k < own.size(); ++k) {
+          if (one_sided(own[k])) s.gain += positive(k);
+          s.coordinates[columns_[own[k].column].unknown] = coordinate(k);
+        }
         break;
       }
+      s.gain += positive(worst);
       own.erase(own.begin() + static_cast<std::ptrdiff_t>(worst));
     }
     return s;
