@@ -29,7 +29,7 @@ constexpr double kWorthwhile = 0.5, kWorthwhileByTheBeat = 0.05;
 constexpr double kTelling = 0.05;
 /// How far, in reaches of its differences, columns of another point are trusted.
 constexpr double kFar = 2;
-/// A function of the place is an effect's own where its change follows it by so much of the square by which it follows any.
+/// Of functions of the place those are of another shape which its change follows by so much of the square by which it follows any.
 constexpr double kNatural = 0.1;
 /// Times that effects are moved where parameters stay.
 constexpr int kMostOwn = 2;
@@ -270,18 +270,19 @@ std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypot
 
 BasisCoefficients Fitter::shape_error(const Hypothesis& hypothesis, const Linearised& point, double shape) const {
   BasisCoefficients squares = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
-  for (const auto& [effect, own] : changes(hypothesis, point)) squares += (shape * shape_of(own)).cwiseAbs2();
+  for (const auto& [effect, own] : changes(hypothesis, point)) squares += shape_of(own, shape).cwiseAbs2();
   return squares.cwiseSqrt();
 }
 
 bool Fitter::has_shape(const Hypothesis& hypothesis, const Linearised& point) const {
-  return std::ranges::any_of(changes(hypothesis, point), [&](const auto& own) { return shape_of(own.second).any(); });
+  return std::ranges::any_of(changes(hypothesis, point),
+                             [&](const auto& own) { return shape_of(own.second, 1).any(); });
 }
 
 /// Laws of what acts by the place (near surfaces, at a line, in time) differ in more than size: along the functions of the place that this change
-/// follows, every load of the body may have as much of it as they have on average. What it follows by little is not its own: a shape may be many
-/// times the entry's, and a heating motor would else explain what turns with the heading.
-BasisCoefficients Fitter::shape_of(const BasisCoefficients& change) const {
+/// follows, every load of the body may have as much of it as they have on average, times the shape. Of what it follows by little (as gusts do of
+/// time) no load has more than that, for a shape may be many times the entry's, and a heating motor would else explain what turns with the heading.
+BasisCoefficients Fitter::shape_of(const BasisCoefficients& change, double shape) const {
   const RegimeBasis& basis = evidence_.basis();
   BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
   if (evidence_.discrepancy().spread.beside_all) return sd;
@@ -302,8 +303,8 @@ BasisCoefficients Fitter::shape_of(const BasisCoefficients& change) const {
   if (!(place > all / 2)) return sd;
   for (int g = 0; g < kGroups; ++g)
     for (int i = 1; i < basis.size(); ++i)
-      if (load(g) && of_place(i) && squares[i] > kNatural * most)
-        sd(g, i) = std::sqrt(squares[i] / groups) * evidence_.signal(g);
+      if (load(g) && of_place(i))
+        sd(g, i) = (squares[i] > kNatural * most ? shape : 1) * std::sqrt(squares[i] / groups) * evidence_.signal(g);
   return sd;
 }
 

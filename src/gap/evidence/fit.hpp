@@ -111,7 +111,7 @@ class Fitter {
 
  private:
   std::map<std::string, BasisCoefficients> changes(const Hypothesis& hypothesis, const Linearised& point) const;
-  BasisCoefficients shape_of(const BasisCoefficients& change) const;
+  BasisCoefficients shape_of(const BasisCoefficients& change, double shape) const;
   BasisCoefficients discrepancy_sd(const Hypothesis& hypothesis, const Linearised& point) const;
   /// Of a size that is a line; null: of none.
   const BasisCoefficients* line_of(const Hypothesis& hypothesis, Eigen::Index direction) const;
