@@ -29,11 +29,13 @@ struct Constant {
   bool by_factors;
 };
 
-const std::array<Constant, 6>& constants() {
-  static const std::array<Constant, 6> kAll = {{
+const std::array<Constant, 7>& constants() {
+  static const std::array<Constant, 7> kAll = {{
       {"doubt", "nats", [](VerdictRule& r) -> double& { return r.doubt.nats; }, 0.1, 100, true},
       {"doubt", "freedom", [](VerdictRule& r) -> double& { return r.doubt.freedom; }, 0.3, 30, true},
       {"gain", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.by_chance_nats; }, 0, 300, false},
+      {"gain.outside", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.outside_by_chance_nats; }, 0,
+       300, false},
       {"prior", "parameters", [](VerdictRule& r) -> double& { return r.prior.parameters; }, 0.01, 0.9, true},
       {"prior", "unknown", [](VerdictRule& r) -> double& { return r.prior.unknown; }, 0.01, 0.8, true},
       {"prior", "remainder", [](VerdictRule& r) -> double& { return r.prior.remainder; }, 0.001, 1, true},
@@ -199,8 +201,8 @@ Json calibrate(const CalibrateCommand& command) {
       {"cases", calibration.cases()}, {"score_before", calibration.score(before)}, {"score", calibration.score(after)}};
   for (const Constant& c : constants()) {
     set_figure(text, c.table, c.key, rounded(c.of(after)));
-    json[c.key] = c.of(after);
-    std::printf("%-7s %-24s %10.4g, was %.4g\n", c.table, c.key, c.of(after), c.of(before));
+    json[std::string(c.table) + "." + c.key] = c.of(after);
+    std::printf("%-12s %-24s %10.4g, was %.4g\n", c.table, c.key, c.of(after), c.of(before));
   }
   for (const auto& [key, value] : {std::pair{"none", after.prior.none}, {"effect", after.prior.effect}})
     set_figure(text, "prior", key, io::shortest_digits(value));

@@ -87,7 +87,7 @@ class Diagnoser {
     const auto explained = [](const ScoredHypothesis& a) { return a.log_evidence - a.log_prior; };
     std::ranges::sort(singles, std::greater{}, explained);
     if (!singles.empty() && singles.front().fitted() &&
-        explained(singles.front()) > plain_ + rule_.gain.by_chance_nats) {
+        explained(singles.front()) > plain_ + rule_.gain.chance_of(singles.front().effects.back())) {
       ScoredHypothesis best = singles.front();
       for (int n = 2; n <= options_.most_effects; ++n) {
         if (!progress(0.7 + 0.3 * (n - 1) / options_.most_effects,
@@ -108,7 +108,7 @@ class Diagnoser {
           move_parameters(sets[static_cast<std::size_t>(first - more.begin())], *first);
         std::erase_if(more, [&](const ScoredHypothesis& a) { return vanished(a); });
         std::erase_if(more, [&](const ScoredHypothesis& a) {
-          return explained(a) < explained(best) + rule_.gain.by_chance_nats;
+          return explained(a) < explained(best) + rule_.gain.chance_of(a.effects.back());
         });
         if (more.empty()) break;
         for (const ScoredHypothesis& a : more) {  // what showed beside that may be all there is

@@ -42,7 +42,8 @@ void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
 double beyond_chance(const ScoredHypothesis& a, double plain, const VerdictRule& rule) {
   const double gain = a.log_evidence - a.log_prior - plain;
   const bool more = a.kind == ScoredHypothesis::Kind::unknown || !a.terms.empty();
-  const double chance = (static_cast<double>(a.effects.size()) + (more ? 1 : 0)) * rule.gain.by_chance_nats;
+  double chance = more ? rule.gain.by_chance_nats : 0;
+  for (const std::string& e : a.effects) chance += rule.gain.chance_of(e);
   return a.log_prior + plain + std::max(gain - chance, std::min(gain, 0.0));
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "io/config.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 
@@ -19,8 +20,17 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
   if (!(std::abs(r.prior.none + r.prior.parameters + r.prior.effect + r.prior.unknown - 1) < 1e-9))
     prior.fail("", "none, parameters, effect and unknown do not add up to 1", "probabilities that do");
   const io::Table gain = root.table("gain");
-  r.gain = {gain.number("by_chance_nats", kNats), gain.number("further_screened_nats", kNats),
-            gain.number("vanished_size", kPositive)};
+  r.gain = {gain.number("by_chance_nats", kNats),
+            gain.number("further_screened_nats", kNats),
+            gain.number("vanished_size", kPositive),
+            {},
+            {}};
+  if (const auto outside = gain.optional_table("outside")) {
+    r.gain.outside = outside->strings("effects");
+    r.gain.outside_by_chance_nats = outside->number("by_chance_nats", kNats);
+    for (const std::string& id : r.gain.outside)
+      if (!model::is_effect(id)) outside->fail("effects", "no effect \"" + id + "\"", "identifiers of docs/effects.md");
+  }
   r.unknown = {root.table("unknown").number("freeing_nats", kNats)};
   if (const auto refutation = root.optional_table("refutation"))
     r.refutation.least_share = refutation->number("least_share", kShare);

@@ -2,7 +2,10 @@
 // configs/gap/verdict.toml, whose tables and keys these are.
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "io/installation.hpp"
 
@@ -14,6 +17,11 @@ struct VerdictRule {
   } prior;
   struct Gain {
     double by_chance_nats, further_screened_nats, vanished_size;
+    double outside_by_chance_nats;     ///< .. of ..
+    std::vector<std::string> outside;  ///< entries that are no part of what a model of the robot itself may get wrong
+    double chance_of(const std::string& effect) const {
+      return std::ranges::count(outside, effect) > 0 ? outside_by_chance_nats : by_chance_nats;
+    }
   } gain;
   struct UnknownCause {
     double freeing_nats;

@@ -53,6 +53,7 @@ TEST(Verdict, CountsNatsBeyondChanceByStudentsT) {
   };
   VerdictRule rule = read_verdict_rule();
   rule.gain.by_chance_nats = 10;
+  rule.gain.outside = {"wind"}, rule.gain.outside_by_chance_nats = 4;
   rule.doubt = {2, 4};
   std::vector<ScoredHypothesis> all = {weighed(-1000, 0.2, hypothesis(0, ScoredHypothesis::Kind::parameters)),
                                        weighed(-980, 0.2, hypothesis(0, ScoredHypothesis::Kind::unknown)),
@@ -60,17 +61,17 @@ TEST(Verdict, CountsNatsBeyondChanceByStudentsT) {
                                        weighed(-960, 0.1, hypothesis(0, {"body_drag"})),
                                        weighed(-880, 0.2, hypothesis(0, {"wind"}))};
   set_probabilities(all, rule);
-  // gains beyond chance: 110 of wind, 95 of the pair, 30 of body_drag, 10 of what is unknown
+  // gains beyond chance: 116 of wind, 101 of the pair, 30 of body_drag, 10 of what is unknown
   const auto share = [](double prior, double behind) { return prior * std::pow(1 + behind / 4, -2); };
-  const double sum = 0.2 + share(0.3, 15) + share(0.1, 80) + share(0.2, 100) + share(0.2, 110);
+  const double sum = 0.2 + share(0.3, 15) + share(0.1, 86) + share(0.2, 106) + share(0.2, 116);
   EXPECT_EQ(all[0].effects, std::vector<std::string>{"wind"});
   EXPECT_NEAR(all[0].probability, 0.2 / sum, 1e-12);
   EXPECT_EQ(all[1].effects.size(), 2u);
   EXPECT_NEAR(all[1].probability, share(0.3, 15) / sum, 1e-12);
   EXPECT_EQ(all[2].kind, ScoredHypothesis::Kind::unknown);
-  EXPECT_NEAR(all[2].probability, share(0.2, 100) / sum, 1e-12);
-  EXPECT_NEAR(all[3].probability, share(0.2, 110) / sum, 1e-12);
-  EXPECT_NEAR(all[4].probability, share(0.1, 80) / sum, 1e-12);
+  EXPECT_NEAR(all[2].probability, share(0.2, 106) / sum, 1e-12);
+  EXPECT_NEAR(all[3].probability, share(0.2, 116) / sum, 1e-12);
+  EXPECT_NEAR(all[4].probability, share(0.1, 86) / sum, 1e-12);
   // what loses against the parameters has lost all of it
   all = {weighed(-1000, 0.5, hypothesis(0, ScoredHypothesis::Kind::parameters)),
          weighed(-1004, 0.5, hypothesis(0, {"wind"}))};
@@ -424,6 +425,7 @@ TEST(VerdictRule, IsReadStrictly) {
       << verdict("priors = 1\n" + rule);
   EXPECT_NE(verdict(with(rule, "none = 0.1", "none = 0.2")).find("do not add up to 1"), std::string::npos);
   EXPECT_NE(verdict(with(rule, "freedom = ", "free = ")).find("doubt.freedom"), std::string::npos);
+  EXPECT_NE(verdict(with(rule, "\"gyro_bias\"", "\"gyro_bais\"")).find("no effect \"gyro_bais\""), std::string::npos);
   const std::string model = contents(kConfigs + "gap/model_discrepancy.toml");
   EXPECT_EQ(discrepancy(model), "accepted");
   EXPECT_NE(discrepancy(with(model, "\"added_mass\"", "\"added_masses\"")).find("no effect \"added_masses\""),
