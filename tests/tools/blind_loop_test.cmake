@@ -7,18 +7,13 @@ set(small --set collect.flappers=48 --set collect.vehicles=16 --set networks.cri
   --set learn.batch=64 --set evaluate.vehicles=32 --set learn.updates=30 --set evaluate.every=30 --set checkpoint.every=30)
 execute_process(COMMAND ${TRAIN} ${SOURCE}/configs/train/escape.toml ${small} --out ${WORK}/run OUTPUT_QUIET RESULT_VARIABLE code)
 expect_equal("exit code of flappy-train" "${code}" 0)
-run(make --family c --out ${WORK}/bench --set development --part singles --part parameters --cases 1)
-expect_equal("exit code of make, which says ${err}" "${code}" 0)
-set(loop loop ${WORK}/bench --run ${WORK}/run --out ${WORK}/loop --escapes 2 ${small})
-expect_refused("${WORK}/bench/predictions.sha256: cannot be read: No such file or directory" ${loop})
 expect_refused("${WORK}/gone/manifest.json: cannot be read: No such file or directory" loop ${WORK}/gone --run ${WORK}/run --out ${WORK}/loop)
-run(score ${WORK}/bench --discrepancy ${SOURCE}/configs/gap/discrepancy/without_c.toml)
-expect_equal("exit code of score, which says ${err}" "${code}" 0)
-expect_refused("${WORK}/bench: robots of the part parameters have files of their own, which are gone; accepted: other parts" ${loop})
-
-# one kind of robot alone
 run(make --family c --out ${WORK}/single --set development --part singles --cases 1)
+expect_equal("exit code of make, which says ${err}" "${code}" 0)
+expect_refused("${WORK}/single/predictions.sha256: cannot be read: No such file or directory"
+  loop ${WORK}/single --run ${WORK}/run --out ${WORK}/loop)
 run(score ${WORK}/single --discrepancy ${SOURCE}/configs/gap/discrepancy/without_c.toml)
+expect_equal("exit code of score, which says ${err}" "${code}" 0)
 set(loop loop ${WORK}/single --run ${WORK}/run --out ${WORK}/single_loop --escapes 2 ${small})
 run(${loop} --json ${WORK}/loop.json)
 expect_equal("exit code of loop, which says ${err}" "${code}" 0)

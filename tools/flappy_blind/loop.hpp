@@ -1,5 +1,5 @@
-// flappy-blind loop: whether a diagnosis pays. Each robot of a scored benchmark flies the escape with a policy trained on with its
-// corrected vehicle, and with the same policy trained on as long with the vehicle's file.
+// flappy-blind loop: whether a diagnosis pays. Each robot of a scored benchmark that has something wrong, and flew rich flights, flies the escape
+// with a policy trained on with its corrected vehicle, and with the same policy trained on as long with the vehicle's file.
 #pragma once
 
 #include <nlohmann/json.hpp>
