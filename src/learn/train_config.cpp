@@ -149,6 +149,7 @@ class Reader {
     c_.last_rate = t.number_or("last_rate", 1, {0, 1});
     c_.cosine = t.choice_or("schedule", "line", {"line", "cosine"}) == "cosine";
     c_.warm_up = static_cast<std::uint64_t>(t.integer_or("warm_up", 0, 0, 1'000'000'000));
+    c_.actor_after = static_cast<std::uint64_t>(t.integer_or("actor_after", 0, 0, 1'000'000'000));
     c_.policy_averaging = t.number_or("policy_averaging", 1, io::positive(1));
     l.tau = t.number("averaging", io::positive(1));
     l.twin = t.boolean("twin");

@@ -13,8 +13,9 @@
 //   [reward]                scale, discount (from action to action), steps (of the return that the critics learn)
 //   [learn]                 engine = "lanes" (unless told) | "libtorch", updates, updates_per_step, batch, actor_rate, critic_rate,
 //                           schedule = "line" (unless told) | "cosine" (of the rates, down to last_rate, their share at the last
-//                           update), warm_up (updates until the rates are whole; unless told: 0), averaging (tau), twin, policy_delay, target_noise,
-//                           target_noise_clip, huber (0: squares), replay (transitions kept), policy_averaging (share of
+//                           update), warm_up (updates until the rates are whole; unless told: 0), actor_after (updates in which the critics learn
+//                           alone, for an actor that knows already how to fly; unless told: 0), averaging (tau), twin,
+//                           policy_delay, target_noise, target_noise_clip, huber (0: squares), replay (transitions kept), policy_averaging (share of
 //                           the actor that the policy takes over after each step; 1: the policy is the actor)
 //   [evaluate]              every (updates), vehicles
 //   [checkpoint]            every (updates), keep
@@ -43,7 +44,7 @@ struct TrainConfig {
   std::uint64_t updates = 0, updates_per_step = 1;
   double actor_rate = 0, critic_rate = 0, last_rate = 1, policy_averaging = 1;
   bool cosine = false;
-  std::uint64_t warm_up = 0;
+  std::uint64_t warm_up = 0, actor_after = 0;
   std::size_t replay = 0;
   std::uint64_t evaluate_every = 0, checkpoint_every = 0;
   std::size_t evaluate_vehicles = 0, keep = 2;

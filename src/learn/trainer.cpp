@@ -125,7 +125,8 @@ class Trainer {
       for (std::uint64_t u = 0; u < n; ++u) {
         const std::size_t first = items * u / n, last = items * (u + 1) / n;
         const double rate = config_.rate_share(updates());
-        learner_.update(replay_, rate * config_.actor_rate, rate * config_.critic_rate,
+        const bool actor_learns = updates() >= config_.actor_after;
+        learner_.update(replay_, actor_learns ? rate * config_.actor_rate : 0, rate * config_.critic_rate,
                         {last - first, [&](std::size_t i) { collector_.run(first + i); }});
       }
       if (!std::isfinite(learner_.metrics().critic_loss))

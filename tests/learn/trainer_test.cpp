@@ -199,6 +199,17 @@ TEST(Trainer, StartsFromATrainedActor) {
   train(c, o);
   EXPECT_EQ(policy::read_actor(second / "last.json").weights, o.init->weights);
 
+  // what it knows is not lost to critics that know nothing yet
+  const auto learnt = [&](const std::string& actor_after) {
+    const TrainConfig alone = small_training({"learn.policy_averaging=1", actor_after});
+    o.folder = fresh("after");
+    o.keep_going = {};
+    EXPECT_EQ(train(alone, o).updates, alone.updates);
+    return policy::read_actor(o.folder / "last.json").weights;
+  };
+  EXPECT_EQ(learnt("learn.actor_after=1000000"), o.init->weights);
+  EXPECT_NE(learnt("learn.actor_after=" + std::to_string(c.updates - 2)), o.init->weights);
+
   const auto refused = [&](const std::shared_ptr<policy::Actor>& init, const char* why) {
     o.folder = fresh("refused");
     o.init = init;

@@ -161,12 +161,13 @@ class Diagnoser {
     const ScoredHypothesis& answer = flown(d);
     const Hypothesis h(uncertain_, answer.effects);
     d.sensors = answer.fitted() ? robot_.sensors(h, answer.fit) : robot_.sensors(plain, parameters_);
-    const auto alone = [&](const Hypothesis& of, const Linearised& point) {
-      return fitter_.joint(of, point, fitter_.all_flights(), true).at;
+    const auto alone = [&](const Hypothesis& of, const Fit& fit) {
+      return within_the_beat() ? fitter_.alone(of, fit).point.at
+                               : fitter_.joint(of, fit.point, fitter_.all_flights(), true).at;
     };
-    if (answer.fitted()) d.corrected = alone(h, answer.fit.point);
+    if (answer.fitted()) d.corrected = alone(h, answer.fit);
     else if (answer.kind == ScoredHypothesis::Kind::effect) d.corrected = h.bounded(answer.fit.mean());
-    else d.corrected = alone(plain, parameters_.point);
+    else d.corrected = alone(plain, parameters_);
     d.minors = uncertain_.minors();
     d.noise_sd = noise_sd();
     if (!within_the_beat()) d.validation = validate(robot_, flights_, d, threads_);

@@ -33,6 +33,8 @@ constexpr double kFar = 2;
 constexpr double kNatural = 0.1;
 /// Times that effects are moved where parameters stay.
 constexpr int kMostOwn = 2;
+/// Steps towards a robot that has nothing of any entry.
+constexpr int kMostAlone = 6;
 
 }  // namespace
 
@@ -443,6 +445,17 @@ Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iteration
   Fit result = before;
   result.point.statistics = evidence_.statistics(before.point.residual);
   return improve(hypothesis, std::move(result), iterations, nullptr, false);
+}
+
+Fit Fitter::alone(const Hypothesis& hypothesis, const Fit& before) const {
+  Fitter bare = *this;
+  const auto lines = static_cast<std::ptrdiff_t>(places_.size());
+  bare.background_.resize(places_.size());
+  bare.scaled_.resize(places_.size());
+  bare.entry_.erase(bare.entry_.begin() + lines, bare.entry_.end());
+  bare.means_.resize(places_.size());
+  bare.tails_.resize(places_.size());
+  return bare.improve(hypothesis, before, kMostAlone, &before, true);
 }
 
 /// Steps by columns of a point that was passed, as long as they do not lead far from it; those of the last one are its own.

@@ -105,6 +105,8 @@ class Fitter {
   Fit fit_beside(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters) const;
   /// The same, from where another fit ended, along its directions.
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const;
+  /// A robot that has nothing of any entry but what the hypothesis names: from another fit on, along its directions, by its columns.
+  Fit alone(const Hypothesis& hypothesis, const Fit& before) const;
   /// Without any effect's size, taken as linear in the hypothesis' own unknowns, whose columns are given (empty: unseen), beside
   /// a fit of the parameters. No residual.
   Fit linear(const Hypothesis& hypothesis, const Fit& parameters, const std::vector<BasisCoefficients>& own) const;
