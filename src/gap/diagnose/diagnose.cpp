@@ -28,6 +28,8 @@ constexpr std::size_t kFurther = 2;
 constexpr std::size_t kFreely = 3;
 /// Less than this share of what parameters leave may be chance; and the log evidence of what is refuted.
 constexpr double kLeastExplainable = 0.15, kRefuted = -1e9;
+/// Of the way to a vehicle that no file may hold.
+constexpr int kMostHalvings = 10;
 /// A size that changes no row by so much, in its unit, cannot be told from none.
 constexpr double kNoChange = 1e-9;
 
@@ -162,8 +164,12 @@ class Diagnoser {
     const Hypothesis h(uncertain_, answer.effects);
     d.sensors = answer.fitted() ? robot_.sensors(h, answer.fit) : robot_.sensors(plain, parameters_);
     const auto alone = [&](const Hypothesis& of, const Fit& fit) {
-      return within_the_beat() ? fitter_.alone(of, fit).point.at
-                               : fitter_.joint(of, fit.point, fitter_.all_flights(), true).at;
+      if (!within_the_beat()) return fitter_.joint(of, fit.point, fitter_.all_flights(), true).at;
+      VectorXd at = fitter_.alone(of, fit).point.at;
+      // figures of a body go each their own way, and together may be no body's
+      for (int n = 0; n < kMostHalvings && model::physical_fault(of.candidate(at).vehicle); ++n)
+        at = (at + fit.point.at) / 2;
+      return at;
     };
     if (answer.fitted()) d.corrected = alone(h, answer.fit);
     else if (answer.kind == ScoredHypothesis::Kind::effect) d.corrected = h.bounded(answer.fit.mean());

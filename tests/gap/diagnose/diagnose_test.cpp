@@ -453,7 +453,7 @@ TEST(Screening, StepsAsFarAsRobotsGoAnyway) {
 }
 
 // A third of a beat and more: near 0 its derivative shows nothing of it.
-TEST(Screening, FindsALongDelay) {
+TEST(Screening, FindsALongDelayAndFliesWhatIsLeftWithoutIt) {
   const std::vector<PredictedFlight> flights =
       flown("hummingbird_nominal", {"vehicle.effects.command_delay.delay_s=0.013", "flight.duration_s=5"});
   const sim::Randomisation prior = uncertain();
@@ -465,6 +465,13 @@ TEST(Screening, FindsALongDelay) {
   EXPECT_GT(first.gain, 50);
   const Unknown delay = unknowns_of("command_delay").front();
   EXPECT_NEAR(delay.value(first.coordinates[0]), 0.013, 0.002) << "steps are 0.0036 s";
+
+  // beside what every robot has of the entries the parameters leave to that what it takes; of a vehicle that has nothing else they are flown
+  const Fit& beside = robot.parameters();
+  const Fit alone = robot.fitter().alone(robot.plain(), beside);
+  EXPECT_GT((alone.point.at - beside.point.at).cwiseAbs().maxCoeff(), 0.1);
+  EXPECT_EQ(robot.plain().bounded(alone.point.at), alone.point.at);
+  EXPECT_EQ(residuals(flights, {robot.plain().candidate(alone.point.at)}, 2)[0], alone.point.residual);
 }
 
 // Of one coefficient of the basis in one group: log p by hand, where it is a column, or a floor.
