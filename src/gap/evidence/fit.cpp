@@ -8,6 +8,7 @@
 
 #include "gap/replay/sensor_correction.hpp"
 #include "io/parallel.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -35,6 +36,12 @@ constexpr double kNatural = 0.1;
 constexpr int kMostOwn = 2;
 /// Steps towards a robot that has nothing of any entry.
 constexpr int kMostAlone = 6;
+
+/// How a sensor errs is known but for its size: that it seems to turn with the heading gives loads no other law.
+bool of_sensor(const std::string& effect) {
+  const auto entry = std::ranges::find_if(model::effects(), [&](const auto& e) { return e.info.id == effect; });
+  return entry != model::effects().end() && entry->info.stage == model::Stage::sensor;
+}
 
 }  // namespace
 
@@ -272,13 +279,14 @@ std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypot
 
 BasisCoefficients Fitter::shape_error(const Hypothesis& hypothesis, const Linearised& point, double shape) const {
   BasisCoefficients squares = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
-  for (const auto& [effect, own] : changes(hypothesis, point)) squares += shape_of(own, shape).cwiseAbs2();
+  for (const auto& [effect, own] : changes(hypothesis, point))
+    if (!of_sensor(effect)) squares += shape_of(own, shape).cwiseAbs2();
   return squares.cwiseSqrt();
 }
 
 bool Fitter::has_shape(const Hypothesis& hypothesis, const Linearised& point) const {
   return std::ranges::any_of(changes(hypothesis, point),
-                             [&](const auto& own) { return shape_of(own.second, 1).any(); });
+                             [&](const auto& own) { return !of_sensor(own.first) && shape_of(own.second, 1).any(); });
 }
 
 /// Laws of what acts by the place (near surfaces, at a line, in time) differ in more than size: along the functions of the place that this change

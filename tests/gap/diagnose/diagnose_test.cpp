@@ -197,6 +197,11 @@ TEST(Fit, WhatActsByThePlaceHasAShape) {
     EXPECT_EQ(sd.bottomRows(kGroups - static_cast<int>(loads)).maxCoeff(), 0) << "strokes, currents, motion capture";
   }
   EXPECT_FALSE(fitter.has_shape(h, with(amplitude)));
+  const Hypothesis tilt(prior, {"mocap_tilt"});
+  Linearised turned{Eigen::VectorXd::Ones(tilt.size()), Fitter::axes(tilt), {}, {}, {}};
+  turned.columns.assign(static_cast<std::size_t>(tilt.size()), l.columns[static_cast<std::size_t>(h.shared())]);
+  EXPECT_FALSE(fitter.has_shape(tilt, turned)) << "of a sensor";
+  EXPECT_FALSE(fitter.shape_error(tilt, turned).any());
 }
 
 TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
