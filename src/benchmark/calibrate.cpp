@@ -85,13 +85,13 @@ class Calibration {
       if (!fs::exists(folder / "true_fits"))
         throw io::InputError(folder.string() + ": was not scored; accepted: folders of flappy-blind score");
       std::map<std::size_t, CaseTruth> truths;
-      const Json sealed = read_json(folder / "sealed" / "labels.json");
+      const Json sealed = open_labels(folder, manifest);
       for (const Json& json : sealed.at("cases")) {
         const Label l = label_from(json);
         truths[l.planned.number] = l.truth();
       }
       for (const PublicCase& c : manifest.cases) {
-        const Prediction p = prediction_from(read_json(folder / "predictions" / (number_text(c.number) + ".json")));
+        const Prediction p = prediction_from(read_json(prediction_file(folder, c.number)));
         Case own{.truth = truths.at(c.number)};
         for (const Weight& w : p.weights) {
           ScoredHypothesis a;

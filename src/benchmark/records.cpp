@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <set>
 
+#include "benchmark/families.hpp"
 #include "io/schema.hpp"
 #include "io/sha256.hpp"
 
@@ -87,10 +88,8 @@ std::filesystem::path prediction_file(const std::filesystem::path& folder, std::
 
 void check_predictions(const std::filesystem::path& folder, const Manifest& manifest) {
   const std::string sums = io::read_text(folder / kSums);
-  for (const PublicCase& c : manifest.cases) {
-    const std::filesystem::path file = prediction_file(folder, c.number);
-    if (sums.find(sum_line(folder, c.number)) == std::string::npos) refuse_changed(file);
-  }
+  for (const PublicCase& c : manifest.cases)
+    if (sums.find(sum_line(folder, c.number)) == std::string::npos) refuse_changed(prediction_file(folder, c.number));
 }
 
 std::string sum_line(const std::filesystem::path& folder, std::size_t number) {
@@ -108,6 +107,12 @@ CaseTruth Label::truth() const {
   CaseTruth t{planned.part, {}, true_values, channels, regimes, planned.seed, draw};
   for (const blind::BlindEffect& e : planned.effects) t.effects.push_back(e.id);
   return t;
+}
+
+blind::Assignment Label::robot(const std::filesystem::path& vehicle) const {
+  blind::Assignment a = assignment_of(planned, vehicle);
+  a.seed = seed_of_draw(planned.seed, draw);
+  return a;
 }
 
 Json to_json(const PlannedCase& p) {

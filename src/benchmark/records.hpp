@@ -52,6 +52,8 @@ struct Label {
   std::vector<std::string> channels, regimes;  ///< of its effects, as blind::FamilyEffect has them
   std::map<std::string, double> true_values;   ///< by "effect.parameter"
   CaseTruth truth() const;
+  /// The robot that flew.
+  blind::Assignment robot(const std::filesystem::path& vehicle) const;
 };
 Json to_json(const PlannedCase& planned);
 Json to_json(const Label& label);

@@ -176,8 +176,7 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
         const std::string& name = bench.cases[open[k]].prediction.manoeuvre;
         const auto manoeuvre = std::ranges::find(manoeuvres, name, &gap::Manoeuvre::name);
         if (manoeuvre == manoeuvres.end()) refuse(file_of(open[k]), "no manoeuvre \"" + name + "\"");
-        blind::Assignment a = assignment_of(label.planned, q.vehicle);
-        a.seed = seed_of_draw(label.planned.seed, label.draw);
+        blind::Assignment a = label.robot(q.vehicle);
         const blind::ProposedFlight flight =
             proposed_flight(*manoeuvre, flightlog::read_flight_log(q.flights.front()).header);
         a.proposed = &flight;

@@ -10,8 +10,10 @@
 
 namespace flappy::blind {
 namespace {
+
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
 }  // namespace
 
 Json fly_escapes(const EscapeOptions& o) {

@@ -1,6 +1,7 @@
 #include "loop.hpp"
 
 #include <cstdio>
+#include <functional>
 #include <map>
 
 #include "benchmark/families.hpp"
@@ -12,7 +13,6 @@
 #include "io/files.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
-#include "io/schema.hpp"
 #include "io/sha256.hpp"
 #include "io/toml_writer.hpp"
 #include "learn/trainer.hpp"
@@ -49,9 +49,9 @@ struct Scored {
 
 struct Robot {
   const Scored* of;
-  std::size_t number;
-  fs::path own;            ///< its folder
-  bool corrected = false;  ///< its diagnosis handed back a vehicle
+  const benchmark::Label* label;
+  benchmark::Prediction said;
+  fs::path own;  ///< its folder
 };
 
 class Loop {
@@ -62,8 +62,8 @@ class Loop {
       std::size_t robots = 0;
       for (const auto& [number, label] : s.labels)
         if (command.robots == 0 || robots++ < command.robots)
-          robots_.push_back(
-              {&s, number, command.out / fs::path(s.manifest.family + "_" + benchmark::number_text(number))});
+          robots_.push_back({&s, &label, s.prediction(number),
+                             command.out / fs::path(s.manifest.family + "_" + benchmark::number_text(number))});
       if (s.labels.empty())
         throw io::InputError(folder + ": no robot with something wrong and rich flights; accepted: a benchmark with " +
                              io::joined({std::begin(kParts), std::end(kParts)}));
@@ -94,15 +94,13 @@ class Loop {
       if (s->manifest.vehicle_sha256 != scored_.front()->manifest.vehicle_sha256)
         throw io::InputError(s->folder.string() + ": is of another vehicle; accepted: benchmarks of one vehicle");
     if (!train_on(declared, without(), 0)) return false;
-    for (Robot& r : robots_) {
-      const std::string text = r.of->prediction(r.number).corrected;
-      r.corrected = !text.empty();
-      io::make_folder(r.own);
-      if (r.corrected) io::write_atomically(r.own / "vehicle_corrected.toml", text);
-    }
     std::vector<const Robot*> open;
-    for (const Robot& r : robots_)
-      if (r.corrected) open.push_back(&r);
+    for (const Robot& r : robots_) {
+      io::make_folder(r.own);
+      if (r.said.corrected.empty()) continue;  // its flights had faults
+      io::write_atomically(r.own / "vehicle_corrected.toml", r.said.corrected);
+      open.push_back(&r);
+    }
     return benchmark::work_through("training", open.size(), command_.threads, nullptr, [&](std::size_t i) {
       train_on(open[i]->own / "vehicle_corrected.toml", open[i]->own / "corrected", 1);
     });
@@ -134,27 +132,30 @@ class Loop {
   }
 
   void fly(const Robot& r) const {
-    const benchmark::Label& label = r.of->labels.at(r.number);
-    Assignment a = benchmark::assignment_of(label.planned, r.of->manifest.vehicle);
-    a.seed = benchmark::seed_of_draw(label.planned.seed, label.draw);
+    const Assignment a = r.label->robot(r.of->manifest.vehicle);
     const fs::path policies[] = {fs::path(command_.run) / "best.json", without() / "best.json",
-                                 (r.corrected ? r.own / "corrected" : without()) / "best.json"};
+                                 (r.said.corrected.empty() ? without() : r.own / "corrected") / "best.json"};
     Json json = {{"escapes", command_.escapes}};
     for (std::size_t p = 0; p < std::size(policies); ++p) {
-      const EscapeRules rules = read_escape_rules(policies[p], command_.config);
+      const auto succeeds = escapes_of(r.of->manifest.family, a, read_escape_rules(policies[p], command_.config));
       std::size_t succeeded = 0;
       for (std::size_t n = 0; n < command_.escapes; ++n) {
         if (io::interrupted()) return;
-        succeeded += succeeds(r.of->manifest.family, a, n, rules);
+        succeeded += succeeds(n);
       }
       json[kPolicies[p]] = succeeded;
     }
     io::write_atomically(r.own / "result.json", json.dump(1) + "\n");
   }
 
-  static bool succeeds(const std::string& family, const Assignment& a, std::size_t number, const EscapeRules& rules) {
-    if (family == "a") return outcome_of(escape(case_of(a), number, rules)).success();
-    return benchmark::family_named(family).escape(a, number, escape_assignment(rules)).success;
+  /// Whether an escape of this number succeeds.
+  static std::function<bool(std::size_t)> escapes_of(const std::string& family, const Assignment& a,
+                                                     const EscapeRules& rules) {
+    if (family == "a")
+      return [robot = case_of(a), rules](std::size_t n) { return outcome_of(escape(robot, n, rules)).success(); };
+    return [&of = benchmark::family_named(family), a, asked = escape_assignment(rules)](std::size_t n) {
+      return of.escape(a, n, asked).success;
+    };
   }
 
   struct Row {
@@ -167,12 +168,11 @@ class Loop {
     std::string lines = "family,case,part,effects,verdict,named,escapes,as_shipped,file,corrected,seed,draw\n";
     for (const Robot& r : robots_) {
       const Json json = benchmark::read_json(r.own / "result.json");
-      const benchmark::Label& label = r.of->labels.at(r.number);
-      const benchmark::Prediction said = r.of->prediction(r.number);
+      const benchmark::Label& label = *r.label;
       const std::string& family = r.of->manifest.family;
-      lines += family + "," + std::to_string(r.number) + "," + label.planned.part + "," +
-               io::joined(label.truth().effects, "+") + "," + said.kind + "," + io::joined(said.effects, "+") + "," +
-               std::to_string(json.at("escapes").get<std::size_t>());
+      lines += family + "," + std::to_string(label.planned.number) + "," + label.planned.part + "," +
+               io::joined(label.truth().effects, "+") + "," + r.said.kind + "," + io::joined(r.said.effects, "+") +
+               "," + std::to_string(json.at("escapes").get<std::size_t>());
       for (Row* row : {&rows[family], &rows["all"]}) {
         ++row->robots;
         row->escapes += json.at("escapes").get<std::size_t>();

@@ -8,7 +8,6 @@
 
 #include "gap/replay/sensor_correction.hpp"
 #include "io/parallel.hpp"
-#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -36,12 +35,6 @@ constexpr double kNatural = 0.1;
 constexpr int kMostOwn = 2;
 /// Steps towards a robot that has nothing of any entry.
 constexpr int kMostAlone = 6;
-
-/// How a sensor errs is known but for its size: that it seems to turn with the heading gives loads no other law.
-bool of_sensor(const std::string& effect) {
-  const auto entry = std::ranges::find_if(model::effects(), [&](const auto& e) { return e.info.id == effect; });
-  return entry != model::effects().end() && entry->info.stage == model::Stage::sensor;
-}
 
 }  // namespace
 
@@ -263,13 +256,13 @@ Columns Fitter::unscaled_columns_of(const Linearised& point) const {
   return c;
 }
 
-/// What all sizes of each effect change.
+/// What all sizes of each effect change that flies. How a sensor errs is known but for its size.
 std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypothesis, const Linearised& point) const {
   std::map<std::string, BasisCoefficients> whole;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
     const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(i)];
     const BasisCoefficients& column = point.columns[static_cast<std::size_t>(i)];
-    if (!u.size || column.size() == 0) continue;
+    if (!u.size || u.log || column.size() == 0) continue;
     BasisCoefficients& own = whole[u.effect];
     if (own.size() == 0) own = BasisCoefficients::Zero(column.rows(), column.cols());
     own += point.at[i] * column;
@@ -279,14 +272,13 @@ std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypot
 
 BasisCoefficients Fitter::shape_error(const Hypothesis& hypothesis, const Linearised& point, double shape) const {
   BasisCoefficients squares = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
-  for (const auto& [effect, own] : changes(hypothesis, point))
-    if (!of_sensor(effect)) squares += shape_of(own, shape).cwiseAbs2();
+  for (const auto& [effect, own] : changes(hypothesis, point)) squares += shape_of(own, shape).cwiseAbs2();
   return squares.cwiseSqrt();
 }
 
 bool Fitter::has_shape(const Hypothesis& hypothesis, const Linearised& point) const {
   return std::ranges::any_of(changes(hypothesis, point),
-                             [&](const auto& own) { return !of_sensor(own.first) && shape_of(own.second, 1).any(); });
+                             [&](const auto& own) { return shape_of(own.second, 1).any(); });
 }
 
 /// Laws of what acts by the place (near surfaces, at a line, in time) differ in more than size: along the functions of the place that this change
@@ -457,11 +449,11 @@ Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iteration
 
 Fit Fitter::alone(const Hypothesis& hypothesis, const Fit& before) const {
   Fitter bare = *this;
-  const auto lines = static_cast<std::ptrdiff_t>(places_.size());
+  // those of no entry come first
   bare.background_.resize(places_.size());
   bare.scaled_.resize(places_.size());
-  bare.entry_.erase(bare.entry_.begin() + lines, bare.entry_.end());
   bare.means_.resize(places_.size());
+  bare.entry_.resize(places_.size());
   bare.tails_.resize(places_.size());
   return bare.improve(hypothesis, before, kMostAlone, &before, true);
 }
