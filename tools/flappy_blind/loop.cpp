@@ -84,6 +84,7 @@ class Loop {
   }
 
  private:
+  static fs::path result_of(const Robot& r) { return r.own / "result.json"; }
   fs::path without() const { return fs::path(command_.out) / "file"; }
 
   /// By what was predicted alone.
@@ -126,7 +127,8 @@ class Loop {
   bool fly() {
     std::vector<const Robot*> open;
     for (const Robot& r : robots_)
-      if (!fs::exists(r.own / "result.json")) open.push_back(&r);
+      if (!fs::exists(result_of(r)) || benchmark::read_json(result_of(r)).at("escapes") != command_.escapes)
+        open.push_back(&r);
     return benchmark::work_through("flying", open.size(), command_.threads, nullptr,
                                    [&](std::size_t i) { fly(*open[i]); });
   }
@@ -145,7 +147,7 @@ class Loop {
       }
       json[kPolicies[p]] = succeeded;
     }
-    io::write_atomically(r.own / "result.json", json.dump(1) + "\n");
+    io::write_atomically(result_of(r), json.dump(1) + "\n");
   }
 
   /// Whether an escape of this number succeeds.
@@ -167,7 +169,7 @@ class Loop {
     std::map<std::string, Row> rows;
     std::string lines = "family,case,part,effects,verdict,named,escapes,as_shipped,file,corrected,seed,draw\n";
     for (const Robot& r : robots_) {
-      const Json json = benchmark::read_json(r.own / "result.json");
+      const Json json = benchmark::read_json(result_of(r));
       const benchmark::Label& label = *r.label;
       const std::string& family = r.of->manifest.family;
       lines += family + "," + std::to_string(label.planned.number) + "," + label.planned.part + "," +
