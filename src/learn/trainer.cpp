@@ -51,6 +51,11 @@ class Trainer {
       if (options_.from) forget_after(updates());
       metrics_.emplace(folder, kColumns, records_);
     }
+    if (options_.init && !options_.from) {  // nothing that is worse becomes the best
+      const auto from = Clock::now();
+      judge();
+      evaluation_s_ += seconds_since(from);
+    }
     publish();
     if (!options_.from) save();  // from now on it can be resumed, whenever it is killed
     if (writes() && !fs::exists(folder / "run.json")) write_start();
@@ -94,19 +99,32 @@ class Trainer {
     return actor;
   }
 
-  void start_from(const policy::Actor& actor) {
+  void start_from(const TrainInit& init) {
     const policy::Actor own = learner_.actor();
-    if (actor.observation != names_.observation || actor.action != names_.action)
+    if (init.actor.observation != names_.observation || init.actor.action != names_.action)
       throw io::InputError("--init: the policy observes or does something else than task " + names_.task +
                            "; accepted: a policy of this task");
-    if (actor.mean != own.mean || actor.scale != own.scale || actor.clip != own.clip)
+    if (init.actor.mean != own.mean || init.actor.scale != own.scale || init.actor.clip != own.clip)
       throw io::InputError(
           "--init: the policy scales its observations in another way; accepted: the same [observation] as its run");
     try {
-      learner_.set_actor(actor);
+      if (init.checkpoint) {
+        const Checkpoint from(*init.checkpoint);
+        load_learner(from);
+        learner_.counters().updates = 0;
+      }
+      learner_.set_actor(init.actor);
     } catch (const std::invalid_argument& e) {
       throw io::InputError("--init: " + std::string(e.what()) + "; accepted: a policy of the same networks");
     }
+  }
+
+  /// std::invalid_argument where the learner has other numbers.
+  void load_learner(const Checkpoint& from) {
+    std::vector<float> numbers = learner_.save();
+    from.get("numbers", numbers);
+    learner_.load(numbers);
+    from.get_bytes("counters", std::as_writable_bytes(std::span(&learner_.counters(), 1)));
   }
 
   static LearnerOptions with_ranks(LearnerOptions options, io::Ranks* ranks) {
@@ -157,9 +175,8 @@ class Trainer {
             std::max(0.0, static_cast<double>(config_.threads) * (learning_s_ + warming_s_) - simulation) / all};
   }
 
-  void evaluate() {
-    const auto from = Clock::now();
-    const double wall = wall_s();
+  /// Flies the policy, and keeps it if it is the best so far.
+  rollout::Summary judge() {
     policy_ = averaged();
     const rollout::Evaluation e =
         evaluator_.fly({std::make_shared<policy::Actor>(policy_), nullptr}, rollout::Detail::success);
@@ -170,6 +187,13 @@ class Trainer {
       best_update_ = updates();
       best_ = policy_;
     }
+    return flown;
+  }
+
+  void evaluate() {
+    const auto from = Clock::now();
+    const double wall = wall_s();
+    const rollout::Summary flown = judge();
     publish();
 
     collector_.share();
@@ -232,7 +256,7 @@ class Trainer {
                                         {"engine", learner_.describe()},
                                         {"config_sha256", config_.sha256},
                                         {"init", options_.init != nullptr},
-                                        {"init_sha256", options_.init_sha256},
+                                        {"init_sha256", options_.init ? options_.init->sha256 : ""},
                                         {"memory_bytes", costs.memory_bytes},
                                         {"disk_bytes", costs.disk_bytes}};
     io::write_atomically(options_.folder / "run.json", run.dump(2) + "\n");
@@ -269,15 +293,12 @@ class Trainer {
       throw io::InputError(from.path().string() + ": is of another configuration than " +
                            (options_.folder / "config").string() + "; accepted: a checkpoint of this run");
     wall_before_s_ = from.header().wall_s;
-    std::vector<float> numbers = learner_.save();
-    from.get("numbers", numbers);
     try {
-      learner_.load(numbers);
+      load_learner(from);
     } catch (const std::invalid_argument& e) {
       throw io::InputError(from.path().string() + ": " + e.what() +
                            "; accepted: a checkpoint of this run, as it was written");
     }
-    from.get_bytes("counters", std::as_writable_bytes(std::span(&learner_.counters(), 1)));
     std::uint64_t size = 0, cursor = 0;
     from.get("replay_size", size);
     from.get("replay_cursor", cursor);
@@ -413,11 +434,20 @@ void refuse_run_in(const fs::path& folder) {
     throw io::InputError(folder.string() + ": holds a run; accepted: a new folder, or --resume " + folder.string());
 }
 
-void refuse_other_run_in(const fs::path& folder, const TrainConfig& config, const std::string& init_sha256) {
+std::shared_ptr<const TrainInit> read_train_init(const fs::path& path) {
+  if (!fs::is_directory(path))
+    return std::make_shared<TrainInit>(policy::read_actor(path), std::nullopt, io::sha256(io::read_text(path)));
+  const Checkpoint newest = newest_checkpoint(path);
+  const fs::path best = path / "best.json";
+  return std::make_shared<TrainInit>(policy::read_actor(best), newest.path(),
+                                     io::sha256(io::read_text(best) + newest.payload_sha256()));
+}
+
+void refuse_other_run_in(const fs::path& folder, const TrainConfig& config, const TrainInit* init) {
   if (!fs::exists(folder / "run.json")) return refuse_run_in(folder);
   const auto run = nlohmann::json::parse(io::read_text(folder / "run.json"), nullptr, false);
   if (!run.is_object() || run.value("config_sha256", "") != config.sha256 ||
-      run.value("init_sha256", "") != init_sha256)
+      run.value("init_sha256", "") != (init != nullptr ? init->sha256 : ""))
     throw io::InputError(folder.string() +
                          ": holds a run of another configuration; accepted: a new folder, or the same options");
 }

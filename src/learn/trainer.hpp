@@ -33,14 +33,25 @@ struct TrainProgress {
   bool evaluated = false;  ///< just now
 };
 
+/// What a run begins with instead of random weights.
+struct TrainInit {
+  policy::Actor actor;
+  /// Critics, and what Adam remembers of every weight; nothing: they begin anew.
+  std::optional<std::filesystem::path> checkpoint;
+  std::string sha256;  ///< of all of it
+};
+
+/// Of a file the actor alone; of a run folder its best actor and what its newest checkpoint knows. io::InputError where one of them
+/// cannot be read.
+std::shared_ptr<const TrainInit> read_train_init(const std::filesystem::path& path);
+
 struct TrainOptions {
   std::filesystem::path folder;
   /// Goes on from this checkpoint; nothing: the run starts.
   std::optional<std::filesystem::path> from;
-  std::string init_sha256;                    ///< of the file of `init`
-  std::shared_ptr<const policy::Actor> init;  ///< starts with this actor
-  io::Ranks* ranks = nullptr;                 ///< that train together; the first writes
-  std::string commit;                         ///< of the program
+  std::shared_ptr<const TrainInit> init;
+  io::Ranks* ranks = nullptr;  ///< that train together; the first writes
+  std::string commit;          ///< of the program
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();  ///< when the process did
   std::function<bool(const TrainProgress&)> keep_going;  ///< asked after each step; false: checkpoint and stop
 };
@@ -70,9 +81,8 @@ struct TrainCosts {
 
 /// io::InputError where a folder holds a run already.
 void refuse_run_in(const std::filesystem::path& folder);
-/// The same, but for a run of this configuration that began with this actor.
-void refuse_other_run_in(const std::filesystem::path& folder, const TrainConfig& config,
-                         const std::string& init_sha256);
+/// The same, but for a run of this configuration that began as this one.
+void refuse_other_run_in(const std::filesystem::path& folder, const TrainConfig& config, const TrainInit* init);
 /// The newest checkpoint of a run that did not reach its end; nothing where there is none.
 std::optional<std::filesystem::path> unfinished_run_in(const std::filesystem::path& folder);
 /// io::InputError where the run folder is taken, a checkpoint does not fit, the disk is full, or learning diverged.

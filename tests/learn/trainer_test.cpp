@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -194,10 +195,10 @@ TEST(Trainer, StartsFromATrainedActor) {
   train_in(first, c);
   TrainOptions o;
   o.folder = second;
-  o.init = std::make_shared<policy::Actor>(policy::read_actor(first / "last.json"));
+  o.init = read_train_init(first / "last.json");
   o.keep_going = [](const TrainProgress&) { return false; };  // before it learns
-  train(c, o);
-  EXPECT_EQ(policy::read_actor(second / "last.json").weights, o.init->weights);
+  EXPECT_GE(train(c, o).best_success.value_or(-1), 0);  // later evaluations have to do better than this
+  EXPECT_EQ(policy::read_actor(second / "last.json").weights, o.init->actor.weights);
 
   // what it knows is not lost to critics that know nothing yet
   const auto learnt = [&](const std::string& actor_after) {
@@ -207,12 +208,12 @@ TEST(Trainer, StartsFromATrainedActor) {
     EXPECT_EQ(train(alone, o).updates, alone.updates);
     return policy::read_actor(o.folder / "last.json").weights;
   };
-  EXPECT_EQ(learnt("learn.actor_after=1000000"), o.init->weights);
-  EXPECT_NE(learnt("learn.actor_after=" + std::to_string(c.updates - 2)), o.init->weights);
+  EXPECT_EQ(learnt("learn.actor_after=1000000"), o.init->actor.weights);
+  EXPECT_NE(learnt("learn.actor_after=" + std::to_string(c.updates - 2)), o.init->actor.weights);
 
-  const auto refused = [&](const std::shared_ptr<policy::Actor>& init, const char* why) {
+  const auto refused = [&](const policy::Actor& init, const char* why) {
     o.folder = fresh("refused");
-    o.init = init;
+    o.init = std::make_shared<TrainInit>(init, std::nullopt, "");
     try {
       train(c, o);
       ADD_FAILURE() << why;
@@ -220,15 +221,52 @@ TEST(Trainer, StartsFromATrainedActor) {
       EXPECT_NE(std::string(e.what()).find(why), std::string::npos) << e.what();
     }
   };
-  auto other = std::make_shared<policy::Actor>(*o.init);
-  other->scale[0] *= 2;
+  policy::Actor other = o.init->actor;
+  other.scale[0] *= 2;
   refused(other, "scales its observations in another way");
-  other->observation[0] = "something";
+  other.observation[0] = "something";
   refused(other, "--init: the policy observes or does something else");
   const TrainConfig wide = small_training({"networks.actor=[8]"});
   const fs::path third = fresh("third");
   train_in(third, wide, [](const TrainProgress&) { return false; });
-  refused(std::make_shared<policy::Actor>(policy::read_actor(third / "last.json")), "of the same networks");
+  refused(policy::read_actor(third / "last.json"), "of the same networks");
+}
+
+TEST(Trainer, StartsFromARunWithItsCritics) {
+  const fs::path first = fresh("first");
+  const TrainConfig c = small_training();
+  train_in(first, c);
+  const auto numbers = [](const fs::path& folder) {
+    std::string bytes = newest_checkpoint(folder).text("numbers");
+    std::vector<float> values(bytes.size() / sizeof(float));
+    std::memcpy(values.data(), bytes.data(), bytes.size());
+    return values;
+  };
+  const std::vector<float> learnt = numbers(first);
+  const auto differing = [&](const fs::path& from) {
+    TrainOptions o;
+    o.folder = fresh("second");
+    o.init = read_train_init(from);
+    o.keep_going = [](const TrainProgress&) { return false; };
+    train(c, o);
+    const std::vector<float> own = numbers(o.folder);
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < own.size(); ++i) n += own[i] != learnt.at(i);
+    return n;
+  };
+  const std::size_t of_actor = 2 * policy::read_actor(first / "best.json").weights.size();  // and of its target
+  EXPECT_LE(differing(first), of_actor);
+  EXPECT_GT(differing(first / "best.json"), 2 * of_actor);
+
+  TrainOptions o;
+  o.folder = fresh("wide");
+  o.init = read_train_init(first);
+  try {
+    train(small_training({"networks.critic=[8]"}), o);
+    ADD_FAILURE() << "other critics";
+  } catch (const io::InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("numbers"), std::string::npos) << e.what();
+  }
 }
 
 TEST(Trainer, RefusesWhatDoesNotFit) {

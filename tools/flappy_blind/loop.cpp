@@ -13,7 +13,6 @@
 #include "io/files.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
-#include "io/sha256.hpp"
 #include "io/toml_writer.hpp"
 #include "learn/trainer.hpp"
 
@@ -68,9 +67,7 @@ class Loop {
         throw io::InputError(folder + ": no robot with something wrong and rich flights; accepted: a benchmark with " +
                              io::joined({std::begin(kParts), std::end(kParts)}));
     }
-    const fs::path shipped = fs::path(command.run) / "best.json";
-    start_ = std::make_shared<policy::Actor>(policy::read_actor(shipped));
-    start_sha256_ = io::sha256(io::read_text(shipped));
+    start_ = learn::read_train_init(command.run);
   }
 
   Json run() {
@@ -113,12 +110,12 @@ class Loop {
     overrides.push_back("vehicle=" + io::toml_string(fs::absolute(vehicle).string()));
     if (threads > 0) overrides.push_back("threads=" + std::to_string(threads));
     const learn::TrainConfig config = learn::read_train_config(command_.train, overrides);
-    learn::refuse_other_run_in(folder, config, start_sha256_);
+    learn::refuse_other_run_in(folder, config, start_.get());
     learn::TrainOptions options;
     options.folder = folder;
     options.from = learn::unfinished_run_in(folder);
     if (fs::exists(folder / "summary.json") && !options.from) return true;
-    options.init = start_, options.init_sha256 = start_sha256_;
+    options.init = start_;
     options.commit = io::commit();
     options.keep_going = [](const learn::TrainProgress&) { return !io::interrupted(); };
     return !learn::train(config, options).stopped;
@@ -212,8 +209,7 @@ class Loop {
   const LoopCommand& command_;
   std::vector<std::unique_ptr<Scored>> scored_;
   std::vector<Robot> robots_;
-  std::shared_ptr<const policy::Actor> start_;
-  std::string start_sha256_;
+  std::shared_ptr<const learn::TrainInit> start_;
 };
 
 }  // namespace

@@ -124,7 +124,7 @@ void train_seeds(io::Program& program, const std::vector<std::uint64_t>& seeds, 
   std::string agreed;
   for (const std::uint64_t seed : seeds) {
     const TrainConfig config = config_of(seed);
-    refuse_other_run_in(folder_of(seed), config, options.init_sha256);
+    refuse_other_run_in(folder_of(seed), config, options.init.get());
     agreed += "configuration: " + config.sha256 + "\n";
   }
   io::Ranks* const ranks = program.ranks(agreed);
@@ -178,7 +178,7 @@ int main(int argc, char** argv) {
       app.option("--resume", resume, "run folder to go on with, from its newest checkpoint").excludes(placed);
   app.option("--seeds", seeds, "several runs: 0-4; writes their learning curve").excludes(resumed);
   app.option("--from", from, "another checkpoint of that folder").needs(resumed);
-  app.option("--init", init, "actor, or run folder whose best one, to start with").excludes(resumed);
+  app.option("--init", init, "what to start with: a run folder (its best actor and its critics), or an actor alone").excludes(resumed);
   app.option("--threads", threads, "0: all").range(0, 1024);
   app.option("--set", overrides, "override a key: learn.updates=1000, task.reward.goal=1")
       .one_at_a_time()
@@ -193,7 +193,7 @@ int main(int argc, char** argv) {
     options.started = train::started;
     const auto train_it = [&](const learn::TrainConfig& config) {
       if (!options.from) learn::refuse_run_in(options.folder);  // on all ranks, before they meet
-      std::string agreed = "configuration: " + config.sha256 + "\ninit: " + options.init_sha256 + "\n";
+      std::string agreed = "configuration: " + config.sha256 + "\ninit: " + (options.init ? options.init->sha256 : "") + "\n";
       if (options.from) agreed += "checkpoint: " + learn::Checkpoint(*options.from).payload_sha256() + "\n";
       // LibTorch's replicas step each on their own
       if (config.engine == learn::EngineKind::libtorch) agreed += "processor: " + learn::processor() + "\n";
@@ -211,11 +211,7 @@ int main(int argc, char** argv) {
       options.from = from.empty() ? learn::newest_checkpoint(resume).path() : fs::path(resume) / from;
       return train_it(config);
     }
-    if (!init.empty()) {
-      const fs::path file = fs::is_directory(init) ? fs::path(init) / "best.json" : fs::path(init);
-      options.init = std::make_shared<policy::Actor>(policy::read_actor(file));
-      options.init_sha256 = io::sha256(io::read_text(file));
-    }
+    if (!init.empty()) options.init = learn::read_train_init(init);
     const fs::path folder = out.empty() ? fs::path("runs") / fs::path(config_name).stem() : fs::path(out);
     if (seeds.empty()) {
       options.folder = folder;
