@@ -290,6 +290,19 @@ TEST(FamilyBEscape, HandsBackAndCaptures) {
   EXPECT_FALSE(fly_escape(assignment(), 0, r, 0.6).success);
 }
 
+TEST(FamilyBEscape, MayTurnOver) {
+  EscapeAssignment r = rules();
+  r.policy = [](const std::vector<double>&) { return std::array<double, 4>{0, 3, 3.5, 0}; };
+  r.hand_back_at_s = 1;
+  r.keep_until_s = 0.3;
+  const FamilyEscape flown = fly_escape(assignment(), 0, r, 0.6);
+  double least_up = 1;
+  for (std::size_t i = 0; i < flown.log.mocap.t_s.size(); ++i)
+    least_up = std::min(least_up, 1 - 2 * (std::pow(flown.log.mocap.qx[i], 2) + std::pow(flown.log.mocap.qy[i], 2)));
+  EXPECT_LT(least_up, -0.5);
+  EXPECT_FALSE(flown.crashed);
+}
+
 TEST(FamilyB, RefusesWhatItCannotDo) {
   const std::unique_ptr<Family> family = make_family_b();
   EXPECT_EQ(family->name(), "b");

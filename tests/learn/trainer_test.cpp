@@ -197,7 +197,7 @@ TEST(Trainer, StartsFromATrainedActor) {
   o.folder = second;
   o.init = read_train_init(first / "last.json");
   o.keep_going = [](const TrainProgress&) { return false; };  // before it learns
-  EXPECT_GE(train(c, o).best_success.value_or(-1), 0);  // later evaluations have to do better than this
+  EXPECT_GE(train(c, o).best_success.value_or(-1), 0);        // later evaluations have to do better than this
   EXPECT_EQ(policy::read_actor(second / "last.json").weights, o.init->actor.weights);
 
   // what it knows is not lost to critics that know nothing yet

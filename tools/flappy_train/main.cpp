@@ -178,7 +178,8 @@ int main(int argc, char** argv) {
       app.option("--resume", resume, "run folder to go on with, from its newest checkpoint").excludes(placed);
   app.option("--seeds", seeds, "several runs: 0-4; writes their learning curve").excludes(resumed);
   app.option("--from", from, "another checkpoint of that folder").needs(resumed);
-  app.option("--init", init, "what to start with: a run folder (its best actor and its critics), or an actor alone").excludes(resumed);
+  app.option("--init", init, "what to start with: a run folder (its best actor and its critics), or an actor alone")
+      .excludes(resumed);
   app.option("--threads", threads, "0: all").range(0, 1024);
   app.option("--set", overrides, "override a key: learn.updates=1000, task.reward.goal=1")
       .one_at_a_time()
@@ -193,7 +194,8 @@ int main(int argc, char** argv) {
     options.started = train::started;
     const auto train_it = [&](const learn::TrainConfig& config) {
       if (!options.from) learn::refuse_run_in(options.folder);  // on all ranks, before they meet
-      std::string agreed = "configuration: " + config.sha256 + "\ninit: " + (options.init ? options.init->sha256 : "") + "\n";
+      std::string agreed =
+          "configuration: " + config.sha256 + "\ninit: " + (options.init ? options.init->sha256 : "") + "\n";
       if (options.from) agreed += "checkpoint: " + learn::Checkpoint(*options.from).payload_sha256() + "\n";
       // LibTorch's replicas step each on their own
       if (config.engine == learn::EngineKind::libtorch) agreed += "processor: " + learn::processor() + "\n";

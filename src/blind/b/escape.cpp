@@ -120,7 +120,7 @@ FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAss
         }
       }
     }
-    const std::string how = flown.tick(beat);
+    const std::string how = flown.tick(beat, true);  // an escape is a somersault
     if (!how.empty()) {
       out.crashed = true;
       break;

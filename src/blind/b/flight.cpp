@@ -49,7 +49,7 @@ Beat Radio::arrived(const Beat& sent, double now) {
   return last_;
 }
 
-std::string Flight::tick(const Beat& sent) {
+std::string Flight::tick(const Beat& sent, bool may_tumble) {
   const double now = time_s();
   const Figures& f = robot_.plant().figures();
   const std::array<double, 2> logged = waveform(f, sent, now + trim_s_);
@@ -79,7 +79,7 @@ std::string Flight::tick(const Beat& sent) {
   }
   ++ticks_;
   observer_.tick(sensors_, time_s());
-  return robot_.crash();
+  return robot_.crash(may_tumble);
 }
 
 flightlog::FlightLog Flight::log(double end_s) const {

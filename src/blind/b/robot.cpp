@@ -186,7 +186,7 @@ Felt Robot::felt_now() const {
   return feels;
 }
 
-std::string Robot::crash() const {
+std::string Robot::crash(bool may_tumble) const {
   const Figures& f = plant_.figures();
   for (const double x : x_)
     if (!std::isfinite(x) || std::abs(x) > 1e6) return "its motion ran away";
@@ -194,7 +194,7 @@ std::string Robot::crash() const {
   if (x_[2] - f.below_m < room_.ground_z_m) return "it struck the ground";
   if (x_[2] + f.above_m > room_.ceiling_z_m) return "it struck the ceiling";
   if (x_[1] + f.around_m > room_.wall_y_m) return "it struck the wall";
-  if (up < -0.2) return "it turned over";
+  if (!may_tumble && up < -0.2) return "it turned over";
   return {};
 }
 

@@ -69,7 +69,7 @@ class Robot {
   /// Voltage at a motor during the last step.
   const std::array<double, 2>& voltage_V() const { return applied_; }
   /// How it crashed; empty where it flies.
-  std::string crash() const;
+  std::string crash(bool may_tumble) const;
 
  private:
   void advance_slow();
