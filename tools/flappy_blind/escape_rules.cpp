@@ -46,6 +46,8 @@ ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& conf
   };
 }
 
+constexpr double kAnywhere = 1e3;
+
 /// A limit whose cosine is -2 is none.
 double angle(double cosine) { return std::acos(std::max(-1.0, cosine)); }
 
@@ -69,6 +71,19 @@ EscapeRules read_escape_rules(const fs::path& policy, const fs::path& config_fil
                          "that stands still and a success");
   const flight::FlightConstants k = flight::flight_constants(fleet);
   return {fleet.task, k.task, k.controller.of<flight::PidController>(), policy_of(policy, config)};
+}
+
+EscapeRules hover_rules(EscapeRules r) {
+  flight::StartRange& start = r.task.start;
+  for (flight::Spread& s : start.position_m) s = {};
+  for (flight::Spread& s : start.rotation_rad) s = {};
+  start.x_low_m = -kAnywhere, start.x_high_m = kAnywhere;
+  r.policy = [](const std::vector<double>&) { return std::array<double, flight::kMaxActions>{}; };
+  r.constants.hand_back.at_s = kControl_s;
+  flight::Success<double>& s = r.constants.success;
+  s.distance_m = s.keep_distance_m, s.speed_m_s = s.body_rate_rad_s = kAnywhere;
+  s.tilt_cos = s.keep_tilt_cos, s.heading_cos = s.keep_heading_cos;
+  return r;
 }
 
 EscapeAssignment escape_assignment(const EscapeRules& r) {

@@ -56,13 +56,20 @@ struct Robot {
 class Loop {
  public:
   explicit Loop(const LoopCommand& command) : command_(command) {
+    const EscapeRules hover = hover_rules(read_escape_rules(fs::path(command.run) / "best.json", command.config));
     for (const std::string& folder : command.folders) {
       const Scored& s = *scored_.emplace_back(std::make_unique<Scored>(folder));
       std::size_t robots = 0;
-      for (const auto& [number, label] : s.labels)
-        if (command.robots == 0 || robots++ < command.robots)
-          robots_.push_back({&s, &label, s.prediction(number),
-                             command.out / fs::path(s.manifest.family + "_" + benchmark::number_text(number))});
+      for (const auto& [number, label] : s.labels) {
+        if (command.robots > 0 && robots == command.robots) break;
+        if (!escapes_of(s.manifest.family, label.robot(s.manifest.vehicle), hover)(0)) {
+          ++unsteady_[s.manifest.family];
+          continue;
+        }
+        ++robots;
+        robots_.push_back({&s, &label, s.prediction(number),
+                           command.out / fs::path(s.manifest.family + "_" + benchmark::number_text(number))});
+      }
       if (s.labels.empty())
         throw io::InputError(folder + ": no robot with something wrong and rich flights; accepted: a benchmark with " +
                              io::joined({std::begin(kParts), std::end(kParts)}));
@@ -200,6 +207,9 @@ class Loop {
       all[family] = {{"robots", row.robots},   {"better", row.better}, {"worse", row.worse},
                      {"as_shipped", share(0)}, {"file", share(1)},     {"corrected", share(2)}};
     }
+    text += "\nleft out, for they do not hover at the goal for three seconds without a policy:";
+    for (const auto& [family, count] : unsteady_) text += " " + family + " " + std::to_string(count);
+    text += unsteady_.empty() ? " none\n" : "\n";
     std::fputs(text.c_str(), stdout);
     io::write_atomically(fs::path(command_.out) / "loop.csv", lines);
     io::write_atomically(fs::path(command_.out) / "loop.md", text);
@@ -209,6 +219,7 @@ class Loop {
   const LoopCommand& command_;
   std::vector<std::unique_ptr<Scored>> scored_;
   std::vector<Robot> robots_;
+  std::map<std::string, std::size_t> unsteady_;  ///< by family, how many do not hover as the escape's end wants it
   std::shared_ptr<const learn::TrainInit> start_;
 };
 

@@ -160,6 +160,7 @@ class Diagnoser {
     if (!robot_.evidence().discrepancy().spread.beside_all) share_backgrounds(d.hypotheses);
     set_probabilities(d.hypotheses, rule_);
     d.conclusion = conclude(d.hypotheses, rule_);
+    if (within_the_beat()) fly_the_likeliest(d.hypotheses, d.conclusion);
     const ScoredHypothesis& answer = flown(d);
     const Hypothesis h(uncertain_, answer.effects);
     d.sensors = answer.fitted() ? robot_.sensors(h, answer.fit) : robot_.sensors(plain, parameters_);

@@ -34,7 +34,7 @@ struct ScoredHypothesis {
   /// Of effects that act by the place: where most otherwise than their entries say; none: as these say, up to what any law may be off.
   std::optional<Term> otherwise;
   Residuals left;  ///< of an effect that was fitted: in each flight what is left with the fit to the others
-  /// Effects of the hypothesis whose fit explains most of this one; beyond its own they are in it as what any robot may have. Empty: its own.
+  /// Effects of the hypothesis whose fit flies this one; those beyond its own are not told from chance. Empty: its own.
   std::vector<std::string> flown_with;
   bool fitted() const { return !fit.point.residual.empty(); }
 };

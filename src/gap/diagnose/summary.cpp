@@ -152,7 +152,7 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
                                       place_of(*r.otherwise).c_str(), r.otherwise->regime.c_str(),
                                       r.otherwise->function.c_str()));
   if (!r.background.empty()) {
-    lines.push_back("besides, in the corrected vehicle, no more than any robot may have:");
+    lines.push_back("besides, in the corrected vehicle, not told from chance:");
     for (std::size_t i = 0; i < r.background.size() && i < kBackground; ++i)
       lines.push_back(size_line(r.background[i]));
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "model/effects/registry.hpp"
 
@@ -110,6 +111,17 @@ Conclusion conclude(const std::vector<ScoredHypothesis>& hypotheses, const Verdi
       if (!std::ranges::count(c.effects, e)) c.effects.push_back(e);
   }
   return c;
+}
+
+void fly_the_likeliest(std::vector<ScoredHypothesis>& hypotheses, const Conclusion& conclusion) {
+  ScoredHypothesis& concluded = hypotheses[conclusion.hypothesis];
+  if (concluded.kind == ScoredHypothesis::Kind::none) return;
+  const auto names = [](const ScoredHypothesis& a) { return std::set(a.effects.begin(), a.effects.end()); };
+  double most = concluded.log_evidence;
+  for (const ScoredHypothesis& a : hypotheses)
+    if (a.fitted() && a.terms.empty() == concluded.terms.empty() && a.log_evidence > most &&
+        std::ranges::includes(names(a), names(concluded)))
+      most = a.log_evidence, concluded.flown_with = a.effects;
 }
 
 }  // namespace flappy::gap

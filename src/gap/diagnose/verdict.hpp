@@ -29,6 +29,10 @@ void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictR
 /// effects are of the same groups. Of a pool the most probable set is named where it holds half of everything or four fifths of its
 /// pool; otherwise the pool is, and its verdict is `group`.
 Conclusion conclude(const std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule);
+
+/// What was concluded is flown with further effects where these explain more, by evidence and prior (ScoredHypothesis::flown_with): chance
+/// speaks against a name, not against a vehicle that predicts better.
+void fly_the_likeliest(std::vector<ScoredHypothesis>& hypotheses, const Conclusion& conclusion);
 const char* kind_name(Conclusion::Kind kind);
 const char* kind_name(ScoredHypothesis::Kind kind);
 

@@ -178,6 +178,27 @@ TEST(Verdict, FliesABackgroundBesideItsEffects) {
   EXPECT_EQ(&flown(d), &d.hypotheses[2]);
 }
 
+// What chance forbids to name is flown where it explains more than what was concluded.
+TEST(Verdict, FliesWhatExplainsMost) {
+  const auto concluded_of = [](std::size_t concluded) {
+    Diagnosis d;
+    d.hypotheses = {hypothesis(0.5, ScoredHypothesis::Kind::parameters), hypothesis(0.2, {"wind"}),
+                    hypothesis(0.2, {"wind", "tether"}), hypothesis(0.05, {"gyro_bias"}),
+                    hypothesis(0.05, ScoredHypothesis::Kind::none)};
+    const double nats[] = {-10, -8, -9, -7, -20};
+    for (std::size_t i = 0; i < 5; ++i) d.hypotheses[i].log_evidence = nats[i];
+    for (const std::size_t i : {1, 2}) d.hypotheses[i].fit.point.residual.emplace_back();
+    d.conclusion.hypothesis = concluded;
+    fly_the_likeliest(d.hypotheses, d.conclusion);
+    return d.hypotheses[concluded].flown_with;
+  };
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(concluded_of(0), Names{"wind"}) << "gyro_bias was not fitted";
+  EXPECT_EQ(concluded_of(1), Names{}) << "more effects explain less";
+  EXPECT_EQ(concluded_of(2), Names{}) << "what was named stays";
+  EXPECT_EQ(concluded_of(4), Names{}) << "no gap";
+}
+
 TEST(Report, UnitsAreThoseOfTheNames) {
   const std::pair<const char*, const char*> kExpected[] = {{"x_m", "m"},
                                                            {"delay_s", "s"},
@@ -238,7 +259,7 @@ TEST(Report, SaysWhatToDoInThirtyLines) {
   EXPECT_NE(text.find("wind.x_m_s"), std::string::npos);
   EXPECT_NE(text.find("0.3 (0.1 to 0.5) m/s\n"), std::string::npos);
   EXPECT_NE(text.find("runners-up: tether 0.2"), std::string::npos) << text;
-  EXPECT_NE(text.find("no more than any robot may have:\n  spring_hardening.per_rad2                 -0.02 (-0.03 to "),
+  EXPECT_NE(text.find("not told from chance:\n  spring_hardening.per_rad2                 -0.02 (-0.03 to "),
             std::string::npos)
       << text;
   EXPECT_NE(
