@@ -68,6 +68,19 @@ class Benchmark : public testing::Test {
     return make_bench(c);
   }
 
+  /// Two robots of a part as make() leaves them, flown once for all tests.
+  void copy_two(const std::string& part = "singles") const {
+    const fs::path kept = made_ / part;
+    if (!fs::exists(kept)) {
+      ASSERT_TRUE(make(2, part));
+      fs::create_directories(made_);
+      fs::copy(root_ / "bench", kept, fs::copy_options::recursive);
+    } else {
+      fs::copy(kept, root_ / "bench", fs::copy_options::recursive);
+    }
+  }
+  static void TearDownTestSuite() { fs::remove_all(made_); }
+
   /// Says ground effect, whatever it is asked, unless it may not.
   ScoreCommand command() {
     ScoreCommand c;
@@ -93,12 +106,13 @@ class Benchmark : public testing::Test {
     return c;
   }
 
+  static inline const fs::path made_ = fs::path(testing::TempDir()) / ("blind_made_" + std::to_string(getpid()));
   fs::path root_;
   std::atomic<int> asked_ = 0;
 };
 
 TEST_F(Benchmark, PredictsSealsAndScores) {
-  ASSERT_TRUE(make(2));
+  copy_two();
   const fs::path bench = root_ / "bench";
   EXPECT_FALSE(fs::exists(bench / "sealed" / "0001.json")) << "labels stand in the sealed file alone";
   EXPECT_EQ(io::read_text(bench / "manifest.json").find("ground_effect"), std::string::npos);
@@ -156,7 +170,7 @@ TEST_F(Benchmark, PredictsSealsAndScores) {
 // Of two robots, each of which is said to have ground effect by 40 nats and ceiling effect by 30, one has the one and one the other: ten
 // nats are worth next to nothing.
 TEST_F(Benchmark, LearnsWhatANatIsWorth) {
-  ASSERT_TRUE(make(2));
+  copy_two();
   CalibrateCommand calibrated{.folders = {root_ / "bench"}, .out = root_ / "verdict.toml"};
   EXPECT_TRUE(test::refusal([&] {
                 calibrate(calibrated);
@@ -181,7 +195,7 @@ TEST_F(Benchmark, LearnsWhatANatIsWorth) {
 }
 
 TEST_F(Benchmark, OpensLabelsOnceAllPredictionsAreSealed) {
-  ASSERT_TRUE(make(2));
+  copy_two();
   const fs::path labels = root_ / "bench/sealed/labels.json";
   fs::remove(labels);
   EXPECT_TRUE(test::refusal([&] { score_bench(command()); }).starts_with(labels.string()));
@@ -190,7 +204,7 @@ TEST_F(Benchmark, OpensLabelsOnceAllPredictionsAreSealed) {
 }
 
 TEST_F(Benchmark, GoesOnWhereItWasStopped) {
-  ASSERT_TRUE(make(2, "none"));
+  copy_two("none");
   ScoreCommand c = command();
   const Predictor whole = c.predictor;
   c.threads = 1;
@@ -206,7 +220,7 @@ TEST_F(Benchmark, GoesOnWhereItWasStopped) {
 }
 
 TEST_F(Benchmark, TakesNoPredictionOnceLabelsAreOpen) {
-  ASSERT_TRUE(make(2));
+  copy_two();
   ScoreCommand c = command();
   const Predictor whole = c.predictor;
   c.threads = 1;
@@ -341,19 +355,19 @@ TEST_F(Benchmark, SealsWhereEffectsActAndWhatTheFileDeclares) {
 }
 
 TEST_F(Benchmark, ScoresSeveralFoldersTogether) {
-  ASSERT_TRUE(make(1));
+  copy_two();
   fs::rename(root_ / "bench", root_ / "first");
-  ASSERT_TRUE(make(1, "none"));
+  copy_two("none");
   ScoreCommand c = command();
   c.folders.push_back(root_ / "first");
   c.out = root_ / "out";
   const nlohmann::ordered_json json = score_bench(c);
-  EXPECT_EQ(json.at("cases"), 2);
+  EXPECT_EQ(json.at("cases"), 4);
   EXPECT_EQ(json.at("group_top1"), 1.0) << "ground effect, said of the ceiling's";
   EXPECT_EQ(json.at("false_alarm_none"), 1.0);
-  EXPECT_EQ(json.at("families").at("a").at("cases"), 2);
+  EXPECT_EQ(json.at("families").at("a").at("cases"), 4);
   const std::string list = io::read_text(root_ / "out/score.csv");
-  EXPECT_EQ(std::ranges::count(list, '\n'), 3);
+  EXPECT_EQ(std::ranges::count(list, '\n'), 5);
 }
 
 // Robots of every family follow a flight that is proposed: half a metre along x and a quarter of a turn in two seconds, and hold there.
