@@ -37,13 +37,4 @@ void parallel_for(std::size_t count, int threads, const Job& job) {
   });
 }
 
-/// The same for few long jobs with loops of their own: what does not go into whole rounds of all threads is called one after another, and
-/// its loops have all threads.
-template <class Job>
-void parallel_rounds(std::size_t count, int threads, const Job& job) {
-  const std::size_t whole = count - count % static_cast<std::size_t>(thread_count(threads));
-  parallel_for(whole, threads, job);
-  for (std::size_t i = whole; i < count; ++i) job(i);
-}
-
 }  // namespace flappy::io

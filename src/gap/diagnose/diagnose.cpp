@@ -68,13 +68,13 @@ class Diagnoser {
     if (progress(0.4, "fitting effects")) {
       // also those that promise nothing: beside parameters that make up for an effect, a line sees nothing of it
       std::vector<ScoredHypothesis> fits(finalists.size());
-      io::parallel_rounds(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}); });
+      io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fit_effects({finalists[i]}); });
       std::vector<std::size_t> order(fits.size());
       std::iota(order.begin(), order.end(), std::size_t{0});
       std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) { return fits[i].log_evidence; });
       order.resize(std::min(order.size(), kFreely));
-      io::parallel_rounds(order.size(), threads_,
-                          [&](std::size_t i) { move_parameters({finalists[order[i]]}, fits[order[i]]); });
+      io::parallel_for(order.size(), threads_,
+                       [&](std::size_t i) { move_parameters({finalists[order[i]]}, fits[order[i]]); });
       for (std::size_t i = 0; i < fits.size(); ++i)
         // a fit that flew to where less is explained than a line from the parameters promises found nothing
         if (vanished(fits[i]) || fits[i].log_evidence < leave_open(finalists[i]).log_evidence)
@@ -102,7 +102,7 @@ class Diagnoser {
         further.resize(std::min(further.size(), evidence_.discrepancy().spread.beside_all ? 1 : kFurther));
         std::vector<ScoredHypothesis> more(further.size());
         std::vector<std::vector<Screened>> sets(further.size(), screened_of(best));
-        io::parallel_rounds(more.size(), threads_, [&](std::size_t i) {
+        io::parallel_for(more.size(), threads_, [&](std::size_t i) {
           sets[i].push_back(further[i]);
           more[i] = fit_effects(sets[i]);
         });
@@ -131,7 +131,7 @@ class Diagnoser {
            explained(singles[asked]) >= plain_)
       ++asked;
     std::vector<ScoredHypothesis> remainders(asked);
-    io::parallel_rounds(asked, threads_, [&](std::size_t i) {
+    io::parallel_for(asked, threads_, [&](std::size_t i) {
       remainders[i] = explain_freely(Hypothesis(uncertain_, singles[i].effects), singles[i].fit.point, 0);
     });
     for (std::size_t i = 0; i < asked; ++i) {
