@@ -38,7 +38,7 @@ class Trainer {
         evaluator_(rollout::unwatched(config.fly),
                    {config.evaluate_vehicles, rollout::kValidationFlappers, 1024, options.ranks}),
         collector_(config, options.ranks) {
-    if (options.init) start_from(*options.init);
+    if (options.init && !options.from) start_from(*options.init);
     actor_ = std::make_shared<policy::Actor>(named(learner_.actor()));
     average_ = actor_->weights;
   }

@@ -46,7 +46,8 @@ ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& conf
   };
 }
 
-constexpr double kAnywhere = 1e3;
+/// In m, m/s and rad/s: beyond what any robot does.
+constexpr double kUnbounded = 1e3;
 
 /// A limit whose cosine is -2 is none.
 double angle(double cosine) { return std::acos(std::max(-1.0, cosine)); }
@@ -77,11 +78,11 @@ EscapeRules hover_rules(EscapeRules r) {
   flight::StartRange& start = r.task.start;
   for (flight::Spread& s : start.position_m) s = {};
   for (flight::Spread& s : start.rotation_rad) s = {};
-  start.x_low_m = -kAnywhere, start.x_high_m = kAnywhere;
+  start.x_low_m = -kUnbounded, start.x_high_m = kUnbounded;
   r.policy = [](const std::vector<double>&) { return std::array<double, flight::kMaxActions>{}; };
   r.constants.hand_back.at_s = kControl_s;
   flight::Success<double>& s = r.constants.success;
-  s.distance_m = s.keep_distance_m, s.speed_m_s = s.body_rate_rad_s = kAnywhere;
+  s.distance_m = s.keep_distance_m, s.speed_m_s = s.body_rate_rad_s = kUnbounded;
   s.tilt_cos = s.keep_tilt_cos, s.heading_cos = s.keep_heading_cos;
   return r;
 }

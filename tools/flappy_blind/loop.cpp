@@ -56,6 +56,7 @@ struct Robot {
 class Loop {
  public:
   explicit Loop(const LoopCommand& command) : command_(command) {
+    start_ = learn::read_train_init(command.run);
     const EscapeRules hover = hover_rules(read_escape_rules(fs::path(command.run) / "best.json", command.config));
     for (const std::string& folder : command.folders) {
       const Scored& s = *scored_.emplace_back(std::make_unique<Scored>(folder));
@@ -74,7 +75,6 @@ class Loop {
         throw io::InputError(folder + ": no robot with something wrong and rich flights; accepted: a benchmark with " +
                              io::joined({std::begin(kParts), std::end(kParts)}));
     }
-    start_ = learn::read_train_init(command.run);
   }
 
   Json run() {

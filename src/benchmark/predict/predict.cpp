@@ -32,7 +32,9 @@ Prediction predict(const Question& q) {
   uncertain.set_minors(d.minors);
   const gap::Report r = verdict_report_of(flights, uncertain, d);
   Prediction p;
-  p.corrected = model::vehicle_text(corrected_vehicle(vehicle, d, uncertain));
+  model::Vehicle corrected = corrected_vehicle(vehicle, d, uncertain);
+  corrected.posterior.reset();  // long, and nobody asks for it here
+  p.corrected = model::vehicle_text(corrected);
   for (const gap::ScoredHypothesis& a : d.hypotheses)
     p.weights.push_back({kind_name(a.kind), a.effects,
                          a.kind == gap::ScoredHypothesis::Kind::effect && !a.terms.empty(), a.log_evidence,
