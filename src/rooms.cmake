@@ -4,8 +4,8 @@ target_compile_options(flappy_options INTERFACE
   -ffp-contract=off -fno-math-errno -fno-trapping-math
   -Wall -Wextra -Wpedantic -Wconversion -Wno-sign-conversion -Wshadow -Wno-missing-field-initializers -Werror)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  # false alarm of gcc 12 on string concatenation (gcc bug 105651)
-  target_compile_options(flappy_options INTERFACE -Wno-restrict)
+  # false alarms of gcc 12 on string concatenation (gcc bug 105651), and of types in one of the sources that a unity build joins
+  target_compile_options(flappy_options INTERFACE -Wno-restrict -Wno-subobject-linkage)
 endif()
 
 # A folder is a room, and a room is a static library; headers are included from src/ and include/. Its sources are all of the
@@ -106,5 +106,6 @@ function(flappy_simulator suffix)
 
   foreach(room IN ITEMS model sim flight lanes)
     target_compile_options(flappy_${room}${suffix} PRIVATE ${ARGN})
+    set_target_properties(flappy_${room}${suffix} PROPERTIES UNITY_BUILD OFF)  # their bits are those of each source for itself
   endforeach()
 endfunction()

@@ -40,7 +40,7 @@ struct Found {
   Shown where;  ///< at size 1
 };
 
-std::string rounded(double x) {
+std::string three_digits(double x) {
   char text[24];
   std::snprintf(text, sizeof text, "%.3g", x);
   return text;
@@ -253,7 +253,7 @@ Json run_detectability(const DetectabilityCommand& command) {
                      command.out + "\n# commit " + io::commit() +
                      "\n#\n"
                      "# detectable    an effect of this size changes a channel's mean or harmonic by " +
-                     rounded(100 * kShare) +
+                     three_digits(100 * kShare) +
                      " % beyond what figures and lateness take over\n"
                      "#               (src/benchmark/detectability.hpp); median of robots; 1 where it acts on "
                      "sensors alone\n"
@@ -267,9 +267,9 @@ Json run_detectability(const DetectabilityCommand& command) {
     std::printf("%-30s %10.3g %8.3g %8.3g %8.3g  %s%s\n", effects[e].id.c_str(), s.detectable, s.low, s.high, s.hover,
                 shows(s).c_str(), s.undetectable ? "; undetectable" : "");
     text += "\n[" + effects[e].id + "]\n";
-    if (!s.undetectable) text += "detectable = " + rounded(s.detectable) + "\n";
-    text +=
-        std::string("undetectable = ") + (s.undetectable ? "true" : "false") + "\nhover = " + rounded(s.hover) + "\n";
+    if (!s.undetectable) text += "detectable = " + three_digits(s.detectable) + "\n";
+    text += std::string("undetectable = ") + (s.undetectable ? "true" : "false") +
+            "\nhover = " + three_digits(s.hover) + "\n";
     all[effects[e].id] = {{"detectable", s.undetectable ? Json(nullptr) : Json(s.detectable)},
                           {"undetectable", s.undetectable},
                           {"hover", s.hover},

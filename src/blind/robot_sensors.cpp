@@ -1,16 +1,10 @@
 #include "blind/robot_sensors.hpp"
 
 namespace flappy::blind {
-namespace {
-
-double square(double x) { return x * x; }
-
-}  // namespace
-
 double bandwidth_hz(double interval_s, double low_pass_hz) {
   const auto passes = [&](double hz) {
-    const double x = kPi * hz * interval_s;
-    return sin_cos(x).sin / x / std::sqrt(1 + square(hz / low_pass_hz));
+    const double x = kPi * hz * interval_s, ratio = hz / low_pass_hz;
+    return sin_cos(x).sin / x / std::sqrt(1 + ratio * ratio);
   };
   double low = 0, high = 1 / interval_s;
   for (int i = 0; i < 60; ++i) {

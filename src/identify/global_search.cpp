@@ -27,7 +27,7 @@ struct Exchange {
   }
 };
 
-struct Problem {
+struct Exchanged {
   Exchange* exchange = nullptr;
   std::size_t dimensions = 0;
 
@@ -66,7 +66,7 @@ SearchResult search(Search method, const BatchCost& cost, const Point& start, co
   Exchange exchange;
   exchange.cost = cost;
   const auto seed = static_cast<unsigned>(options.seed);
-  const pagmo::problem problem{Problem{&exchange, start.size()}};
+  const pagmo::problem problem{Exchanged{&exchange, start.size()}};
   pagmo::population population(problem, pagmo::bfe{pagmo::member_bfe{}}, options.population - 1, seed);
   population.push_back(start, exchange.evaluate({start}));
   pagmo::algorithm algorithm = algorithm_of(method, seed);

@@ -26,7 +26,7 @@ void flappy_loaded_step(const float *observation, float *action) { flappy_policy
 int flappy_loaded_selftest(void) { return flappy_policy_selftest(); }
 )";
 
-[[noreturn]] void refuse(const fs::path& header, const std::string& what, const std::string& accepted) {
+[[noreturn]] void refuse_header(const fs::path& header, const std::string& what, const std::string& accepted) {
   throw io::InputError(header.string() + ": " + what + "; accepted: " + accepted);
 }
 
@@ -39,7 +39,7 @@ std::string compile(const fs::path& header, const fs::path& source, const fs::pa
                                            source.string(), "-o", library.string(), "-lm"});
     return finished.exit_code == 0 ? "" : finished.err + "\n";
   } catch (const std::system_error& e) {
-    refuse(header, "cannot be compiled: cc: " + e.code().message(), "a C compiler of this name in PATH");
+    refuse_header(header, "cannot be compiled: cc: " + e.code().message(), "a C compiler of this name in PATH");
   }
 }
 
@@ -88,18 +88,19 @@ std::unique_ptr<const Policy> load_header(const fs::path& path, int observations
   if (loaded == nullptr) {
     std::string why = dlerror();
     if (why.starts_with(library.string() + ": ")) why.erase(0, library.string().size() + 2);
-    refuse(header, "cannot be loaded: " + why, "a header that defines all it calls");
+    refuse_header(header, "cannot be loaded: " + why, "a header that defines all it calls");
   }
   const auto number = [&](const char* name) { return *static_cast<const int*>(dlsym(loaded, name)); };
   auto policy = std::make_unique<Header>(loaded, number("flappy_loaded_observations"), number("flappy_loaded_actions"),
                                          reinterpret_cast<Header::Step>(dlsym(loaded, "flappy_loaded_step")));
   if (policy->observations() != observations || policy->actions() != actions)
-    refuse(header,
-           "has " + std::to_string(policy->observations()) + " inputs and " + std::to_string(policy->actions()) +
-               " outputs",
-           std::to_string(observations) + " and " + std::to_string(actions) + ", as the task has");
+    refuse_header(header,
+                  "has " + std::to_string(policy->observations()) + " inputs and " + std::to_string(policy->actions()) +
+                      " outputs",
+                  std::to_string(observations) + " and " + std::to_string(actions) + ", as the task has");
   const int failed = reinterpret_cast<int (*)()>(dlsym(loaded, "flappy_loaded_selftest"))();
-  if (failed != 0) refuse(header, "fails its self-test: " + std::to_string(failed), "flappy_policy_selftest() of 0");
+  if (failed != 0)
+    refuse_header(header, "fails its self-test: " + std::to_string(failed), "flappy_policy_selftest() of 0");
   return policy;
 }
 
@@ -116,7 +117,7 @@ const TorchFunctions& torch() {
 std::unique_ptr<const Policy> load_policy(const fs::path& path, int observations, int actions) {
   if (path.extension() == ".pt") return load_torch_script(path, observations, actions);
   if (path.extension() == ".h") return load_header(path, observations, actions);
-  refuse(path, "is no policy", "a TorchScript file (.pt) or a C header (.h)");
+  refuse_header(path, "is no policy", "a TorchScript file (.pt) or a C header (.h)");
 }
 
 bool reads_torch_script() { return io::has_plugin(kPlugin); }
@@ -129,8 +130,8 @@ std::string torch_script(const PolicyNetwork& network, const std::string& contra
 std::unique_ptr<const Policy> load_torch_script(const fs::path& path, int observations, int actions) {
   if (reads_torch_script()) return torch().load(path, observations, actions);
   io::read_text(path);
-  refuse(path, "cannot be read by this build, which has no LibTorch",
-         "a C header (.h), or a build with libtorch-dev installed");
+  refuse_header(path, "cannot be read by this build, which has no LibTorch",
+                "a C header (.h), or a build with libtorch-dev installed");
 }
 
 }  // namespace flappy::policy

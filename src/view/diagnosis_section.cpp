@@ -18,7 +18,7 @@ namespace {
 using flightlog::format;
 
 constexpr const char* kWriter = "flappy-gap diagnose";
-constexpr std::size_t kBars = 10, kRivals = 6;
+constexpr std::size_t kBars = 10, kShownRows = 6;
 constexpr double kLeastShown = 5e-3;
 /// More than any flights bring: what it is beside was ruled out.
 constexpr double kRuledOut_nats = 1e8;
@@ -381,7 +381,7 @@ class Story {
     for (const Rival& r : rivals_) best = std::max(best, r.log_evidence);
     Json rows = Json::array();
     for (const Rival& r : rivals_) {
-      if (rows.size() == kRivals || (r.probability < kLeastShown && rows.size() >= 3)) break;
+      if (rows.size() == kShownRows || (r.probability < kLeastShown && rows.size() >= 3)) break;
       std::vector<std::string> pro, con;
       if (refit != nullptr && r.log_evidence > refit->log_evidence + kRuledOut_nats)
         pro.push_back("rules out parameters alone");

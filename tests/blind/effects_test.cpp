@@ -7,6 +7,7 @@
 #include <set>
 
 #include "blind/robot_sensors.hpp"
+#include "full.hpp"
 #include "refusal.hpp"
 #include "vehicles.hpp"
 
@@ -114,6 +115,7 @@ Stand stand(const std::vector<BlindEffect>& effects, double z_m = 1, double ampl
 
 // Sizes of the catalogue, within a factor of about two: what is typical is not known better.
 TEST(BlindEffects, AreOfTypicalSize) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const double thrust = stand({}).thrust_N;
   const auto change = [&](const char* name, double z_m = 1) { return stand({{name, 1}}, z_m).thrust_N / thrust - 1; };
   EXPECT_NEAR(change("ground_effect", 0.08), 0.06, 0.03);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "flight/constants.hpp"
+#include "full.hpp"
 #include "rollout/fly_config.hpp"
 #include "vehicles.hpp"
 
@@ -77,6 +78,7 @@ TEST(Escape, ThePolicySeesWhatItWasTrainedWith) {
 }
 
 TEST(Escape, WhatIsAddedFliesUntilTheHandBack) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   Rows seen;
   const Escape plain = escape(identified(), 0, shipped(watcher(seen)));
   const Escape more = escape(identified(), 0, shipped([](const std::vector<double>&) {

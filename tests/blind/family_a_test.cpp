@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "blind/sampled_robot.hpp"
+#include "full.hpp"
 
 namespace flappy::blind {
 namespace {
@@ -27,6 +28,7 @@ TEST(FamilyA, DescribesEveryEffectOnce) {
 }
 
 TEST(FamilyA, FliesWhatItsOwnProgramsFly) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   Case c = declared_case(assignment().vehicle_file);
   c.seed = 41;
   c.programme = Programme::hover;
@@ -61,6 +63,7 @@ TEST(FamilyA, DrawsFiguresAndSensorsApart) {
 }
 
 TEST(FamilyA, SaysWhatAnEffectChanges) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const std::unique_ptr<Family> family = make_family_a();
   const ProposedFlight hover{2,
                              [](double) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "flightlog/check/check.hpp"
+#include "full.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::blind {
@@ -38,6 +39,7 @@ TEST(BlindFlights, PassTheCheckAndReadBack) {
 }
 
 TEST(BlindFlights, SameSeedSameBytes) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const ProposedFlight hold{2,
                             [](double) {
                               return std::array<double, 4>{0, 0, 0.5, 0};

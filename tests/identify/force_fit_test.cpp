@@ -68,6 +68,7 @@ TEST(ForceFit, RecoversTwelveWithoutNoise) {
 }
 
 TEST(ForceFit, IntervalsHoldTheTruthAsOftenAsTheySay) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   model::Vehicle truth = changed(kFour);
   const FitConfig c = config(kFour);
   const std::vector<double*> values = fitted_values(c, truth);
@@ -164,6 +165,7 @@ TEST(ForceFit, SpringVerdicts) {
 
 // Amplitude alone, twenty times the noise: six parameters are known from each other alone.
 TEST(ForceFit, WhatIsSeenJointlyStaysFitted) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   model::Vehicle truth = test::identified();
   std::vector<sim::Input> inputs = default_inputs();
   inputs.resize(13);
@@ -227,6 +229,7 @@ TEST(ForceFit, IntervalsHoldTheTruthWhereDirectionsAreWeak) {
 }
 
 TEST(ForceFit, LeavesOutWhereTheMapJumps) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const model::Vehicle truth = changed(kFour);
   std::vector<sim::Input> inputs = default_inputs();
   inputs.push_back({2.5, 0, 0, 0});
@@ -242,6 +245,7 @@ TEST(ForceFit, LeavesOutWhereTheMapJumps) {
 }
 
 TEST(ForceFit, AllMethodsMeet) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const std::vector<std::string> two(kFour.begin(), kFour.begin() + 2);
   std::vector<sim::Input> inputs = default_inputs();
   inputs.resize(16);

@@ -189,7 +189,7 @@ TEST(Summary, CountsEachFlightOnce) {
   EXPECT_EQ(s.missing[static_cast<std::size_t>(rollout::Demand::heading)], 3u);
   std::swap(flights[0], flights[1]);
   EXPECT_NE(summarise(flights).hash, s.hash);
-  const rollout::Summary nothing = rollout::summarise({});
+  const rollout::Summary nothing = rollout::summarise(std::span<const rollout::Outcome>());
   EXPECT_EQ(nothing.flights, 0u);
   EXPECT_FALSE(nothing.capture_s.median);
 }

@@ -1,4 +1,5 @@
 // The onboard loop in the simulator: its flapper moves as one that the lanes fly, to the bit.
+#include "full.hpp"
 #include "tools/own_flight.hpp"
 
 namespace flappy::deploy {
@@ -65,6 +66,7 @@ TEST(Onboard, FliesAnyPolicyAsTheLanesDo) {
 }
 
 TEST(Onboard, IsTheSameFromOtherCompilers) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   Loop loop(escape_headers());
   for (const char* level : {"-O0", "-O3"}) {
     ASSERT_EQ(loop.build("gcc", {level}), "");
@@ -76,6 +78,7 @@ TEST(Onboard, IsTheSameFromOtherCompilers) {
 }
 
 TEST(Onboard, FliesOnTheBoardAsTheLanesDo) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   if (const std::string missing = board_missing(); !missing.empty()) GTEST_SKIP() << missing;
   Loop loop(escape_headers());
   ASSERT_EQ(loop.build_for_board(), "");

@@ -2,15 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "blind/b/flight.hpp"
 #include "io/files.hpp"
 
 namespace flappy::blind::b {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// The goal stands in the middle of the room, so that nothing is near.
 const Vector3d kGoal_m(0, 0, 1);

@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace flappy::blind::b {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 Eigen::Quaterniond turn_by(const Vector3d& rotation) {
   const double angle = rotation.norm();

@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -67,5 +68,7 @@ Figures drawn_figures(const Figures& nominal, std::uint64_t seed);
 bool is_physical(const Eigen::Matrix3d& inertia);
 /// The same, or with its largest principal moment cut to what a body can have.
 Eigen::Matrix3d made_physical(const Eigen::Matrix3d& inertia);
+
+inline constexpr double kDegree = M_PI / 180;
 
 }  // namespace flappy::blind::c

@@ -3,8 +3,6 @@
 namespace flappy::blind::c {
 namespace {
 
-constexpr double kDegree = M_PI / 180;
-
 /// The faults that are figures.
 Figures faulty(Figures f, const Sizes& sizes, std::uint64_t seed) {
   Random random(seed, "faults");

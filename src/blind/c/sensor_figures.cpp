@@ -5,8 +5,6 @@
 namespace flappy::blind::c {
 namespace {
 
-constexpr double kDegree = M_PI / 180;
-
 Eigen::Matrix3d turned(const Eigen::Vector3d& by) {
   return by.norm() > 0 ? Eigen::AngleAxisd(by.norm(), by.normalized()).toRotationMatrix() : Eigen::Matrix3d::Identity();
 }

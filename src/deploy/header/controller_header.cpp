@@ -14,7 +14,7 @@
 namespace flappy::deploy {
 namespace {
 
-constexpr const char* kCodes = R"(/* What flappy_controller_selftest() finds. */
+constexpr const char* kControllerCodes = R"(/* What flappy_controller_selftest() finds. */
 #define FLAPPY_CONTROLLER_FAILED_CRC 1   /* the numbers are not those of the run */
 #define FLAPPY_CONTROLLER_FAILED_TRACE 2 /* the recorded flight comes out otherwise */
 #define FLAPPY_CONTROLLER_FAILED_NAN 3   /* what is no sample is taken */
@@ -295,7 +295,7 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
   define("TEST_FRAMES", number(trace.frames.size()));
   define("TEST_PERIODS", number(trace.periods.size()));
   define("TEST_UPDATES", number(trace.updates.size()));
-  text << kCodes << "\n"
+  text << kControllerCodes << "\n"
        << kEmbedded.at("arithmetic.h") << "\n"
        << kEmbedded.at("controller_types.h") << "\n"
        << kEmbedded.at(source + "_types.h") << "\n"

@@ -22,7 +22,7 @@ typedef struct {
 } flappy_policy_signal;
 )";
 
-constexpr const char* kCodes = R"(/* What flappy_policy_selftest() finds. */
+constexpr const char* kPolicyCodes = R"(/* What flappy_policy_selftest() finds. */
 #define FLAPPY_POLICY_FAILED_CRC 1    /* the numbers are not those of the run */
 #define FLAPPY_POLICY_FAILED_VECTOR 2 /* a test vector comes out otherwise */
 #define FLAPPY_POLICY_FAILED_NAN 3    /* an observation with a NaN in it is not refused */
@@ -137,7 +137,7 @@ std::string header(const rollout::FlyConfig& config, const policy::RunInfo& run,
   }
   define("HIDDEN(x)", kind.hidden);
   define("VECTORS", vectors.rows());
-  text << kCodes << "\n"
+  text << kPolicyCodes << "\n"
        << kSignalType << "\n"
        << signals("flappy_policy_observation", "FLAPPY_POLICY_OBS", config.fleet.task.observation())
        << signals("flappy_policy_action", "FLAPPY_POLICY_ACT", config.fleet.task.action()) << "\n"

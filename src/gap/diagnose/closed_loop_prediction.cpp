@@ -78,17 +78,19 @@ std::vector<Beat> beats_of(const Recording& r, double from_s, double to_s) {
 }
 
 /// Where a log went: position and heading.
-using GapLocation = Eigen::Vector4d;
-GapLocation place_of(const Beat& b) { return {b.position_m.x(), b.position_m.y(), b.position_m.z(), b.heading_rad}; }
+using PlaceAndHeading = Eigen::Vector4d;
+PlaceAndHeading place_of(const Beat& b) {
+  return {b.position_m.x(), b.position_m.y(), b.position_m.z(), b.heading_rad};
+}
 
 struct OnPath {
-  GapLocation at, per_s;
+  PlaceAndHeading at, per_s;
 };
 
 /// A line through the beats around an instant.
 OnPath path_at(const std::vector<Beat>& beats, double t_s, double sd_s) {
   double n = 0, t = 0, tt = 0;
-  GapLocation sum = GapLocation::Zero(), moment = GapLocation::Zero();
+  PlaceAndHeading sum = PlaceAndHeading::Zero(), moment = PlaceAndHeading::Zero();
   for (const Beat& b : beats) {
     const double dt = b.t_s - t_s, x = dt / sd_s;
     if (std::abs(x) > 5) continue;
@@ -99,7 +101,7 @@ OnPath path_at(const std::vector<Beat>& beats, double t_s, double sd_s) {
   const double spread = n * tt - t * t;
   if (!(spread > 1e-9 * n * n * sd_s * sd_s)) {  // next to nothing around it: the nearest
     const auto nearest = std::ranges::min_element(beats, {}, [&](const Beat& b) { return std::abs(b.t_s - t_s); });
-    return {place_of(*nearest), GapLocation::Zero()};
+    return {place_of(*nearest), PlaceAndHeading::Zero()};
   }
   return {(tt * sum - t * moment) / spread, (n * moment - t * sum) / spread};
 }
@@ -164,7 +166,7 @@ flight::Segment<double> segment(std::uint32_t tick, double duration_s, const OnP
 Path path_of(const std::vector<Beat>& beats, const sim::World& world, double tick_s) {
   std::vector<OnPath> knots;
   const double first_s = beats.front().t_s, span_s = beats.back().t_s - first_s;
-  GapLocation low = place_of(beats.front()), high = low, mean = GapLocation::Zero();
+  PlaceAndHeading low = place_of(beats.front()), high = low, mean = PlaceAndHeading::Zero();
   for (std::size_t n = 0; static_cast<double>(n) * kKnot_s <= span_s; ++n) {
     knots.push_back(path_at(beats, first_s + static_cast<double>(n) * kKnot_s, kFlownSd_s));
     low = low.cwiseMin(knots.back().at), high = high.cwiseMax(knots.back().at);
@@ -173,13 +175,13 @@ Path path_of(const std::vector<Beat>& beats, const sim::World& world, double tic
   if ((high - low).head<3>().maxCoeff() < kHoverReach_m && high[3] - low[3] < kHoverTurn_rad) {
     mean /= static_cast<double>(knots.size());
     mean[3] = knots.front().at[3];
-    knots = {{mean, GapLocation::Zero()}};
+    knots = {{mean, PlaceAndHeading::Zero()}};
   }
   Path path;
   const auto add = [&](double t_s, double duration_s, const OnPath& from, const OnPath& to) {
     path.push_back(segment(static_cast<std::uint32_t>(std::lround(t_s / tick_s)), duration_s, from, to));
   };
-  const OnPath start{knots.front().at, GapLocation::Zero()};
+  const OnPath start{knots.front().at, PlaceAndHeading::Zero()};
   OnPath clear = start;
   if (world.ceiling_z_m - world.ground_z_m > 2 * kClear_m)
     clear.at[2] = std::clamp(start.at[2], world.ground_z_m + kClear_m, world.ceiling_z_m - kClear_m);
@@ -188,7 +190,7 @@ Path path_of(const std::vector<Beat>& beats, const sim::World& world, double tic
   add(kLearn_s + kApproach_s, kRest_s, start, start);
   for (std::size_t k = 0; k + 1 < knots.size(); ++k)
     add(kLead_s + static_cast<double>(k) * kKnot_s, kKnot_s, knots[k], knots[k + 1]);
-  const OnPath end{knots.back().at, GapLocation::Zero()};
+  const OnPath end{knots.back().at, PlaceAndHeading::Zero()};
   add(kLead_s + static_cast<double>(knots.size() - 1) * kKnot_s, 1, end, end);
   return path;
 }

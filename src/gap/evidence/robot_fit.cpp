@@ -14,13 +14,13 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kMostRounds = 5, kIterations = 6;
+constexpr int kMostRounds = 5, kRefitIterations = 6;
 /// So many times what is usual of an entry.
 constexpr double kWide = 5;
 /// Noise and what it lets the catalogue explain, by turns.
 constexpr int kRemainderRounds = 3;
 /// Nats that another round has to bring; and that a round may lose, as lines are no curves.
-constexpr double kWorthwhile = 2;
+constexpr double kWorthwhileNats = 2;
 
 /// How far another law than the entry's may go: sd of the log of its factor, and the largest.
 constexpr double kShapeSd = 1, kMostShape = 32;
@@ -63,7 +63,7 @@ void RobotFit::refit_beside_background() {
   set_background();
   if (evidence_.discrepancy().spread.beside_all) learn_remainder();
   widen_entries();
-  parameters_ = fitter_.refit(plain_, parameters_, kIterations);
+  parameters_ = fitter_.refit(plain_, parameters_, kRefitIterations);
   take_scales(plain_, parameters_.point);
   for (int round = 0; round < kMostRounds && refit_with_minors(); ++round) continue;
 }
@@ -111,14 +111,14 @@ bool RobotFit::refit_with_minors() {
   };
   take(there, parameters_);
   // with columns of its own: beside those of another point a fit may stay where it is, a hundred nats below what is near
-  parameters_ = fitter_.fit(plain_, parameters_.mean(), kIterations);
+  parameters_ = fitter_.fit(plain_, parameters_.mean(), kRefitIterations);
   take_scales(plain_, parameters_.point);
   const double gain = log_evidence() - before;
-  if (gain < -kWorthwhile) {
+  if (gain < -kWorthwhileNats) {
     take(minors, parameters);
     take_scales(plain_, parameters_.point);
   }
-  return gain > kWorthwhile;
+  return gain > kWorthwhileNats;
 }
 
 Columns RobotFit::lines() const {
@@ -186,7 +186,7 @@ void RobotFit::take_scales(const Hypothesis& hypothesis, const Linearised& at) {
     if (evidence_.discrepancy().spread.beside_all) break;
     if (const auto larger = larger_entry(hypothesis, at)) {
       Weighed other = weigh(hypothesis, at, *larger);
-      better = other.posterior.log_evidence > best.posterior.log_evidence + kWorthwhile;
+      better = other.posterior.log_evidence > best.posterior.log_evidence + kWorthwhileNats;
       if (better) best = std::move(other);
     }
   }
@@ -203,7 +203,7 @@ std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const
                                            (evidence_.discrepancy_sd().cwiseAbs2() + own.cwiseAbs2()).cwiseSqrt()),
                           c.chosen, c.mean());
   std::optional<Scales> best;
-  double most = kWorthwhile;
+  double most = kWorthwhileNats;
   for (std::size_t e = 0; e < now.entries.size(); ++e) {
     std::vector<Eigen::Index> columns;
     for (std::size_t k = 0; k < c.entry.size(); ++k)

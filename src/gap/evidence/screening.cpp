@@ -133,7 +133,7 @@ class Screening {
 }  // namespace
 
 /// How many standard deviations of it a robot may well have of an entry, and how near differences are rough.
-constexpr double kFarFromUsual = 2, kLeastReach = 0.05;
+constexpr double kFarFromUsual = 2, kLeastSizeReach = 0.05;
 
 std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const VectorXd& at,
                                  const std::vector<std::string>& withheld, const ModelDiscrepancy* usual) {
@@ -144,7 +144,7 @@ std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Vect
     if (std::ranges::count(withheld, id)) continue;
     const Hypothesis h(uncertain, {id});
     const double sd = usual ? std::max(usual->background_sd(id), usual->background_sd(id + kOfBoth)) : 0,
-                 reach = std::clamp(kFarFromUsual * sd, kLeastReach, kSizeReach);
+                 reach = std::clamp(kFarFromUsual * sd, kLeastSizeReach, kSizeReach);
     const Index first = at.size();
     VectorXd here = h.start(now);
     here.head(first) = at;

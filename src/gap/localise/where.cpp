@@ -12,7 +12,7 @@ namespace flappy::gap {
 namespace {
 
 /// Half a second of a flapper at 34 Hz: longer than the memory of what noise usually is.
-constexpr int kBlock = 16;
+constexpr int kLongBlock = 16;
 /// For whiteness: short, yet longer than the hats of beats.
 constexpr int kShortBlock = 8;
 constexpr double kMostMemory = 0.95;
@@ -35,7 +35,7 @@ std::string in_short(double value) {
   return text;
 }
 
-struct Beat {
+struct TestedBeat {
   std::size_t flight, beat;
 };
 
@@ -44,7 +44,7 @@ class ChannelRows {
  public:
   ChannelRows(const RowContext& around, const Residuals& residual, int channel, const std::string& stage)
       : around_(around), channel_(channel), stage_(stage) {
-    const std::vector<int> all = blocks_of(around.beats, kBlock), fine = blocks_of(around.beats, kShortBlock);
+    const std::vector<int> all = blocks_of(around.beats, kLongBlock), fine = blocks_of(around.beats, kShortBlock);
     std::size_t i = 0;
     for (std::size_t f = 0; f < around.beats.size(); ++f)
       for (std::size_t j = 0; j < around.beats[f]; ++j, ++i)
@@ -55,7 +55,7 @@ class ChannelRows {
         }
     for (int c = 0; c < kCoefficients; ++c) {
       rows_.emplace_back();
-      for (const Beat& b : beats_)
+      for (const TestedBeat& b : beats_)
         rows_.back().push_back(residual[b.flight][b.beat * kRowsPerBeat + group_of(channel, c)]);
     }
   }
@@ -102,7 +102,7 @@ class ChannelRows {
 
   std::vector<double> of(const Quantity& q) const {
     std::vector<double> x;
-    for (const Beat& b : beats_) x.push_back(q.values[b.flight][b.beat]);
+    for (const TestedBeat& b : beats_) x.push_back(q.values[b.flight][b.beat]);
     return x;
   }
 
@@ -142,7 +142,7 @@ class ChannelRows {
       squares += (off(i) * off(i) + off(i - 1) * off(i - 1)) / 2;
     }
     if (!(squares > 0)) return 0;
-    return std::clamp((products / squares + 1.0 / kBlock) / (1 - 3.0 / kBlock), -kMostMemory, kMostMemory);
+    return std::clamp((products / squares + 1.0 / kLongBlock) / (1 - 3.0 / kLongBlock), -kMostMemory, kMostMemory);
   }
 
   void test_bands(std::vector<GapLocation>& places) const {
@@ -154,7 +154,7 @@ class ChannelRows {
     for (std::size_t f = 0; f < around_.beats.size(); ++f) {
       std::vector<double> y(around_.beats[f], 0);
       double covered = 0;
-      for (const Beat& b : beats_)
+      for (const TestedBeat& b : beats_)
         if (b.flight == f) y[b.beat] = rows_[0][static_cast<std::size_t>(&b - beats_.data())], covered += 1;
       if (covered == 0) continue;
       add_bands(y, around_.beats_Hz[f], ends, left);
@@ -212,7 +212,7 @@ class ChannelRows {
   const RowContext& around_;
   int channel_;
   const std::string& stage_;
-  std::vector<Beat> beats_;
+  std::vector<TestedBeat> beats_;
   std::vector<int> block_, short_block_;
   std::vector<std::vector<double>> rows_;  ///< [coefficient][beat]
 };

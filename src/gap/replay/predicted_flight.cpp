@@ -5,15 +5,8 @@
 #include "gap/replay/reset_kernel.hpp"
 #include "gap/replay/reset_prediction.hpp"
 #include "io/parallel.hpp"
-#include "sim/lanes.hpp"
 
 namespace flappy::gap {
-namespace {
-
-/// Vehicles that a flight is predicted by at once: the lanes of a block.
-constexpr std::size_t kVehicles = sim::kLanes<Flown>;
-
-}  // namespace
 
 const char* channel_name(int channel) {
   static const char* const kNames[kChannels] = {

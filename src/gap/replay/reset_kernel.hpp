@@ -8,6 +8,8 @@ namespace flappy::gap {
 
 /// What candidates fly in: rounding is far below any sensor's noise, and a block holds twice as many as in double.
 using Flown = float;
+/// Vehicles that a flight is predicted by at once: the lanes of a block.
+inline constexpr std::size_t kVehicles = sim::kLanes<Flown>;
 
 /// The torso origin where an interval begins or ends; body to world, velocity in W.
 struct TorsoAt {
@@ -25,8 +27,8 @@ enum ResetRow : int {
 
 /// What a block keeps from one interval to the next.
 struct ResetBlockState {
-  alignas(64) Flown imu_velocity_m_s[3][sim::kLanes<Flown>];  ///< in W, where the interval began
-  alignas(64) Flown rows[kResetRows][sim::kLanes<Flown>];
+  alignas(64) Flown imu_velocity_m_s[3][kVehicles];  ///< in W, where the interval began
+  alignas(64) Flown rows[kResetRows][kVehicles];
 };
 
 /// Reads what the interval from `from` to `to` gave and puts every torso back onto the record at `to`, wings kept; with

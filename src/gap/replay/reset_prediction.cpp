@@ -15,7 +15,6 @@ FLAPPY_KERNELS(ProjectBlock, project_block_kernel);
 
 namespace {
 
-constexpr std::size_t kVehicles = sim::kLanes<Flown>;
 /// Channels of which a vehicle predicts a sample at every interval, and those of the meter.
 constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
 static_assert(kPathX == kSignals + kMetered);

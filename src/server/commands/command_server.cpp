@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kLook{100};  // between looks at the queue
+constexpr milliseconds kQueueLook{100};  // between looks at the queue
 constexpr std::size_t kMostTransfers = 16;
 constexpr double kMostOfSpeed_m_s = 100;  // beyond it, two poses are of two flights
 
@@ -54,16 +54,16 @@ CommandServer::~CommandServer() {
 void CommandServer::run() {
   double looked_s = 0;
   while (!over_) try {
-      if (transfers_.empty()) waiting_.wait(kLook);
+      if (transfers_.empty()) waiting_.wait(kQueueLook);
       take_commands();
       send_pieces();
-      if (io::steady_seconds() - looked_s < std::chrono::duration<double>(kLook).count()) continue;
+      if (io::steady_seconds() - looked_s < std::chrono::duration<double>(kQueueLook).count()) continue;
       looked_s = io::steady_seconds();
       show_changes(false);
       look();
     } catch (const std::exception& e) {  // one that nobody sent; the queue goes on
       io::log(io::LogLevel::error, std::string("dds: ") + e.what());
-      std::this_thread::sleep_for(kLook);
+      std::this_thread::sleep_for(kQueueLook);
     }
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kNames =
+constexpr const char* kAcceptedNames =
     "a name of letters, digits, \"_\", \"-\", \".\" and \"/\", each part beginning with a letter, a digit or \"_\"";
 
 bool is_plain(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
@@ -37,7 +37,7 @@ fs::path below(const fs::path& folder, const std::string& name, const std::strin
   const auto refuse = [&](const std::string& why) -> io::InputError {
     return io::InputError(what + ": \"" + shown(name) + "\" " + why);
   };
-  if (!is_name(name)) throw refuse(std::string("is no name; accepted: ") + kNames);
+  if (!is_name(name)) throw refuse(std::string("is no name; accepted: ") + kAcceptedNames);
   std::error_code error;
   const fs::path root = fs::canonical(folder, error);
   if (error) throw io::InputError(folder.string() + ": cannot be read: " + error.message());

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using namespace flightlog;
 
 constexpr Quality kAll{false, false, 1000};  // any writer offers best effort; so many samples between two looks
-constexpr std::chrono::milliseconds kLook{10};
+constexpr std::chrono::milliseconds kBetweenLooks{10};
 
 /// Types that may be recorded.
 template <class... M>
@@ -52,7 +52,7 @@ class Recording {
     double asked_s = started_s;
     for (;;) {
       find_topics();
-      waiting_.wait(kLook);
+      waiting_.wait(kBetweenLooks);
       for (Topic& topic : topics_) take(topic);
       const double now_s = io::steady_seconds();
       if (options_.duration_s > 0 && now_s - started_s >= options_.duration_s) break;

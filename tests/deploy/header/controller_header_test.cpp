@@ -303,6 +303,7 @@ const std::string& escape_header() {
 }
 
 TEST(ControllerHeader, TestsItself) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   for (const auto& library : libraries(escape_header())) {
     EXPECT_EQ(library->function<int()>("w_selftest")(), 0) << library->name();
     EXPECT_EQ(library->function<float()>("w_selftest_error")(), 0) << library->name();
@@ -337,6 +338,7 @@ TEST(ControllerHeader, TestsItself) {
 }
 
 TEST(ControllerHeader, CatchesEveryFlippedBit) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const ControllerLibrary library(escape_header(), {"gcc", "-O2", "-Dconst="});
   const auto test = library.function<int()>("w_selftest");
   const auto list = library.function<std::uint32_t(std::uint32_t, std::uint32_t**)>("w_constants");
@@ -357,6 +359,7 @@ TEST(ControllerHeader, CatchesEveryFlippedBit) {
 }
 
 TEST(ControllerHeader, CompilesWithoutAWarning) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const flight::Folder folder;
   const std::string header = folder.write("flappy_controller.h", escape_header());
   const std::string use =

@@ -217,6 +217,7 @@ TEST(Proof, MissingToolsAreRows) {
 }
 
 TEST(Proof, ContractionIsSeen) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   Toy toy;
   toy.sum = "weight * x + sum";
   const std::vector<Parity> rows = proof_of(toy, vectors_of(toy, 300, false));
@@ -322,6 +323,7 @@ double instructions_of(int turns) {
 }
 
 TEST(Proof, CountsInstructions) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   // two durations are each off by less than a microsecond, which is 1,000 instructions in 1,001 inferences
   EXPECT_NEAR(instructions_of(100), 204, 2);
   EXPECT_NEAR(instructions_of(1100), 2204, 2);
@@ -439,6 +441,7 @@ TEST(Footprints, GrowWithTheWeights) {
 }
 
 TEST(Footprints, FindMemoryAndRecursion) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   Toy toy;
   toy.other = "static volatile float held[25];\nstatic int calls = 1;\n";
   toy.before = "held[calls++ % 25] = obs[0];\n";

@@ -236,6 +236,7 @@ TEST(DataFaults, OfSyntheticLogs) {
 }
 
 TEST(DataFaults, OfFlights) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   for (const std::size_t flight : {0, 1, 2}) {
     const FlightLog log = blind_log(1 + flight, flight);
     EXPECT_EQ(describe(data_faults(log, "a")), "");
@@ -253,6 +254,7 @@ TEST(DataFaults, AreNotEffects) {
 }
 
 TEST(DataFaults, AShortFlightIsNone) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     FlightLog log = blind_log(seed, 0);
     keep_first(log, 3);

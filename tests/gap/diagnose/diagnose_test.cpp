@@ -10,6 +10,7 @@
 #include <numeric>
 #include <random>
 
+#include "full.hpp"
 #include "gap/evidence/robot_fit.hpp"
 #include "gap/replay/sensor_correction.hpp"
 #include "io/config.hpp"
@@ -354,6 +355,7 @@ TEST(Diagnose, StopsWithWhatItHas) {
 
 // Figures that priors call minor: a wing's centre of mass, a spring that is stiffer one way, an inertia about one axis.
 TEST(RobotFit, FliesMinorFigures) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const std::vector<PredictedFlight> flights =
       flown("hummingbird_nominal",
             {"vehicle.left.wing.com_m.x=0.0006", "vehicle.right.spring.stiffness_positive_Nm_rad=0.0147",
@@ -459,6 +461,7 @@ TEST(Screening, StepsAsFarAsRobotsGoAnyway) {
 
 // A third of a beat and more: near 0 its derivative shows nothing of it.
 TEST(Screening, FindsALongDelayAndFliesWhatIsLeftWithoutIt) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const std::vector<PredictedFlight> flights =
       flown("hummingbird_nominal", {"vehicle.effects.command_delay.delay_s=0.013", "flight.duration_s=5"});
   const sim::Randomisation prior = uncertain();

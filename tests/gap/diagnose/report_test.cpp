@@ -9,6 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "full.hpp"
 #include "gap/diagnose/diagnose_command.hpp"
 #include "gap/diagnose/summary.hpp"
 #include "io/config.hpp"
@@ -346,6 +347,7 @@ void expect_schema(const nlohmann::ordered_json& j) {
 }
 
 TEST(RunDiagnose, ReadsNoTruth) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const flight::Folder folder;
   rollout::FlyOptions options;
   options.log_folder = folder / "flight";
