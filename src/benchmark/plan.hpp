@@ -44,7 +44,7 @@ struct PlanOptions {
   std::size_t at_most = 0;         ///< cases of each part; 0: all
 };
 
-/// Seeds of b begin at 20,000,000 for development and at 27,500,000 for what is reported, those of a and c likewise.
+/// Seeds of b begin at 20,000,000 for development and at 28,000,000 for what is reported, those of a and c likewise.
 std::vector<PlannedCase> plan_cases(const blind::Family& family,
                                     const std::map<std::string, Detectability>& detectability,
                                     const PlanOptions& options);
