@@ -84,14 +84,14 @@ Beats beats_of(const flightlog::FlightLog& log, const std::vector<double>& beat_
   const flightlog::ImuStream& imu = log.imu;
   const flightlog::Column* streams[] = {&imu.accel_x_m_s2, &imu.accel_y_m_s2, &imu.accel_z_m_s2,
                                         &imu.gyro_x_rad_s, &imu.gyro_y_rad_s, &imu.gyro_z_rad_s};
-  constexpr std::ptrdiff_t kLeast = 9;
+  constexpr std::ptrdiff_t kLeastSamples = 9;
   Beats beats;
   for (const double start : beat_s) {
     const double late = log.header.imu.latency_s;
     const auto first = std::ranges::lower_bound(imu.t_s, start + late),
                last = std::ranges::lower_bound(imu.t_s, start + beat + late);
     beats.emplace_back();
-    if (last - first < kLeast) continue;
+    if (last - first < kLeastSamples) continue;
     const auto from = first - imu.t_s.begin();
     Eigen::MatrixXd waves(last - first, 6), values(last - first, 6);
     for (Eigen::Index i = 0; i < waves.rows(); ++i) {

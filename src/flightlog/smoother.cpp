@@ -89,6 +89,49 @@ struct Smoother::Pose {
   Quaterniond attitude;
 };
 
+/// How an error goes on: F = 1 but for blocks of three. Errors are of angle (0), position (3), velocity (6), gyro bias (9),
+/// accelerometer bias (12).
+struct Smoother::Transition {
+  double dt;
+  Matrix3d turn, half;
+  Matrix3d leans;  ///< velocity for an angle
+
+  /// F times a matrix.
+  template <class M>
+  M of(M m) const {
+    const auto gained = (leans * m.template topRows<3>() - dt * half * m.template bottomRows<3>()).eval();
+    m.template middleRows<3>(3) += dt * m.template middleRows<3>(6) + dt / 2 * gained;
+    m.template middleRows<3>(6) += gained;
+    m.template topRows<3>() = (turn * m.template topRows<3>() - dt * m.template middleRows<3>(9)).eval();
+    return m;
+  }
+  /// Its transpose times a matrix.
+  template <class M>
+  M transposed_of(M m) const {
+    const auto gained = (m.template middleRows<3>(6) + dt / 2 * m.template middleRows<3>(3)).eval();
+    m.template middleRows<3>(6) += dt * m.template middleRows<3>(3);
+    m.template middleRows<3>(9) -= dt * m.template topRows<3>();
+    m.template bottomRows<3>() -= dt * half.transpose() * gained;
+    m.template topRows<3>() = (turn.transpose() * m.template topRows<3>() + leans.transpose() * gained).eval();
+    return m;
+  }
+};
+
+/// A pose's word about the errors: S^-1 of its innovation, and the gain.
+struct Smoother::Correction {
+  Eigen::Matrix<double, 6, 15> h;
+  Eigen::Matrix<double, 15, 6> gain;
+  Eigen::Matrix<double, 6, 6> inverse;
+  Eigen::Matrix<double, 6, 1> off;
+};
+
+/// What the filter leaves: of every node, from every node to the next, of every pose but the first.
+struct Smoother::Filtered {
+  std::vector<Covariance> covariance;
+  std::vector<Transition> transition;
+  std::vector<Correction> correction;
+};
+
 Smoother::Smoother(const FlightLog& log, const std::filesystem::path& folder)
     : gravity_m_s2_(log.header.gravity_m_s2),
       longest_unseen_s_(kLongestUnseenFrames / log.header.mocap.rate_hz),
@@ -185,42 +228,6 @@ auto Smoother::moved(const State& x, const Reading& r) const -> State {
   y.attitude = (x.attitude * exponential(turn)).normalized();
   return y;
 }
-
-/// How an error goes on: F = 1 but for blocks of three. Errors are of angle (0), position (3), velocity (6), gyro bias (9),
-/// accelerometer bias (12).
-struct Smoother::Transition {
-  double dt;
-  Matrix3d turn, half;
-  Matrix3d leans;  ///< velocity for an angle
-
-  /// F times a matrix.
-  template <class M>
-  M of(M m) const {
-    const auto gained = (leans * m.template topRows<3>() - dt * half * m.template bottomRows<3>()).eval();
-    m.template middleRows<3>(3) += dt * m.template middleRows<3>(6) + dt / 2 * gained;
-    m.template middleRows<3>(6) += gained;
-    m.template topRows<3>() = (turn * m.template topRows<3>() - dt * m.template middleRows<3>(9)).eval();
-    return m;
-  }
-  /// Its transpose times a matrix.
-  template <class M>
-  M transposed_of(M m) const {
-    const auto gained = (m.template middleRows<3>(6) + dt / 2 * m.template middleRows<3>(3)).eval();
-    m.template middleRows<3>(6) += dt * m.template middleRows<3>(3);
-    m.template middleRows<3>(9) -= dt * m.template topRows<3>();
-    m.template bottomRows<3>() -= dt * half.transpose() * gained;
-    m.template topRows<3>() = (turn.transpose() * m.template topRows<3>() + leans.transpose() * gained).eval();
-    return m;
-  }
-};
-
-/// A pose's word about the errors: S^-1 of its innovation, and the gain.
-struct Smoother::Correction {
-  Eigen::Matrix<double, 6, 15> h;
-  Eigen::Matrix<double, 15, 6> gain;
-  Eigen::Matrix<double, 6, 6> inverse;
-  Eigen::Matrix<double, 6, 1> off;
-};
 
 auto Smoother::transition(const State& x, const Reading& r) const -> Transition {
   const double dt = r.duration_s;

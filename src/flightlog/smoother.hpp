@@ -90,12 +90,7 @@ class Smoother {
   struct Pose;
   struct Transition;
   struct Correction;
-  /// What the filter leaves: of every node, from every node to the next, of every pose but the first.
-  struct Filtered {
-    std::vector<Covariance> covariance;
-    std::vector<Transition> transition;
-    std::vector<Correction> correction;
-  };
+  struct Filtered;
 
   void read_imu(const FlightLog& log);
   std::vector<Pose> read_poses(const FlightLog& log) const;

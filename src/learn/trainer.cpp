@@ -436,11 +436,12 @@ void refuse_run_in(const fs::path& folder) {
 
 std::shared_ptr<const TrainInit> read_train_init(const fs::path& path) {
   if (!fs::is_directory(path))
-    return std::make_shared<TrainInit>(policy::read_actor(path), std::nullopt, io::sha256(io::read_text(path)));
+    return std::make_shared<TrainInit>(
+        TrainInit{policy::read_actor(path), std::nullopt, io::sha256(io::read_text(path))});
   const Checkpoint newest = newest_checkpoint(path);
   const fs::path best = path / "best.json";
-  return std::make_shared<TrainInit>(policy::read_actor(best), newest.path(),
-                                     io::sha256(io::read_text(best) + newest.payload_sha256()));
+  return std::make_shared<TrainInit>(
+      TrainInit{policy::read_actor(best), newest.path(), io::sha256(io::read_text(best) + newest.payload_sha256())});
 }
 
 void refuse_other_run_in(const fs::path& folder, const TrainConfig& config, const TrainInit* init) {

@@ -60,10 +60,12 @@ std::uint64_t course(Bench& bench, std::size_t i, std::uint64_t before) {
 
 /// What flappy-fly flies, action by action.
 TEST(Environments, FlyAsFlappyFlyDoes) {
-  for (const auto& [path, overrides] : {std::pair{kHover, std::vector<std::string>{}},
-                                        {kEscape, {"precision=\"double\"", "flight.first_flapper=5"}},
-                                        {kVoltages, {}},
-                                        {kEscape, {"task.history=2"}}}) {
+  for (const auto& flown : {std::pair{kHover, std::vector<std::string>{}},
+                            {kEscape, {"precision=\"double\"", "flight.first_flapper=5"}},
+                            {kVoltages, {}},
+                            {kEscape, {"task.history=2"}}}) {
+    const auto& path = flown.first;
+    const auto& overrides = flown.second;
     const FlyConfig config = read_fly_config(path, overrides);
     Bench bench(path, overrides, {3, Autoreset::disabled});
     bench.reset(config.fleet.seed);

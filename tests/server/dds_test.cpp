@@ -3,6 +3,7 @@
 #include <sys/wait.h>
 
 #include <chrono>
+#include <cmath>
 #include <map>
 #include <thread>
 

@@ -1,6 +1,8 @@
 // What is shown of a training and of flights, and that it changes nothing of them.
 #include "server/telemetry/telemetry.hpp"
 
+#include <gtest/gtest.h>
+
 #include "learn/trainer.hpp"
 #include "learn/training.hpp"
 #include "rollout/fly.hpp"

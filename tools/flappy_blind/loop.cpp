@@ -197,7 +197,7 @@ class Loop {
     for (const auto& [family, row] : rows) {
       const rollout::Rate better = rollout::rate_of(row.better, row.robots);
       char line[300];
-      const auto share = [&](std::size_t p) {
+      const auto share = [&row = row](std::size_t p) {
         return static_cast<double>(row.succeeded[p]) / static_cast<double>(row.escapes);
       };
       std::snprintf(line, sizeof line, "| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f | %.3f | %.3f |\n",

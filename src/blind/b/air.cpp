@@ -6,7 +6,6 @@
 namespace flappy::blind::b {
 namespace {
 
-constexpr double kDegree = kPi / 180;
 constexpr double kCentroid = 0.46, kGyration = 0.53;
 constexpr std::array<double, 2> kA = {0.165, 0.335}, kB = {0.0455, 0.3};
 

@@ -123,7 +123,6 @@ Figures read_figures(const std::filesystem::path& file) {
 
 void draw_figures(std::uint64_t seed, Figures& f) {
   Random random(seed, 0, Stream::kFigures);
-  constexpr double kDegree = std::numbers::pi / 180;
   draw_link(random, f.torso, 0.07);
   f.density_kg_m3 *= factor(random, 0.02);  // weather, beyond the coefficients of each wing
   for (Side& s : f.side) {

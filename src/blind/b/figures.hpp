@@ -51,7 +51,7 @@ struct Figures {
   double mass_kg() const;
 };
 
-inline constexpr double kGravity_m_s2 = 9.81, kPi = std::numbers::pi;
+inline constexpr double kGravity_m_s2 = 9.81, kPi = std::numbers::pi, kDegree = kPi / 180;
 
 /// Reads a vehicle file. InputError where a figure is missing or out of range.
 Figures read_figures(const std::filesystem::path& file);
