@@ -43,8 +43,8 @@ install_packages() {
   quietly "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}"
 }
 
-# Configures a preset with the given options of cmake, and builds it, several sources of a cold room at once, which takes half the time;
-# what follows --target goes to the build.
+# Configures a preset with the given options of cmake, and builds it, several sources of a cold room at once, which is faster; what follows
+# --target goes to the build.
 build() {
   local preset=$1 options=()
   shift

@@ -82,20 +82,15 @@ class Team {
     for (; helpers_ + 1 < loop.threads; ++helpers_)
       std::thread([this, thread = helpers_ + 1] { help(thread); }).detach();
     loop_ = &loop;
-    through_.store(0, std::memory_order_relaxed);
     gate_.store(kOpen, std::memory_order_release);
     round_.fetch_add(1, std::memory_order_release);
     round_.notify_all();
     loop.work(0);
-    through_.fetch_add(1, std::memory_order_relaxed);
     for (unsigned inside = gate_.fetch_and(~kOpen, std::memory_order_acq_rel) & ~kOpen; inside > 0;
          inside = gate_.load(std::memory_order_acquire))
       wait_while(gate_, inside);
     return true;
   }
-
-  /// How many threads of the loop found nothing more to do in it.
-  std::size_t through() const { return through_.load(std::memory_order_relaxed); }
 
  private:
   static constexpr unsigned kOpen = 1U << 31;
@@ -107,10 +102,7 @@ class Team {
       unsigned inside = gate_.load(std::memory_order_relaxed);
       while ((inside & kOpen) && !gate_.compare_exchange_weak(inside, inside + 1, std::memory_order_acquire)) continue;
       if (!(inside & kOpen)) continue;
-      if (thread < loop_->threads) {
-        loop_->work(thread);
-        through_.fetch_add(1, std::memory_order_relaxed);
-      }
+      if (thread < loop_->threads) loop_->work(thread);
       if (gate_.fetch_sub(1, std::memory_order_acq_rel) == 1) gate_.notify_one();
     }
   }
@@ -119,7 +111,6 @@ class Team {
   std::vector<Stretch> stretches_;
   std::size_t helpers_ = 0;
   Loop* loop_ = nullptr;
-  std::atomic<std::size_t> through_ = 0;
   alignas(64) std::atomic<unsigned> gate_ = 0;   // kOpen, and how many helpers are inside
   alignas(64) std::atomic<unsigned> round_ = 0;  // loops so far
 };
@@ -162,15 +153,8 @@ int processors() {
 
 void detail::parallel_for(std::size_t count, int threads, const void* job, Call call) {
   Loop loop{job, call, nullptr, std::min(count, static_cast<std::size_t>(thread_count(threads))), {}, 0, nullptr};
-  // never deleted: their threads outlive whoever would do it
-  static Team &outer = *new Team, &inner = *new Team;
-  const auto helped = [&] {
-    if (loop.threads < 2) return false;
-    if (outer.run(loop, count)) return true;
-    loop.threads = std::min(loop.threads, 1 + outer.through());
-    return loop.threads > 1 && inner.run(loop, count);
-  };
-  if (!helped())
+  static Team& team = *new Team;  // never deleted: its threads outlive whoever would do it
+  if (loop.threads < 2 || !team.run(loop, count))
     for (std::size_t i = 0; i < count; ++i) loop.run(i, 0);
   if (loop.failed) std::rethrow_exception(loop.failed);
 }

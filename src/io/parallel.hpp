@@ -27,8 +27,7 @@ void parallel_for(std::size_t count, int threads, const void* job, Call call);
 
 /// Calls job(i) or job(i, thread) for every i below `count`, on at most `threads` threads (0: one for each processor), which
 /// have the numbers from 0 on; 0 is the caller. If some throw, all are called nevertheless, and what the first of them by
-/// index threw is thrown again. A loop in a job, and one beside a loop of another thread, runs on its caller, and on the threads
-/// for which the outer loop has nothing more to do.
+/// index threw is thrown again. A loop in a job, and one beside a loop of another thread, runs on its caller alone.
 template <class Job>
 void parallel_for(std::size_t count, int threads, const Job& job) {
   detail::parallel_for(count, threads, &job, [](const void* it, std::size_t i, int thread) {

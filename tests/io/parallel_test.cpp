@@ -90,30 +90,13 @@ TEST(Parallel, RunsLoopsInLoopsAndBesideLoops) {
     for (int round = 0; round < 200; ++round)
       parallel_for(4, 3, [&](std::size_t) {
         parallel_for(5, 3, [&](std::size_t, int thread) {
-          EXPECT_LT(thread, 3);
+          EXPECT_EQ(thread, 0);
           ++called;
         });
       });
   };
   { const std::jthread one(nest), two(nest); }
   EXPECT_EQ(called, 2 * 200 * 4 * 5);
-}
-
-TEST(Parallel, HelpsInALoopOfTheLastJob) {
-  // the other job's thread has nothing more to do once its own is done
-  std::atomic<int> inner = 0, by_others = 0;
-  parallel_for(2, 2, [&](std::size_t job) {
-    if (job == 0) return;
-    for (int round = 0; round < 2000 && by_others == 0; ++round)
-      parallel_for(8, 2, [&](std::size_t, int thread) {
-        std::this_thread::sleep_for(std::chrono::microseconds(100));
-        EXPECT_LT(thread, 2);
-        by_others += thread != 0;
-        ++inner;
-      });
-    EXPECT_EQ(inner % 8, 0) << "every inner job is done when its loop is";
-  });
-  EXPECT_GT(by_others, 0);
 }
 
 TEST(Parallel, KnowsWhatItsControlGroupPaysFor) {
