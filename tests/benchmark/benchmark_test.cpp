@@ -12,6 +12,7 @@
 #include "benchmark/make.hpp"
 #include "benchmark/records.hpp"
 #include "benchmark/score_bench.hpp"
+#include "full.hpp"
 #include "gap/diagnose/verdict_rule.hpp"
 #include "io/files.hpp"
 #include "io/sha256.hpp"
@@ -204,6 +205,7 @@ TEST_F(Benchmark, OpensLabelsOnceAllPredictionsAreSealed) {
 }
 
 TEST_F(Benchmark, GoesOnWhereItWasStopped) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   copy_two("none");
   ScoreCommand c = command();
   const Predictor whole = c.predictor;
@@ -339,6 +341,7 @@ TEST_F(Benchmark, HoverHidesWhatTheTableSays) {
 }
 
 TEST_F(Benchmark, SealsWhereEffectsActAndWhatTheFileDeclares) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   ASSERT_TRUE(make(1));
   const Json labels = read_json(root_ / "bench/sealed/labels.json");
   ASSERT_EQ(labels.at("cases")[0].at("effects")[0].at("id"), "ceiling_effect");

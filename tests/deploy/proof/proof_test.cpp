@@ -283,6 +283,7 @@ TEST(Proof, BadCallsAreRefused) {
 }
 
 TEST(Proof, ControllerIsTriedToo) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const Toy toy;
   const io::TemporaryFolder folder;
   toy.write(folder.path());

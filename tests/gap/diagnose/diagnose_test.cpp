@@ -337,6 +337,7 @@ TEST(SensorEffects, AreTakenBack) {
 }
 
 TEST(Diagnose, StopsWithWhatItHas) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const std::vector<PredictedFlight> flights = flown("hummingbird_nominal");
   DiagnoseOptions options;
   options.threads = 2;
