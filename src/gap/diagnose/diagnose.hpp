@@ -11,7 +11,7 @@
 
 namespace flappy::gap {
 
-/// What no entry explains: a block of the discrepancy that is larger than models are wrong by.
+/// What no entry explains: a block of the discrepancy (of the place, within the beat) that is larger than models are wrong by.
 struct Term {
   int channel = 0, harmonic = 0;
   int function = 0;  ///< of the basis, the one that takes most of the block

@@ -117,7 +117,8 @@ class Evidence {
                  const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
                  const Eigen::MatrixXd* same = nullptr) const;
   /// Expectation-maximisation over the scales of the discrepancy, from `start` on. `own_sd`: what equations of effects get wrong of
-  /// themselves, which no scale changes. `freeing_nats`: the price at which a block may be larger than any model is off; none: no block.
+  /// themselves, which no scale changes. `freeing_nats`: the price at which a block whose tails are no heavier than those of the place may be
+  /// larger than any model is off; none: no block.
   Weighed weigh(const SufficientStatistics& residual, const Columns& columns, const std::vector<char>& use,
                 const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats = {},
                 int iterations = kMostIterations) const;

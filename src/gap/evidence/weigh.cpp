@@ -228,7 +228,8 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
       const double usual2 = held_ ? scales_.blocks[b] * scales_.blocks[b] : (total[b] + nu[b] * f2) / (n + nu[b]);
       next.blocks[b] = std::sqrt(usual2);
       next.free[b] = 0;
-      if (freeing_nats) {
+      // heavy tails hold whatever models are off by: to be spared their price is no cause
+      if (freeing_nats && nu[b] >= discrepancy_.spread.place_freedom) {
         const double free2 = std::max(total[b] / n, kLeastFree * kLeastFree * f2);
         const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };
         const double usual = held_ ? 0 : log_prior(std::sqrt(usual2), next.robot, nu[b]);

@@ -563,6 +563,11 @@ TEST(Evidence, FindsHowFarModelsOfARobotAreOff) {
   EXPECT_EQ(std::count(freer.scales.free.begin(), freer.scales.free.end(), 1), 1);
   EXPECT_TRUE(freer.scales.free[static_cast<std::size_t>(freed)]);
   EXPECT_GT(freer.posterior.log_evidence, w.posterior.log_evidence);
+  // where blocks of the place have lighter tails, this one's hold it already
+  discrepancy.spread.place_freedom = 2 * discrepancy.spread.block_freedom;
+  const Evidence lighter(flights, discrepancy, 2);
+  const Weighed held = lighter.weigh(sums_of(lighter, flights[0], delta), {}, {1}, {}, Scales{}, 10);
+  EXPECT_EQ(std::count(held.scales.free.begin(), held.scales.free.end(), 1), 0);
 }
 
 // A robot that has twenty times what is usual of an entry, and rows that say so to a hundredth of that: its factor t has most of
