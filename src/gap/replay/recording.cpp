@@ -90,7 +90,7 @@ void Recording::lay_grid() {
       if (n == 0) continue;
       const double from_s = now_s;
       now_s += n * kPredictionStep_s;
-      const double at_s = std::min(now_s, smoother.end_s());
+      const double at_s = std::clamp(now_s, smoother.begin_s(), smoother.end_s());
       steps.push_back(n);
       end_s.push_back(now_s);
       torso.push_back(torso_at(smoother.at(at_s)));
@@ -98,7 +98,9 @@ void Recording::lay_grid() {
       const bool flies = torso.back().position_m[2] > least_z_m;
       const bool driven =
           std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
-      valid.push_back(flies && driven && smoother.covers(std::max(from_s, smoother.begin_s()), at_s) ? 1 : 0);
+      // of another delay of motion capture the record may begin later than the grid, which all candidates share, or end before it does
+      const bool recorded = now_s > smoother.begin_s() && from_s < smoother.end_s();
+      valid.push_back(recorded && flies && driven && smoother.covers(std::max(from_s, smoother.begin_s()), at_s));
     }
   }
 }

@@ -94,7 +94,7 @@ std::vector<StreamRow> stream_rows(const Recording& r) {
   std::vector<double> pose_s, samples;
   for (const flightlog::PoseReading& seen : flightlog::pose_readings(r.log)) {
     const double t_s = seen.t_s;
-    if (t_s < x.t_s.front() || t_s >= x.t_s.back()) continue;
+    if (t_s < x.t_s.front() || t_s >= x.t_s.back() || t_s < r.smoother.begin_s() || t_s > r.smoother.end_s()) continue;
     const std::size_t k = flightlog::last_not_after(x.t_s, t_s);
     const double dt = t_s - x.t_s[k], share = dt / (x.t_s[k + 1] - x.t_s[k]);
     const Vector3d a = (x.velocity_m_s[k + 1] - x.velocity_m_s[k]) / (x.t_s[k + 1] - x.t_s[k]);

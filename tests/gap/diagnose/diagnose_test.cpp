@@ -13,6 +13,7 @@
 #include "full.hpp"
 #include "gap/evidence/robot_fit.hpp"
 #include "gap/replay/sensor_correction.hpp"
+#include "gap/replay/stream_rows.hpp"
 #include "io/config.hpp"
 #include "io/files.hpp"
 #include "model/effects/registry.hpp"
@@ -154,6 +155,27 @@ TEST(Recording, FliesWhatWasDriven) {
   EXPECT_NEAR(r.full, 1.1, 5 * 0.02 / 18 / std::sqrt(20));
   EXPECT_DOUBLE_EQ(r.left_V[1000], r.full * whole.left_V[1000]);
   EXPECT_EQ(whole.full, 1);
+}
+
+// Another delay of motion capture moves all poses: a grid that begins before the first of them, or ends after the last, says nothing there.
+TEST(Recording, KnowsNoMotionWhereThereIsNoPose) {
+  const std::vector<PredictedFlight> flights = flown("hummingbird_nominal", {"flight.duration_s=4"});
+  const Recording& whole = flights[0].recording();
+  for (const double moved_s : {0.1, -0.1}) {
+    flightlog::FlightLog log = whole.log;
+    log.header.mocap.latency_s -= moved_s;
+    const Recording r(whole, log);
+    ASSERT_EQ(r.intervals(), whole.intervals());
+    int unknown = 0;
+    for (std::size_t k = 0; k < r.intervals(); ++k) {
+      const bool known = r.end_s[k] > r.smoother.begin_s() && r.end_s[k] - r.interval_s(k) < r.smoother.end_s();
+      unknown += known ? 0 : 1;
+      if (!known) EXPECT_FALSE(r.valid[k]) << moved_s << " s: " << r.end_s[k];
+    }
+    // 0.05 s of them, at 500 Hz, but for one that a pose halves
+    EXPECT_NEAR(unknown, 25, 5) << moved_s;
+    for (const StreamRow& row : stream_rows(r)) EXPECT_TRUE(row.path_m_s2.allFinite()) << moved_s;
+  }
 }
 
 // What acts by the place may act by another law: along the functions that its own change follows, every load of the body may have as much as the
