@@ -48,7 +48,7 @@ expect_line("  imu            151     3.000     50.00     50.00        20.00    
 expect_line("  command        151     3.000     50.00         -        20.00         -       -      0.000")
 expect_line("  clock              not tested: too little rotation")
 expect_line("  accelerometer      ok: mean specific force (0.00, 0.00, 9.81) m/s^2 in W")
-expect_line("  flapping frequency ok: voltages beat at 10 Hz left, 10 Hz right, 10 Hz declared")
+expect_line("  flapping frequency ok: voltages beat at 10 Hz, 10 Hz declared")
 expect_line("  forbids a diagnosis: ${WORK}/good/command.csv:152: the flight lasts 3 s, at least 6 s (60 beats) are needed")
 expect_line("1 readable, faults 1, warnings 0, not tested 4")
 

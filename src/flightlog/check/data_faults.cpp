@@ -140,7 +140,7 @@ std::vector<DataFault> wrong_clocks(const FlightLog& log, const CheckReport& rep
     // Whose clock it is the third stream says, or, where none does, the frequency declared.
     bool of_command = off(power) || off(wings) || (against_mocap && !mocap_off);
     if (!of_command && !against_mocap && !power && !wings && frequency) {
-      const double driven = value(*frequency, "left_Hz") / log.header.flapping_Hz;
+      const double driven = value(*frequency, "frequency_Hz") / log.header.flapping_Hz;
       of_command = std::abs(driven - 1) > std::abs(driven * ratio - 1);
     }
     if (of_command) blame(kCommand, log.command.t_s, std::abs(ratio - 1));
