@@ -6,7 +6,7 @@ target_compile_options(flappy_options INTERFACE
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # false alarms of gcc 12 on string concatenation (gcc bug 105651), and of types in one of the sources that a unity build joins
   target_compile_options(flappy_options INTERFACE -Wno-restrict -Wno-subobject-linkage)
-  # it collects its garbage from a gigabyte on, which takes a tenth less time for a fifth more memory
+  # it collects its garbage from a gigabyte on, which takes less time for more memory
   target_compile_options(flappy_options INTERFACE --param=ggc-min-heapsize=1000000)
 endif()
 
