@@ -36,6 +36,7 @@ function(flappy_embed output header namespace variable)
   set(script ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/deploy/embed.cmake)
   add_custom_command(OUTPUT ${output} COMMAND ${CMAKE_COMMAND} -DOUTPUT=${output} -DHEADER=${header} -DNAMESPACE=${namespace}
     -DVARIABLE=${variable} "-DFILES=${files}" -P ${script} DEPENDS ${files} ${script} VERBATIM)
+  set_source_files_properties(${output} PROPERTIES COMPILE_OPTIONS -Wno-overlength-strings)  # which clang tells of in C++
 endfunction()
 
 # A part that is opened on demand, from one source: lib/flappy/NAME.so.

@@ -239,7 +239,8 @@ std::vector<Errors> errors_of(const model::Vehicle& vehicle, const Manoeuvre& ma
   return errors;
 }
 
-std::vector<WorkPrecisionRow> work_precision(const model::Vehicle& vehicle, double enough_m, bool peers,
+std::vector<WorkPrecisionRow> work_precision(const model::Vehicle& vehicle, [[maybe_unused]] double enough_m,
+                                             bool peers,
                                              const std::function<void(double done, const std::string& now)>& tell) {
   const std::vector<OwnFlight> flights = draw(vehicle, kAboutHover);
   const std::vector<Flight> exact = free_flights(flights, {kAboutHover.exact_step_s});
