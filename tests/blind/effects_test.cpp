@@ -11,7 +11,7 @@
 #include "refusal.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::blind {
+namespace flappy::blind::effects_test {
 namespace {
 
 /// What a short flight near ground, ceiling and wall leaves: motion, currents, battery, and what the sensors saw.
@@ -160,4 +160,4 @@ TEST(BlindEffects, HaveThoseOutsideTheCatalogueLast) {
 }
 
 }  // namespace
-}  // namespace flappy::blind
+}  // namespace flappy::blind::effects_test

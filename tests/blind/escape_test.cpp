@@ -10,7 +10,7 @@
 #include "rollout/fly_config.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::blind {
+namespace flappy::blind::escape_test {
 namespace {
 
 Case identified() {
@@ -118,4 +118,4 @@ TEST(Escape, SameCaseSameBytesAnotherStartEachTime) {
 }
 
 }  // namespace
-}  // namespace flappy::blind
+}  // namespace flappy::blind::escape_test

@@ -8,7 +8,7 @@
 #include "io/csv.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::blind {
+namespace flappy::blind::robot_test {
 namespace {
 
 constexpr double kFlapping_Hz = 34;
@@ -234,4 +234,4 @@ TEST(BlindPlanform, HasThePublishedMoments) {
 }
 
 }  // namespace
-}  // namespace flappy::blind
+}  // namespace flappy::blind::robot_test

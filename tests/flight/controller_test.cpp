@@ -8,7 +8,7 @@
 #include "flight/arc.hpp"
 #include "flight/fleets.hpp"
 
-namespace flappy::flight {
+namespace flappy::flight::controller_test {
 namespace {
 
 using V = model::Vec3<double>;
@@ -517,4 +517,4 @@ TEST_P(Shipped, HoldsItsPlaceAgainstConstantOffsets) {
 INSTANTIATE_TEST_SUITE_P(Controllers, Shipped, testing::Values("pid", "arc"));
 
 }  // namespace
-}  // namespace flappy::flight
+}  // namespace flappy::flight::controller_test

@@ -13,7 +13,7 @@
 #include "flight/fleets.hpp"
 #include "refusal.hpp"
 
-namespace flappy::flight {
+namespace flappy::flight::episode_test {
 namespace {
 
 using V = model::Vec3<double>;
@@ -582,4 +582,4 @@ TEST(Fleet, LanesBeyondTheLastFlapperAreHarmless) {
 }
 
 }  // namespace
-}  // namespace flappy::flight
+}  // namespace flappy::flight::episode_test

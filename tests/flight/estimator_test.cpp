@@ -12,7 +12,7 @@
 #include "flight/schedule.hpp"
 #include "sim/storage.hpp"
 
-namespace flappy::flight {
+namespace flappy::flight::estimator_test {
 namespace {
 
 using V = model::Vec3<double>;
@@ -633,4 +633,4 @@ TEST(FleetFusion, StartsAnewOnTheWayAsWellAsFresh) {
 }
 
 }  // namespace
-}  // namespace flappy::flight
+}  // namespace flappy::flight::estimator_test

@@ -10,7 +10,7 @@
 #include "flight/fleets.hpp"
 #include "sim/lanes.hpp"
 
-namespace flappy::flight {
+namespace flappy::flight::path_test {
 namespace {
 
 constexpr double kTick_s = 0.002;
@@ -193,4 +193,4 @@ TEST(Spline, RefusesWhatIsNoPath) {
 }
 
 }  // namespace
-}  // namespace flappy::flight
+}  // namespace flappy::flight::path_test

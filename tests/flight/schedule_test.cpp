@@ -9,7 +9,7 @@
 #include <optional>
 #include <sstream>
 
-namespace flappy::flight {
+namespace flappy::flight::schedule_test {
 namespace {
 
 constexpr double kStep_s = 1e-4;
@@ -213,4 +213,4 @@ TEST(Schedule, IsLateByTheLowPass) {
 }
 
 }  // namespace
-}  // namespace flappy::flight
+}  // namespace flappy::flight::schedule_test

@@ -9,7 +9,7 @@
 
 #include "flight/fleets.hpp"
 
-namespace flappy::flight {
+namespace flappy::flight::sensors_test {
 namespace {
 
 using V = model::Vec3<double>;
@@ -338,4 +338,4 @@ TEST(Truth, IsWhatTheBatchSays) {
 }
 
 }  // namespace
-}  // namespace flappy::flight
+}  // namespace flappy::flight::sensors_test

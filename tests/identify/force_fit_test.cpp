@@ -11,7 +11,7 @@
 #include "refusal.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::identify {
+namespace flappy::identify::force_fit_test {
 namespace {
 
 const std::vector<std::string> kFour = {"left.motor.resistance_ohm", "right.motor.resistance_ohm",
@@ -51,6 +51,7 @@ TEST(ForceFit, ErrorIsAsDefined) {
 }
 
 TEST(ForceFit, RecoversTwelveWithoutNoise) {
+  if (!test::full()) GTEST_SKIP() << "identify_program_test fits them with noise; this takes seconds: with --full";
   const MeasuredMap m = simulate_forces(test::identified(), default_inputs(), {.noise_steps = 0}, 1);
   const ForceFit f = fit_forces(test::nominal(), m, config(), one_start());
   EXPECT_GT(f.before.total, 20);
@@ -370,4 +371,4 @@ TEST(Intervals, AgreementIsMeasuredInNoise) {
 }
 
 }  // namespace
-}  // namespace flappy::identify
+}  // namespace flappy::identify::force_fit_test

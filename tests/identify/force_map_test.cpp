@@ -10,7 +10,7 @@
 #include "identify/linear_map.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::identify {
+namespace flappy::identify::force_map_test {
 namespace {
 
 /// Largest difference of a value, over the root mean square of `b`'s forces or torques.
@@ -135,4 +135,4 @@ TEST(ForceSensor, ScattersAsItDeclares) {
 }
 
 }  // namespace
-}  // namespace flappy::identify
+}  // namespace flappy::identify::force_map_test

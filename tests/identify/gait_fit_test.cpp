@@ -8,7 +8,7 @@
 
 #include "refusal.hpp"
 
-namespace flappy::identify {
+namespace flappy::identify::gait_fit_test {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
@@ -97,4 +97,4 @@ TEST(GaitFit, RefusesWhatIsNoGaitInOneLine) {
 }
 
 }  // namespace
-}  // namespace flappy::identify
+}  // namespace flappy::identify::gait_fit_test

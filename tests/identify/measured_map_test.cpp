@@ -8,7 +8,7 @@
 #include "refusal.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::identify {
+namespace flappy::identify::measured_map_test {
 namespace {
 
 const std::string kHeader =
@@ -96,4 +96,4 @@ TEST(MeasuredMap, NoRowIsBothFittedAndHeldOut) {
 }
 
 }  // namespace
-}  // namespace flappy::identify
+}  // namespace flappy::identify::measured_map_test

@@ -11,7 +11,7 @@
 #include "refusal.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::identify {
+namespace flappy::identify::signs_test {
 namespace {
 
 std::vector<Wrench> nominal_map(const std::vector<sim::Input>& inputs) {
@@ -186,4 +186,4 @@ TEST(Signs, ARowIsNotRefusedForAModelThatFitsNoRow) {
 }
 
 }  // namespace
-}  // namespace flappy::identify
+}  // namespace flappy::identify::signs_test

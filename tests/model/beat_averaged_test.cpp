@@ -11,7 +11,7 @@
 #include "refusal.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::model {
+namespace flappy::model::beat_averaged_test {
 namespace {
 
 BeatAveraged some() {
@@ -268,4 +268,4 @@ TEST(MeanEffects, AreDocumented) {
 }
 
 }  // namespace
-}  // namespace flappy::model
+}  // namespace flappy::model::beat_averaged_test

@@ -14,7 +14,7 @@
 #include "model/jointed_kane.hpp"
 #include "refusal.hpp"
 
-namespace flappy {
+namespace flappy::jointed_test {
 namespace {
 
 using model::Jointed, model::Moving, model::Vec3, model::Vehicle;
@@ -225,4 +225,4 @@ TEST(StripAerodynamics, TakesSeriesForPolynomials) {
 }
 
 }  // namespace
-}  // namespace flappy
+}  // namespace flappy::jointed_test

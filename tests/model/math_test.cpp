@@ -10,7 +10,7 @@
 
 #include "sim/lanes.hpp"
 
-namespace flappy::model {
+namespace flappy::model::math_test {
 namespace {
 
 // Rounding of u = x^2 <= 3.1 (half an ulp, 1.2e-7, times df/du < 0.5), of the polynomial times u (3.1 x 3e-8)
@@ -310,4 +310,4 @@ TEST(Lanes, FuseWhatIsWritten) {
 }
 
 }  // namespace
-}  // namespace flappy::model
+}  // namespace flappy::model::math_test

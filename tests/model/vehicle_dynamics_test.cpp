@@ -9,7 +9,7 @@
 #include "model/kane.hpp"
 #include "vehicles.hpp"
 
-namespace flappy {
+namespace flappy::vehicle_dynamics_test {
 namespace {
 
 using model::Vec3;
@@ -180,4 +180,4 @@ TEST(VehicleDynamics, CentreOfMassAndItsVelocity) {
 }
 
 }  // namespace
-}  // namespace flappy
+}  // namespace flappy::vehicle_dynamics_test

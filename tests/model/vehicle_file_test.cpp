@@ -15,7 +15,7 @@
 #include "model/posterior.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::model {
+namespace flappy::model::vehicle_file_test {
 namespace {
 
 using Figures = std::map<std::string, double>;
@@ -464,4 +464,4 @@ TEST_F(VehicleFile, RefusesEffectsThatDoNotExist) {
 }
 
 }  // namespace
-}  // namespace flappy::model
+}  // namespace flappy::model::vehicle_file_test

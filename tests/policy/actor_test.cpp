@@ -13,7 +13,7 @@
 #include "flight/fleets.hpp"
 #include "sim/lanes.hpp"
 
-namespace flappy::flight {
+namespace flappy::flight::actor_test {
 namespace {
 
 policy::Actor random_actor(std::vector<int> widths, policy::Activation hidden, std::uint32_t seed,
@@ -355,4 +355,4 @@ TEST(ActorFile, RefusesWhatIsNoActor) {
 }
 
 }  // namespace
-}  // namespace flappy::flight
+}  // namespace flappy::flight::actor_test

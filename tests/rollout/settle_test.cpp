@@ -8,7 +8,7 @@
 #include "model/effects/registry.hpp"
 #include "sim/randomise.hpp"
 
-namespace flappy::flight {
+namespace flappy::flight::settle_test {
 namespace {
 
 constexpr std::size_t kCount = 48;
@@ -248,4 +248,4 @@ TEST(Success, NotesCaptureAndLossOnTheTrueState) {
 }
 
 }  // namespace
-}  // namespace flappy::flight
+}  // namespace flappy::flight::settle_test

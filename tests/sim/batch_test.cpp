@@ -11,7 +11,7 @@
 #include "sim/lanes.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::sim {
+namespace flappy::sim::batch_test {
 namespace {
 
 constexpr double kStep = 1e-4;
@@ -341,4 +341,4 @@ TEST(Effects, BodyDragBrakesAsAnIsolatedBodyWould) {
 }
 
 }  // namespace
-}  // namespace flappy::sim
+}  // namespace flappy::sim::batch_test

@@ -12,7 +12,7 @@
 #include "model/wing_angles.hpp"
 #include "sim/storage.hpp"
 
-namespace flappy::sim {
+namespace flappy::sim::jointed_step_test {
 namespace {
 
 using model::Jointed, model::Vehicle;
@@ -418,4 +418,4 @@ TEST(JointedStep, RefusesOthersInItsBatch) {
 }
 
 }  // namespace
-}  // namespace flappy::sim
+}  // namespace flappy::sim::jointed_step_test

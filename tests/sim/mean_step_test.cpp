@@ -10,7 +10,7 @@
 #include "sim/storage.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::sim {
+namespace flappy::sim::mean_step_test {
 namespace {
 
 using Eigen::Matrix3d, Eigen::Quaterniond, Eigen::Vector3d;
@@ -315,4 +315,4 @@ TEST(MeanStep, RobotsOfABatchShareExpressions) {
 }
 
 }  // namespace
-}  // namespace flappy::sim
+}  // namespace flappy::sim::mean_step_test

@@ -16,7 +16,7 @@
 #include "model/kane.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::sim {
+namespace flappy::sim::physics_test {
 namespace {
 
 using std::numbers::pi;
@@ -772,4 +772,4 @@ TEST(Precision, StepOf100MicrosecondsHasConverged) {
 }
 
 }  // namespace
-}  // namespace flappy::sim
+}  // namespace flappy::sim::physics_test

@@ -8,7 +8,7 @@
 
 #include "vehicles.hpp"
 
-namespace flappy::sim {
+namespace flappy::sim::randomise_test {
 namespace {
 
 constexpr std::size_t kDraws = 20'000;
@@ -508,4 +508,4 @@ TEST(Random, IsUniformAndUncorrelatedBetweenStreamsAndNeighbours) {
 }
 
 }  // namespace
-}  // namespace flappy::sim
+}  // namespace flappy::sim::randomise_test

@@ -10,7 +10,7 @@
 #include "sim/storage.hpp"
 #include "vehicles.hpp"
 
-namespace flappy::sim {
+namespace flappy::sim::replay_test {
 namespace {
 
 constexpr double kStep = 1e-4;
@@ -216,4 +216,4 @@ TEST(Replay, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace flappy::sim
+}  // namespace flappy::sim::replay_test

@@ -130,7 +130,7 @@ endforeach()
 # ---- Ctrl-C: whole parts are written
 
 find_program(TIMEOUT timeout REQUIRED)
-execute_process(COMMAND ${TIMEOUT} --foreground --preserve-status -s INT 3 ${PROGRAM} ${WORK}/best.json --task ${WORK}/task.toml ${short}
+execute_process(COMMAND ${TIMEOUT} --foreground --preserve-status -s INT 1 ${PROGRAM} ${WORK}/best.json --task ${WORK}/task.toml ${short}
   --episodes 100000 --threads 1 --json ${WORK}/int.json OUTPUT_VARIABLE out ERROR_VARIABLE err RESULT_VARIABLE code)
 expect_equal("exit code" "${code}" 0)
 expect_match("stdout" "${out}" "^stopped: policy flew [0-9]+ of 100000 flights\n")

@@ -7,7 +7,7 @@ set(escape ${SOURCE}/configs/train/escape.toml)
 set(small --set collect.flappers=48 --set collect.vehicles=16 --set networks.critic=[32,32] --set learn.replay=4000
   --set learn.batch=64 --set evaluate.vehicles=32 --set flight.duration_s=0.4 --set task.success.keep.from_s=0.36
   --set task.success.keep.until_s=0.4)
-set(some ${small} --set learn.updates=120000 --set evaluate.every=24000 --set checkpoint.every=600)
+set(some ${small} --set learn.updates=60000 --set evaluate.every=12000 --set checkpoint.every=600)
 
 # ---- a run and what it leaves
 
@@ -15,7 +15,7 @@ run(${escape} ${some} --out ${WORK}/whole --threads 1 --json ${WORK}/whole.json)
 expect_match("stderr, where a slow machine is told how far it is" "${err}" "^(trained [0-9]+ %[^\n]*\n)*$")
 expect_equal("exit code" "${code}" 0)
 expect_match("stdout" "${out}" "^${WORK}/whole: seed 0, 1 threads, [0-9]+ MB of memory, at most [0-9]+ MB on disk\n")
-foreach(row IN ITEMS "trained: seed 0, 120000 updates in [0-9.]+ s .and [0-9.]+ s of evaluation., [0-9.]+ million environment steps\n"
+foreach(row IN ITEMS "trained: seed 0, 60000 updates in [0-9.]+ s .and [0-9.]+ s of evaluation., [0-9.]+ million environment steps\n"
     "best success on validation vehicles: [0-9.]+ %, at update [0-9]+\n" "time to 50, 80, 90, 95 % success:( [-0-9.s]+)+\n"
     "simulation [0-9]+ %, learning [0-9]+ %, the rest [0-9]+ %" "policy ${WORK}/whole/best.json, last checkpoint's payload [0-9a-f]+\n"
     "\nshown by: flappy-report ${WORK}/whole --out report.html\n$")
@@ -29,7 +29,7 @@ expect_keys(${WORK}/whole/run.json commit=STRING processor=STRING instruction_se
 
 file(READ ${WORK}/whole/log.txt text)
 set(time "[-0-9]+T[0-9:.+-]+")
-expect_match("log.txt" "${text}" "^${time} info: flappy-train [0-9.]+, commit [^ ]+: [^\n]+--threads 1[^\n]*\n(${time} info: update [0-9]+: [^\n]+\n)+${time} info: trained, update 120000\n$")
+expect_match("log.txt" "${text}" "^${time} info: flappy-train [0-9.]+, commit [^ ]+: [^\n]+--threads 1[^\n]*\n(${time} info: update [0-9]+: [^\n]+\n)+${time} info: trained, update 60000\n$")
 
 # What a run must leave, to the byte.
 function(digest folder result)

@@ -16,14 +16,14 @@
 namespace flappy::identify {
 namespace {
 
-struct Settings {
+struct CalibrationSettings {
   MapSource source;
   FitSettings fit;
   std::string truth, inputs, held_out;
   unsigned seeds = 20;
 };
 
-Json run(const Settings& s, io::Program& program) {
+Json run(const CalibrationSettings& s, io::Program& program) {
   const auto began = std::chrono::steady_clock::now();
   const model::Vehicle vehicle = s.source.read_vehicle();
   model::Vehicle truth = model::read_vehicle(s.truth);
@@ -109,7 +109,7 @@ Json run(const Settings& s, io::Program& program) {
 
 Command add_calibrate(io::Program& owner) {
   const io::Command program = owner.app();
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<CalibrationSettings>();
   io::Command app = program.command("calibrate", "counts how often a fit's 95 % intervals hold the truth");
   s->source.add(app, "vehicle to start each fit from");
   app.option("--truth", s->truth, "vehicle whose noisy maps are fitted").required();

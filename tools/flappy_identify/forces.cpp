@@ -16,7 +16,7 @@
 namespace flappy::identify {
 namespace {
 
-struct Settings {
+struct ForceSettings {
   MapSource source;
   FitSettings fit;
   std::string measured, out, held_out;
@@ -172,7 +172,7 @@ Json map_of(const MeasuredMap& measured, const model::Vehicle& before, const mod
 }
 
 /// The fitted vehicle's file, saying how it came about; no time and no path, so the same fit is the same bytes.
-std::string vehicle_file(const Settings& s, const ForceFit& f, const std::string& from,
+std::string vehicle_file(const ForceSettings& s, const ForceFit& f, const std::string& from,
                          const std::string& measured_sha256) {
   char line[160];
   std::snprintf(line, sizeof line, "# total error %.4f %% before, %.4f %% after\n", f.before.total, f.after.total);
@@ -197,7 +197,7 @@ std::string vehicle_file(const Settings& s, const ForceFit& f, const std::string
          "\n# parameters fitted:" + fitted + "\n" + model::vehicle_text(without_posterior);
 }
 
-Json run(const Settings& s) {
+Json run(const ForceSettings& s) {
   const auto began = std::chrono::steady_clock::now();
   const model::Vehicle vehicle = s.source.read_vehicle();
   const FitConfig config = s.fit.read_config(vehicle);
@@ -242,7 +242,7 @@ Json run(const Settings& s) {
 }  // namespace
 
 Command add_forces(const io::Command& program) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<ForceSettings>();
   io::Command app = program.command("forces", "fits a vehicle to a measured force map");
   app.option("measured", s->measured, "table of inputs and mean wrenches").required();
   s->source.add(app, "vehicle to start from");

@@ -13,14 +13,14 @@ namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-struct Settings {
+struct GaitSettings {
   std::string measured, out;
   GaitOptions options;
   double frequency_Hz = 0;
   io::Option frequency;
 };
 
-Json run(const Settings& s) {
+Json run(const GaitSettings& s) {
   GaitOptions options = s.options;
   if (s.frequency.given()) {
     if (!(s.frequency_Hz > 0)) throw io::InputError("--frequency-Hz: is not above 0; accepted: beats per second");
@@ -49,7 +49,7 @@ Json run(const Settings& s) {
 }  // namespace
 
 Command add_gait(const io::Command& program) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<GaitSettings>();
   io::Command app = program.command("gait", "Fourier coefficients of measured wing angles, for a vehicle file");
   app.option("measured", s->measured, "table of a beat or more: t_s or beat, and angles in _rad or _deg").required();
   s->frequency = app.option("--frequency-Hz", s->frequency_Hz, "beats per second, of a table by t_s");

@@ -14,7 +14,7 @@
 namespace flappy::identify {
 namespace {
 
-struct Settings {
+struct KinematicsSettings {
   MapSource source;
   std::string measured, csv, svg;
   sim::Input input;
@@ -26,7 +26,7 @@ Json figures(const BeatFigures& f) {
   return {{"amplitude_rad", f.amplitude_rad}, {"bias_rad", f.bias_rad}, {"phase_rad", f.phase_rad}};
 }
 
-Json run(const Settings& s) {
+Json run(const KinematicsSettings& s) {
   constexpr double kDegree = std::numbers::pi / 180;
   const model::Vehicle vehicle = s.source.read_vehicle();
   if (!(s.from_s < s.to_s)) throw io::InputError("--from-s: is not before --to-s; accepted: a time before it");
@@ -65,7 +65,7 @@ Json run(const Settings& s) {
 }  // namespace
 
 Command add_kinematics(const io::Command& program) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<KinematicsSettings>();
   io::Command app = program.command("kinematics", "measured strokes and rotations beside simulated ones");
   app.option("measured", s->measured, "table of wing angles, as a flight log's wings.csv").required();
   s->source.add(app, "vehicle to simulate, welded");

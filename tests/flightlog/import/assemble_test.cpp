@@ -15,7 +15,7 @@
 #include "io/temporary_folder.hpp"
 #include "refusal.hpp"
 
-namespace flappy::flightlog {
+namespace flappy::flightlog::assemble_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -570,4 +570,4 @@ TEST(Import, TurnsAnglesInTheirOrder) {
 }
 
 }  // namespace
-}  // namespace flappy::flightlog
+}  // namespace flappy::flightlog::assemble_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace flappy::flightlog {
+namespace flappy::flightlog::channels_test {
 namespace {
 
 using Values = std::vector<double>;
@@ -45,4 +45,4 @@ TEST(Channels, TakeNoTimeThatHasNoDifferences) {
 }
 
 }  // namespace
-}  // namespace flappy::flightlog
+}  // namespace flappy::flightlog::channels_test

@@ -7,7 +7,7 @@
 #include "io/temporary_folder.hpp"
 #include "refusal.hpp"
 
-namespace flappy::flightlog {
+namespace flappy::flightlog::mapping_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -114,4 +114,4 @@ TEST(Mapping, OfInputsRefusesFaults) {
 }
 
 }  // namespace
-}  // namespace flappy::flightlog
+}  // namespace flappy::flightlog::mapping_test

@@ -13,7 +13,7 @@
 #include "io/temporary_folder.hpp"
 #include "refusal.hpp"
 
-namespace flappy::flightlog {
+namespace flappy::flightlog::sources_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -148,4 +148,4 @@ TEST(Sources, RefuseWhatTheyCannotRead) {
 }
 
 }  // namespace
-}  // namespace flappy::flightlog
+}  // namespace flappy::flightlog::sources_test

@@ -5,7 +5,7 @@
 #include "flightlog/import/ulogs.hpp"
 #include "refusal.hpp"
 
-namespace flappy::flightlog {
+namespace flappy::flightlog::ulog_test {
 namespace {
 
 using test::UlogText;
@@ -114,4 +114,4 @@ TEST(Ulog, RefusesWhatIsNone) {
 }
 
 }  // namespace
-}  // namespace flappy::flightlog
+}  // namespace flappy::flightlog::ulog_test

@@ -9,7 +9,7 @@
 #include "io/temporary_folder.hpp"
 #include "refusal.hpp"
 
-namespace flappy::flightlog::ros {
+namespace flappy::flightlog::ros::bag_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -101,4 +101,4 @@ TEST(Bag, RefusesWhatIsNone) {
 }
 
 }  // namespace
-}  // namespace flappy::flightlog::ros
+}  // namespace flappy::flightlog::ros::bag_test

@@ -10,7 +10,7 @@
 #include "flightlog/ros/messages.hpp"
 #include "flightlog/ros/type_hash.hpp"
 
-namespace flappy::flightlog::ros {
+namespace flappy::flightlog::ros::cdr_test {
 namespace {
 
 std::string bytes_of(std::string_view hex) {
@@ -208,4 +208,4 @@ TEST(Cdr, GivesBackTheMessagesOfABagFromOutside) {
 }
 
 }  // namespace
-}  // namespace flappy::flightlog::ros
+}  // namespace flappy::flightlog::ros::cdr_test

@@ -7,7 +7,7 @@
 #include "flightlog/some_log.hpp"
 #include "io/temporary_folder.hpp"
 
-namespace flappy::flightlog::ros {
+namespace flappy::flightlog::ros::flight_mcap_test {
 namespace {
 
 struct Seen {
@@ -88,4 +88,4 @@ TEST(FlightMcap, DoesWithoutWhatIsNotLogged) {
 }
 
 }  // namespace
-}  // namespace flappy::flightlog::ros
+}  // namespace flappy::flightlog::ros::flight_mcap_test

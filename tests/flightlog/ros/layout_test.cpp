@@ -5,7 +5,7 @@
 #include "flightlog/ros/messages.hpp"
 #include "flightlog/ros/type_hash.hpp"
 
-namespace flappy::flightlog::ros {
+namespace flappy::flightlog::ros::layout_test {
 namespace {
 
 std::string fault(const std::string& text) {
@@ -73,4 +73,4 @@ TEST(Layout, RefusesWhatItCannotRead) {
 }
 
 }  // namespace
-}  // namespace flappy::flightlog::ros
+}  // namespace flappy::flightlog::ros::layout_test

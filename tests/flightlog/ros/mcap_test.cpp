@@ -14,7 +14,7 @@
 #include "io/temporary_folder.hpp"
 #include "refusal.hpp"
 
-namespace flappy::flightlog::ros {
+namespace flappy::flightlog::ros::mcap_test {
 namespace {
 
 using mcap::Bytes;
@@ -223,4 +223,4 @@ TEST(Mcap, RefusesWhatIsNone) {
 }
 
 }  // namespace
-}  // namespace flappy::flightlog::ros
+}  // namespace flappy::flightlog::ros::mcap_test
