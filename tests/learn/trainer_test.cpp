@@ -213,7 +213,7 @@ TEST(Trainer, StartsFromATrainedActor) {
 
   const auto refused = [&](const policy::Actor& init, const char* why) {
     o.folder = fresh("refused");
-    o.init = std::make_shared<TrainInit>(init, std::nullopt, "");
+    o.init = std::make_shared<TrainInit>(TrainInit{init, std::nullopt, ""});
     try {
       train(c, o);
       ADD_FAILURE() << why;
