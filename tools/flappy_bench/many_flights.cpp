@@ -31,7 +31,8 @@ extern const Kernel<double> kernel_double;
 namespace flappy::bench {
 namespace {
 
-constexpr double kFlight_s = 0.3, kSettles_s = 0.5, kHold_s = 1e-3;
+constexpr double kFlight_s = 0.3, kSettles_s = 0.5;
+[[maybe_unused]] constexpr double kHold_s = 1e-3;  // by peers alone
 constexpr double kPeriod_s = 2e-3;
 constexpr int kBeats = 17;
 constexpr std::uint64_t kSeed = 9;
