@@ -79,6 +79,7 @@ void add_truth(std::vector<flightlog::Column>& truth, double t_s, const Robot& r
                         r.stroke_rad_s, r.rotation_rad_s,
                         bias.x(),       bias.y(),
                         bias.z()};
+  truth.resize(std::size(row));
   for (std::size_t k = 0; k < truth.size(); ++k) truth[k].push_back(row[k]);
 }
 
@@ -165,7 +166,6 @@ RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double du
   f.log.command.phase_rad.emplace();
   if (sensors.power) f.log.power.emplace();
   if (sensors.wings) f.log.wings.emplace();
-  f.truth.resize(flightlog::kMotionNames.size());
 
   robot.place_torso(start);
 

@@ -29,7 +29,9 @@ struct RobotFlight {
   bool crashed = false;
   std::string how;  ///< it crashed
   flightlog::FlightLog log;
-  std::vector<flightlog::Column> truth;      ///< columns flight::kMotionNames, at the control rate
+  /// At the control rate: time, position, attitude (w first), velocity, body rates, stroke and rotation of both wings, their rates,
+  /// the gyro's constant bias.
+  std::vector<flightlog::Column> truth;
   double farthest_m = 0, most_tilt_rad = 0;  ///< from where it was meant to be; of the body's z axis
 };
 

@@ -33,6 +33,7 @@ class Hypothesis {
  public:
   /// `effects`: identifiers, in order.
   Hypothesis(const sim::Randomisation& uncertain, std::vector<std::string> effects);
+  Hypothesis(sim::Randomisation&&, std::vector<std::string>) = delete;  // it does not keep what it is of
 
   const std::vector<std::string>& effects() const { return effects_; }
   const std::vector<Unknown>& unknowns() const { return unknowns_; }

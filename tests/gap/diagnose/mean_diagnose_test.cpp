@@ -124,7 +124,8 @@ Diagnosis diagnose_robot(const Robot& r, std::vector<std::string> withheld = {},
 /// 90 % interval of a size.
 bool holds(const Diagnosis& d, const std::string& name, double truth) {
   const ScoredHypothesis& a = d.hypotheses[d.conclusion.hypothesis];
-  const Hypothesis h(sim::Randomisation(nimble()), a.effects);
+  const sim::Randomisation exact(nimble());
+  const Hypothesis h(exact, a.effects);
   const Eigen::VectorXd mean = a.fit.mean();
   const Eigen::MatrixXd covariance = a.fit.covariance();
   // its parameters stand before its effects, in order
