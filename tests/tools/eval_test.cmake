@@ -56,7 +56,7 @@ endforeach()
 # ---- what it survives
 
 run(${WORK}/run ${short} --episodes 20 --effects --json ${WORK}/effects.json)
-expect_equal("stderr" "${err}" "")
+expect_match("stderr, where a slow machine is told how far it is" "${err}" "^(effects flown [0-9]+ %[^\n]*\n)*$")
 expect_equal("exit code" "${code}" 0)
 expect_match("stdout" "${out}" "^20 flights each, task escape, seed 1, test vehicles: success, %, by size of an effect, of its typical one\n +0.5 +1 +1.5 +2\n  none +[0-9.]+\n")
 file(READ ${WORK}/effects.json json)
