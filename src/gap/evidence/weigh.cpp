@@ -190,12 +190,13 @@ Weighed Evidence::weigh(const SufficientStatistics& residual, const Columns& col
       const Half& h = halves[n];
       const VectorXd z = h.llt.matrixU().solve(h.half.col(k) - h.half.leftCols(k) * w.posterior.mean);
       const MatrixXd inverse = h.llt.matrixU().solve(MatrixXd::Identity(q, q));
-      MatrixXd moved = MatrixXd::Zero(q, k);
-      if (k > 0)  // Eigen's triangular products are not for matrices without columns
+      MatrixXd moved;
+      if (k > 0)  // neither Eigen's triangular products nor its rows are for matrices without columns
         moved = h.llt.matrixU().solve(h.half.leftCols(k) * spread.triangularView<Eigen::Lower>());
       for (Index i = 0; i < q; ++i) {
         const double d = h.sd[i], shared = d > 0 ? 1 - std::pow(h.own[i] / d, 2) : 0;  // of the discrepancy's own
-        const double square = d * d * (z[i] * z[i] + inverse.row(i).squaredNorm() + moved.row(i).squaredNorm());
+        const double square =
+            d * d * (z[i] * z[i] + inverse.row(i).squaredNorm() + (k > 0 ? moved.row(i).squaredNorm() : 0.0));
         const double own = shared * shared * square + shared * h.own[i] * h.own[i];
         w.delta(seen[n], i) = z[i];
         w.squares(seen[n], i) = sums[n].base[i] > 0 ? own / (sums[n].base[i] * sums[n].base[i]) : 0;
