@@ -11,7 +11,7 @@ struct Times {
 };
 
 /// Flies the programme of a flight; with `path` and `sent`, those of all steps and ticks.
-FamilyFlight fly_programme(const Assignment& a, std::size_t flight, const Times& times = {}, Path* path = nullptr,
+FamilyFlight fly_programme(const Assignment& a, std::size_t number, const Times& times = {}, Path* path = nullptr,
                            std::vector<Beat>* sent = nullptr);
 
 /// As Family::contrast has it. The torso is led along the path flown, with and without the effect; the hinges and all that is slow

@@ -39,7 +39,7 @@ class Flight {
          double trim_s);
 
   /// Flies one tick with these inputs of the pilot, held between its periods. Empty, or how it crashed.
-  std::string tick(const Beat& beat, bool may_tumble = false);
+  std::string tick(const Beat& sent, bool may_tumble = false);
   double time_s() const { return static_cast<double>(ticks_) * kTick_s - trim_s_; }
   long ticks() const { return ticks_; }
   bool steers_now() const { return ticks_ % 2 == 0; }

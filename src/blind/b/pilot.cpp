@@ -21,8 +21,9 @@ Vector3d rotation_of(const Eigen::Quaterniond& q) {
 
 double wrapped(double angle) { return angle - 2 * kPi * std::round(angle / (2 * kPi)); }
 
-double heading_of(const Eigen::Quaterniond& q) {
-  return std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z()));
+double heading_of(const Eigen::Quaterniond& attitude) {
+  return std::atan2(2 * (attitude.w() * attitude.z() + attitude.x() * attitude.y()),
+                    1 - 2 * (attitude.y() * attitude.y() + attitude.z() * attitude.z()));
 }
 
 Observer::Observer(const flightlog::FlightHeader& header, const Vector3d& position, double heading)
