@@ -480,7 +480,7 @@ LogAmbient read_ambient(const io::Table& ambient) {
 
 std::vector<std::string> read_inputs(const io::Table& command) {
   constexpr std::string_view kAccepted = "names of columns, of letters, digits and _";
-  const std::vector<std::string> inputs = command.strings("inputs");
+  std::vector<std::string> inputs = command.strings("inputs");
   if (inputs.empty()) command.fail("inputs", "is empty", kAccepted);
   for (const std::string& name : inputs) {
     const bool plain = std::ranges::all_of(

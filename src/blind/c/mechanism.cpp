@@ -53,7 +53,7 @@ Mechanism::Mechanism(const Figures& figures, const Build& build, double step_s)
     std::memcpy(strip_quat_[side].data(), m.geom_quat + 4 * strips_[side].back(), sizeof strip_quat_[side]);
   }
   // What stands for no air has no virtual mass either.
-  for (int geom = 0; geom < m.ngeom; ++geom) {
+  for (std::ptrdiff_t geom = 0; geom < m.ngeom; ++geom) {
     mjtNum* fluid = m.geom_fluid + mjNFLUID * geom;
     if (fluid[1] == 0 || geom == mj_name2id(&m, mjOBJ_GEOM, "torso")) std::fill(fluid + 6, fluid + mjNFLUID, 0.0);
   }
@@ -144,7 +144,7 @@ void Mechanism::add_virtual_mass() {
   const int nv = m->nv;
   Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> along(3, nv), about(3, nv);
   for (const auto& wing : strips_)
-    for (const int geom : wing) {
+    for (const std::ptrdiff_t geom : wing) {
       mj_jac(m, d, along.data(), about.data(), d->geom_xpos + 3 * geom, m->geom_bodyid[geom]);
       const mjtNum* fluid = m->geom_fluid + mjNFLUID * geom;
       const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(d->geom_xmat + 9 * geom);

@@ -96,7 +96,7 @@ class Mechanism {
   std::unique_ptr<mjModel, void (*)(mjModel*)> model_;
   std::unique_ptr<mjData, void (*)(mjData*)> data_;
   std::array<int, 2> stroke_q_{}, stroke_v_{}, rotation_q_{}, rotation_v_{}, drive_q_{}, drive_v_{};
-  std::array<std::array<int, kStrips>, 2> strips_{};
+  std::array<std::array<std::ptrdiff_t, kStrips>, 2> strips_{};
   std::array<std::array<double, 4>, 2> strip_quat_{};
   double added_mass_ = 0;
 };

@@ -99,10 +99,10 @@ void Robot::step(const Motion* held) {
   ++done_;
 }
 
-Eigen::Vector3d specific_force_B(const Motion& now, const Eigen::Vector3d& at) {
+Eigen::Vector3d specific_force_B(const Motion& motion, const Eigen::Vector3d& place_B) {
   const Eigen::Vector3d gravity(0, 0, -Mechanism::kGravity_m_s2);
-  return now.R_WB.transpose() * (now.acceleration_W - gravity) + now.turning_B.cross(at) +
-         now.rate_B.cross(now.rate_B.cross(at));
+  return motion.R_WB.transpose() * (motion.acceleration_W - gravity) + motion.turning_B.cross(place_B) +
+         motion.rate_B.cross(motion.rate_B.cross(place_B));
 }
 
 }  // namespace flappy::blind::c

@@ -116,7 +116,7 @@ Shoves shoves_of(const Context& c) {
   std::vector<char> known;
   for (const double t_s : t) {
     const auto q = c.motion.attitude_at(t_s, Order::wxyz);
-    known.push_back(q.has_value());
+    known.push_back(q ? 1 : 0);
     s.attitude.push_back(q.value_or(Quaterniond::Identity()));
   }
   for (double middle = span_s; middle + span_s < c.motion.mocap_t_s().back(); middle += span_s) {
