@@ -147,7 +147,7 @@ std::vector<char> swapped_poses(const FlightLog& log) {
     for (const auto& [i, turn] : turns) known.push_back(angles[i] = middle->angularDistance(turn));
   }
   const double most = known.empty() ? 0 : std::max(kTurned_rad, kTurnedUsual * io::median(known));
-  for (std::size_t i = 0; i < n && !known.empty(); ++i) swapped[i] = angles[i] > most;
+  for (std::size_t i = 0; i < n && !known.empty(); ++i) swapped[i] = angles[i] > most ? 1 : 0;
   // Of the rest, those that leap are not kept.
   std::vector<PoseReading> rest;
   for (const PoseReading& pose : fresh_poses(log))
@@ -155,7 +155,8 @@ std::vector<char> swapped_poses(const FlightLog& log) {
   std::vector<char> leaping(n, 0);
   for (const PoseReading& pose : rest) leaping[pose.row] = 1;
   for (const PoseReading& pose : without_swaps(rest)) leaping[pose.row] = 0;
-  for (std::size_t i = 0; i < n; ++i) swapped[i] = swapped[i] || leaping[i];
+  for (std::size_t i = 0; i < n; ++i)
+    if (leaping[i]) swapped[i] = 1;
   return swapped;
 }
 

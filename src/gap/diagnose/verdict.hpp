@@ -14,7 +14,7 @@ void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule);
 
 /// The log evidence of a hypothesis, where what its effects, and something that no entry explains, gain over the parameters alone by chance
 /// counts for nothing. `plain`: log evidence of the parameters, without what was thought before.
-double beyond_chance(const ScoredHypothesis& hypothesis, double plain, const VerdictRule& rule);
+double beyond_chance(const ScoredHypothesis& a, double plain, const VerdictRule& rule);
 
 /// Of every hypothesis; the most probable first. Where d nats speak for the best rather than for it, it counts
 ///   (1 + 2 d / (n f))^(-f / 2)       n, f: doubt.nats, doubt.freedom

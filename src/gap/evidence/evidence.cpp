@@ -247,7 +247,7 @@ SufficientStatistics Evidence::statistics(const Residuals& residual) const {
         counted[i] += now * y;
         if (past != 0) counted[i - 1] -= past * y;
       });
-      s.sums[f][static_cast<std::size_t>(g)].noalias() = basis.transpose() * counted;
+      s.sums[f][static_cast<std::size_t>(g)] = basis.transpose() * counted;
     }
   }
   return s;

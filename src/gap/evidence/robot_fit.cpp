@@ -308,7 +308,7 @@ void RobotFit::find_sizes() {
     const std::size_t near = i;
     i += s.near.size();
     if (along[0].size() == 0) continue;
-    sizes_.push_back({s, along[0] / kSizeReach, {}, {}});
+    sizes_.push_back({static_cast<const EffectSize&>(s), along[0] / kSizeReach, {}, {}});
     for (std::size_t n = 0; n < s.near.size(); ++n) {
       const BasisCoefficients& there = changes[near + n];
       sizes_.back().near.push_back(there.size() > 0 ? BasisCoefficients(there / (n == 0 ? s.reach : -s.reach))
@@ -316,7 +316,8 @@ void RobotFit::find_sizes() {
     }
     if (s.near.empty()) sizes_.back().near.push_back(sizes_.back().change);
     for (std::size_t k = shapes; k < shapes + s.shaped.size(); ++k)
-      if (changes[k].size() > 0) shapes_.push_back({s, (changes[k] - along[0]) / kSizeReach, {}, {}});
+      if (changes[k].size() > 0)
+        shapes_.push_back({static_cast<const EffectSize&>(s), (changes[k] - along[0]) / kSizeReach, {}, {}});
     for (std::size_t n = 1; n + 1 < along.size() && along[n].size() > 0 && along[n + 1].size() > 0; ++n) {
       const double at = kSizeReach * static_cast<double>(n + 1);
       sizes_.back().large.push_back({at, along[n] / at, (along[n + 1] - along[n - 1]) / (2 * kSizeReach)});

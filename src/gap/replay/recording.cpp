@@ -99,8 +99,9 @@ void Recording::lay_grid() {
       const bool driven =
           std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
       // of another delay of motion capture the record may begin later than the grid, which all candidates share, or end before it does
-      const bool recorded = now_s > smoother.begin_s() && from_s < smoother.end_s();
-      valid.push_back(recorded && flies && driven && smoother.covers(std::max(from_s, smoother.begin_s()), at_s));
+      const bool recorded = now_s > smoother.begin_s() && from_s < smoother.end_s() &&
+                            smoother.covers(std::max(from_s, smoother.begin_s()), at_s);
+      valid.push_back(recorded && flies && driven ? 1 : 0);
     }
   }
 }
