@@ -23,7 +23,7 @@ class Collector {
   /// begin() plans a step in which `actor` acts, run() takes one of items() blocks through it, end() closes it.
   void begin(const std::shared_ptr<const policy::Actor>& actor);
   std::size_t items() const { return last_item_ - first_item_; }
-  void run(std::size_t i);
+  void run(std::size_t k);
   /// Whether any rank `wants_end`.
   bool end(Replay& replay, bool wants_end = false);
 

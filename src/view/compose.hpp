@@ -19,7 +19,7 @@ Kind recognised(const std::filesystem::path& path);
 
 /// A folder of flight logs stands for the first kMostFlights of them. Sections in the order of the paths; flights share the place of the first. A path that is given twice is refused, as whatever
 /// a section refuses.
-std::vector<Section> composed(const std::vector<std::filesystem::path>& paths, const FlightOptions& options,
+std::vector<Section> composed(const std::vector<std::filesystem::path>& given, const FlightOptions& options,
                               Packing& packing);
 
 }  // namespace flappy::view

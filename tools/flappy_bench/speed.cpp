@@ -19,11 +19,11 @@ namespace flappy::bench {
 namespace {
 
 constexpr double kStep_s = sim::kDefaultStep_s;
-constexpr int kPeriod = static_cast<int>(2e-3 / kStep_s + 0.5);  // physics steps in a control period
+const int kPeriod = static_cast<int>(std::lround(2e-3 / kStep_s));  // physics steps in a control period
 constexpr std::size_t kDistinctVehicles = 1024;
 /// Flights are no longer than this: without a controller a flapper then tumbles, which is not what anyone simulates.
 constexpr double kFlight_s = 0.2;
-constexpr int kFlightPeriods = static_cast<int>(kFlight_s / (kPeriod * kStep_s));
+const int kFlightPeriods = static_cast<int>(kFlight_s / (kPeriod * kStep_s));
 
 double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
