@@ -19,7 +19,7 @@ struct Command {
 
 Command add_forces(const io::Command& program);
 Command add_simulate_forces(const io::Command& program);
-Command add_calibrate(io::Program& program);
+Command add_calibrate(io::Program& owner);
 Command add_compare_map(const io::Command& program);
 Command add_kinematics(const io::Command& program);
 Command add_transitions(const io::Command& program);
