@@ -127,7 +127,8 @@ FLAPPY_INLINE void evaluate(const ActorView<Element<L>>& actor, const L* observa
       weights += 2 * outputs;
     }
     if (last && actor.linear)
-      for (int k = 0; k < outputs; ++k) out[k] = clamp(out[k], L(-1), L(1));
+      for (int k = 0; k < outputs; ++k)
+        out[k] = clamp(out[k], L(-1), L(1));  // NOLINT(clang-analyzer-core.CallAndMessage): neurons() wrote it
     else activate(last ? Activation::tanh : actor.hidden, outputs, out);
   }
   for (int o = 0; o < actor.widths[actor.layers]; ++o) action[o] = values[actor.layers % 2][o];

@@ -120,7 +120,7 @@ class Plant {
 
  private:
   struct SideNow;
-  void place(const State& x, std::size_t side, SideNow& now) const;
+  void place(const State& x, std::size_t j, SideNow& now) const;
   double hinge_torque(const Hinge& hinge, double angle, double rate, double stiffness, double loss, double shift) const;
   double stroke_torque(const State& x, std::size_t j, double i, const Slow& slow, State& rate) const;
   double spring_torque(std::size_t j, double stroke_rad, double stiffness) const;
