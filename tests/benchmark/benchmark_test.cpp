@@ -358,6 +358,7 @@ TEST_F(Benchmark, SealsWhereEffectsActAndWhatTheFileDeclares) {
 }
 
 TEST_F(Benchmark, ScoresSeveralFoldersTogether) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   copy_two();
   fs::rename(root_ / "bench", root_ / "first");
   copy_two("none");

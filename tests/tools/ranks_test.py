@@ -17,7 +17,8 @@ from pathlib import Path
 
 program, config, work = sys.argv[1], sys.argv[2], Path(sys.argv[3])
 full, launchers = "--full" in sys.argv, [word for word in sys.argv[4:] if word != "--full"]
-small = ["learn.updates=600", "evaluate.every=300", "evaluate.vehicles=101", "checkpoint.every=150", "collect.vehicles=32",
+updates = 600 if full else 300
+small = [f"learn.updates={updates}", f"evaluate.every={updates // 2}", "evaluate.vehicles=101", "checkpoint.every=150", "collect.vehicles=32",
          "collect.flappers=200", "learn.replay=20000"]
 lost = 75
 
@@ -147,7 +148,7 @@ alike("eval", ["e.json"], lambda f: [str(work / "one"), "--episodes", "70", "--n
 
 
 def sweep(folder, seeds="0-2"):
-    words = [word.replace("=600", "=60").replace("=300", "=60") for word in fresh(folder, more=["checkpoint.every=30"])]
+    words = [word.replace(f"={updates}", "=60").replace(f"={updates // 2}", "=60") for word in fresh(folder, more=["checkpoint.every=30"])]
     return [*words, "--seeds", seeds]
 
 
