@@ -138,10 +138,9 @@ class Calibration {
   VerdictRule best() const {
     VerdictRule rule = rule_;
     double value = score(rule);
-    for (int halvings = 1; halvings <= 6; ++halvings)
+    for (double step = 0.5; step > 0.01; step /= 2)
       for (bool better = true; better;) {
         better = false;
-        const double step = std::ldexp(1, -halvings);
         for (const Constant& c : constants())
           for (const double way : {step, -step}) {
             VerdictRule there = rule;
