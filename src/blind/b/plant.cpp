@@ -60,12 +60,12 @@ Slow Plant::fresh() const {
   return slow;
 }
 
-void Plant::place(const State& x, std::size_t j, SideNow& now) const {
-  const Side& s = f_.side[j];
-  const double sign = j == 0 ? 1 : -1;
-  const double c = std::cos(x[kStroke + j]), n = sign * std::sin(x[kStroke + j]);
-  now.cosine = std::cos(x[kRotation + j]);
-  now.sine = std::sin(x[kRotation + j]);
+void Plant::place(const State& x, std::size_t side, SideNow& now) const {
+  const Side& s = f_.side[side];
+  const double sign = side == 0 ? 1 : -1;
+  const double c = std::cos(x[kStroke + side]), n = sign * std::sin(x[kStroke + side]);
+  now.cosine = std::cos(x[kRotation + side]);
+  now.sine = std::sin(x[kRotation + side]);
   now.edge << c, -n, 0, n, c, 0, 0, 0, 1;
   now.wing.col(0) = now.cosine * now.edge.col(0) - now.sine * now.edge.col(2);
   now.wing.col(1) = now.edge.col(1);

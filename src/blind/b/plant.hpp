@@ -120,11 +120,12 @@ class Plant {
 
  private:
   struct SideNow;
-  void place(const State& x, std::size_t j, SideNow& now) const;
-  double hinge_torque(const Hinge& hinge, double angle, double rate, double stiffness, double loss, double shift) const;
-  double stroke_torque(const State& x, std::size_t j, double i, const Slow& slow, State& rate) const;
-  double spring_torque(std::size_t j, double stroke_rad, double stiffness) const;
-  double spring_energy(std::size_t j, double stroke_rad) const;
+  void place(const State& x, std::size_t side, SideNow& now) const;
+  double hinge_torque(const Hinge& hinge, double angle, double rate, double stiffness, double restitution,
+                      double shift) const;
+  double stroke_torque(const State& x, std::size_t side, double current_A, const Slow& slow, State& rate) const;
+  double spring_torque(std::size_t side, double stroke_rad, double stiffness) const;
+  double spring_energy(std::size_t side, double stroke_rad) const;
   double near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const Surroundings& room) const;
   Wrench on_torso(const State& x, const Matrix3d& R, const Slow& slow, const Surroundings& room) const;
 
