@@ -148,8 +148,7 @@ alike("eval", ["e.json"], lambda f: [str(work / "one"), "--episodes", "70", "--n
 
 
 def sweep(folder, seeds="0-2"):
-    words = [word.replace(f"={updates}", "=60").replace(f"={updates // 2}", "=60") for word in fresh(folder, more=["checkpoint.every=30"])]
-    return [*words, "--seeds", seeds]
+    return [*fresh(folder, more=["learn.updates=60", "evaluate.every=60", "checkpoint.every=30"]), "--seeds", seeds]
 
 
 left = [f"seed_{seed}/{file}" for seed in range(3) for file in ("best.json", "metrics.jsonl")]
