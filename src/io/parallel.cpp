@@ -1,51 +1,60 @@
-// A loop is open while its caller works on it. Threads that help enter it when the scheduler lets them, and the caller waits
-// only for those that have entered: one that others keep from its processor holds nobody up. (OpenMP waits for every thread
-// of a team, and its threads spin meanwhile.)
+// A loop is tasks of OpenMP: its caller and those that help each work through a stretch of their own, then take from the others'. The caller
+// waits only for helpers that have begun, so one that is kept from its processor holds nobody up.
 #include "io/parallel.hpp"
 
+#include <omp.h>
+#include <pthread.h>
 #include <sched.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <exception>
 #include <fstream>
-#include <memory>
+#include <latch>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace flappy::io {
 namespace {
 
-/// Who waits looks on for so long before it sleeps. Training on two threads beside a busy loop on each of two processors
-/// took 3.8 s with 10 us, as helpers were woken too late to help, 3.0 s with 50, and 3.2 s and a fifth more processor time
-/// with 200.
-constexpr std::chrono::microseconds kPatience{50};
+int sharing = 1;  // processes on this machine
 
-/// Waits until `word` is no longer `old`.
-void wait_while(const std::atomic<unsigned>& word, unsigned old) {
-  const auto until = std::chrono::steady_clock::now() + kPatience;
-  while (word.load(std::memory_order_acquire) == old)
-    if (std::chrono::steady_clock::now() > until) return word.wait(old, std::memory_order_acquire);
-}
+/// Whether a thread of this process has a team.
+std::atomic_flag team_taken;
+enum class Place { outside, with_team, in_job };
+thread_local Place place = Place::outside;
 
-/// A stretch of the loop. Its thread takes it from the front, as do those that have finished their own.
-struct alignas(64) Stretch {
-  std::atomic<std::size_t> next = 0;
-  std::size_t end = 0;
+/// `place` as long as this lives.
+class At {
+ public:
+  explicit At(Place now) : before_(std::exchange(place, now)) {}
+  ~At() { place = before_; }
+  At(const At&) = delete;
+  At& operator=(const At&) = delete;
+
+ private:
+  Place before_;
 };
 
 struct Loop {
-  const void* job;
-  detail::Call call;
-  std::vector<Stretch>* stretches;
-  std::size_t threads;
-  std::mutex mutex;
-  std::size_t failed_at = 0;
-  std::exception_ptr failed;
+  /// Jobs from `next` to `end`. Its thread takes them from the front, as do those that have finished their own.
+  struct alignas(64) Stretch {
+    std::atomic<std::size_t> next;
+    std::size_t end;
+  };
+
+  Loop(std::size_t count, std::size_t threads, const void* what, detail::Call how)
+      : job(what), call(how), stretches(threads) {
+    for (std::size_t k = 0; k < threads; ++k) {
+      stretches[k].next.store(count * k / threads, std::memory_order_relaxed);
+      stretches[k].end = count * (k + 1) / threads;
+    }
+  }
 
   void run(std::size_t i, std::size_t thread) {
     try {
@@ -56,64 +65,63 @@ struct Loop {
     }
   }
 
-  void work(std::size_t thread) {
+  void work() {
+    const At job_runs(Place::in_job);
+    const std::size_t thread = entered.fetch_add(1, std::memory_order_relaxed), threads = stretches.size();
     for (std::size_t k = 0; k < threads; ++k) {
-      Stretch& s = (*stretches)[(thread + k) % threads];
+      Stretch& s = stretches[(thread + k) % threads];
       if (s.next.load(std::memory_order_relaxed) >= s.end) continue;
       for (std::size_t i; (i = s.next.fetch_add(1, std::memory_order_relaxed)) < s.end;) run(i, thread);
     }
   }
+
+  const void* job;
+  detail::Call call;
+  std::vector<Stretch> stretches;
+  std::atomic<std::size_t> entered = 0;
+  std::mutex mutex;
+  std::size_t failed_at = 0;
+  std::exception_ptr failed;
 };
 
-/// The threads of this process that help, as many as were ever asked for. They sleep between loops and end with the process.
-class Team {
- public:
-  /// False where another loop has them.
-  bool run(Loop& loop, std::size_t count) {
-    if (busy_.test_and_set(std::memory_order_acquire)) return false;
-    const auto free = [](std::atomic_flag* busy) { busy->clear(std::memory_order_release); };
-    const std::unique_ptr<std::atomic_flag, decltype(free)> until_done(&busy_, free);
-    if (stretches_.size() < loop.threads) stretches_ = std::vector<Stretch>(loop.threads);
-    for (std::size_t k = 0; k < loop.threads; ++k) {
-      stretches_[k].next.store(count * k / loop.threads, std::memory_order_relaxed);
-      stretches_[k].end = count * (k + 1) / loop.threads;
+/// Shares a loop with the other threads of the region.
+void share(Loop& loop) {
+#pragma omp taskgroup
+  {
+    for (std::size_t k = 1; k < loop.stretches.size(); ++k) {
+#pragma omp task default(none) shared(loop)
+      loop.work();
     }
-    loop.stretches = &stretches_;
-    for (; helpers_ + 1 < loop.threads; ++helpers_)
-      std::thread([this, thread = helpers_ + 1] { help(thread); }).detach();
-    loop_ = &loop;
-    gate_.store(kOpen, std::memory_order_release);
-    round_.fetch_add(1, std::memory_order_release);
-    round_.notify_all();
-    loop.work(0);
-    for (unsigned inside = gate_.fetch_and(~kOpen, std::memory_order_acq_rel) & ~kOpen; inside > 0;
-         inside = gate_.load(std::memory_order_acquire))
-      wait_while(gate_, inside);
-    return true;
+    loop.work();
   }
+}
 
- private:
-  static constexpr unsigned kOpen = 1U << 31;
+/// GNU's threads look on for milliseconds before they sleep, which takes processors from others; for microseconds, where there are more of
+/// them than processors: this starts so many, asleep for good. (Its environment may have been read before us, as in Python.)
+/// https://gcc.gnu.org/onlinedocs/libgomp/GOMP_005fSPINCOUNT.html
+void let_waiting_threads_sleep() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    std::latch started(1);
+    std::thread([&] {
+      std::atomic<int> team = 0;
+#pragma omp parallel num_threads(omp_get_num_procs() + 1) default(none) shared(team)
+      ++team;  // gcc starts no threads for nothing
+      started.count_down();
+      for (;;) pause();  // its team lives as long
+    }).detach();
+    started.wait();
+  });
+}
 
-  void help(std::size_t thread) {
-    for (unsigned round = 0;;) {
-      wait_while(round_, round);
-      round = round_.load(std::memory_order_acquire);
-      unsigned inside = gate_.load(std::memory_order_relaxed);
-      while ((inside & kOpen) && !gate_.compare_exchange_weak(inside, inside + 1, std::memory_order_acquire)) continue;
-      if (!(inside & kOpen)) continue;
-      if (thread < loop_->threads) loop_->work(thread);
-      if (gate_.fetch_sub(1, std::memory_order_acq_rel) == 1) gate_.notify_one();
-    }
-  }
-
-  std::atomic_flag busy_;
-  std::vector<Stretch> stretches_;
-  std::size_t helpers_ = 0;
-  Loop* loop_ = nullptr;
-  alignas(64) std::atomic<unsigned> gate_ = 0;   // kOpen, and how many helpers are inside
-  alignas(64) std::atomic<unsigned> round_ = 0;  // loops so far
-};
+/// A child has none of its parent's threads: they end before, and both begin anew.
+void before_fork() {
+  if (place == Place::outside) omp_pause_resource_all(omp_pause_soft);
+}
+/// Another thread of the parent may have had its team.
+void in_child() {
+  if (place == Place::outside) team_taken.clear();
+}
 
 }  // namespace
 
@@ -133,10 +141,6 @@ int processors_of_group(const std::filesystem::path& membership, const std::file
   return static_cast<int>(std::ceil(least));
 }
 
-namespace {
-int sharing = 1;  // processes on this machine
-}
-
 void share_processors(int processes) { sharing = processes; }
 
 int processors() {
@@ -151,11 +155,38 @@ int processors() {
   return of_group > 0 ? std::min(share(of_group), own) : own;
 }
 
+void detail::together(int threads, const void* body, void (*call)(const void*)) {
+  let_waiting_threads_sleep();
+  static const int fork_error = pthread_atfork(before_fork, nullptr, in_child);
+  const int count = thread_count(threads);
+  if (fork_error != 0 || count < 2 || place != Place::outside || team_taken.test_and_set(std::memory_order_acquire))
+    return call(body);
+  std::exception_ptr failed;
+#pragma omp parallel num_threads(count) default(none) shared(body, call, failed)
+#pragma omp masked
+  {
+    const At with_team(Place::with_team);
+    try {
+      call(body);
+    } catch (...) {
+      failed = std::current_exception();
+    }
+  }
+  team_taken.clear(std::memory_order_release);
+  if (failed) std::rethrow_exception(failed);
+}
+
 void detail::parallel_for(std::size_t count, int threads, const void* job, Call call) {
-  Loop loop{job, call, nullptr, std::min(count, static_cast<std::size_t>(thread_count(threads))), {}, 0, nullptr};
-  static Team& team = *new Team;  // never deleted: its threads outlive whoever would do it
-  if (loop.threads < 2 || !team.run(loop, count))
+  Loop loop(count, std::min(count, static_cast<std::size_t>(thread_count(threads))), job, call);
+  if (loop.stretches.size() < 2) {
     for (std::size_t i = 0; i < count; ++i) loop.run(i, 0);
+  } else {
+    io::together(threads, [&] {
+      if (place == Place::with_team) return share(loop);
+      const At job_runs(Place::in_job);
+      for (std::size_t i = 0; i < count; ++i) loop.run(i, 0);
+    });
+  }
   if (loop.failed) std::rethrow_exception(loop.failed);
 }
 

@@ -23,7 +23,14 @@ inline int thread_count(int threads) { return threads > 0 ? threads : processors
 namespace detail {
 using Call = void (*)(const void* job, std::size_t i, int thread);
 void parallel_for(std::size_t count, int threads, const void* job, Call call);
+void together(int threads, const void* body, void (*call)(const void*));
 }  // namespace detail
+
+/// Calls body() on this thread. Loops that it runs share one team of at most `threads` threads, which stays together between them.
+template <class Body>
+void together(int threads, const Body& body) {
+  detail::together(threads, &body, [](const void* it) { (*static_cast<const Body*>(it))(); });
+}
 
 /// Calls job(i) or job(i, thread) for every i below `count`, on at most `threads` threads (0: one for each processor), which
 /// have the numbers from 0 on; 0 is the caller. If some throw, all are called nevertheless, and what the first of them by

@@ -135,6 +135,14 @@ class Trainer {
   /// One action of every flapper, and meanwhile the updates of this step. False: a rank wants it to be the last.
   bool step() {
     const auto from = Clock::now();
+    io::together(config_.threads, [&] { fly_and_learn(); });
+    const bool ends = collector_.end(replay_, wants_end_);
+    ++steps_;
+    (learnt_ ? learning_s_ : warming_s_) += seconds_since(from);
+    return !ends;
+  }
+
+  void fly_and_learn() {
     collector_.begin(actor_);
     const std::size_t items = collector_.items();
     learnt_ = replay_.size() >= config_.learner.batch && steps_ >= config_.steps_before;
@@ -160,10 +168,6 @@ class Trainer {
     } else {
       io::parallel_for(items, config_.threads, [&](std::size_t i) { collector_.run(i); });
     }
-    const bool ends = collector_.end(replay_, wants_end_);
-    ++steps_;
-    (learnt_ ? learning_s_ : warming_s_) += seconds_since(from);
-    return !ends;
   }
 
   double wall_s() const { return wall_before_s_ + seconds_since(options_.started) - evaluation_s_; }

@@ -1,9 +1,12 @@
 #include "io/parallel.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
+#include <ctime>
 #include <fstream>
 #include <numeric>
 #include <stdexcept>
@@ -32,7 +35,7 @@ TEST(Parallel, CallsEveryJobOnceOnTheThreadsAllowed) {
 
 TEST(Parallel, FinishesManySmallLoopsInOrder) {
   std::vector<std::size_t> sums(5);
-  for (int round = 0; round < 20000; ++round) {
+  for (int round = 0; round < 2000; ++round) {
     parallel_for(sums.size(), 1 + round % 4, [&](std::size_t i) { sums[i] += i + 1; });
     ASSERT_EQ(std::accumulate(sums.begin(), sums.end(), std::size_t{0}), 15 * static_cast<std::size_t>(round + 1));
   }
@@ -97,6 +100,80 @@ TEST(Parallel, RunsLoopsInLoopsAndBesideLoops) {
   };
   { const std::jthread one(nest), two(nest); }
   EXPECT_EQ(called, 2 * 200 * 4 * 5);
+}
+
+/// Two jobs that wait for each other: false where one thread has both, and the first gave up.
+bool two_meet(std::chrono::milliseconds patience = std::chrono::seconds(10)) {
+  std::atomic<int> here = 0, alone = 0;
+  parallel_for(2, 2, [&](std::size_t) {
+    ++here;
+    const auto until = std::chrono::steady_clock::now() + patience;
+    while (here < 2 && std::chrono::steady_clock::now() < until) std::this_thread::yield();
+    alone += here < 2;
+  });
+  return alone == 0;
+}
+
+TEST(Parallel, SharesOneTeamAmongTheLoopsOfABody) {
+  int loops = 0;
+  std::atomic<int> called = 0;
+  together(2, [&] {
+    for (; loops < 100; ++loops) parallel_for(10, 2, [&](std::size_t) { ++called; });
+    EXPECT_TRUE(two_meet());
+    together(2, [] { EXPECT_TRUE(two_meet()) << "one within the other"; });
+    std::thread([] {
+      EXPECT_FALSE(two_meet(std::chrono::milliseconds(50))) << "another thread's loop has no team";
+    }).join();
+  });
+  EXPECT_EQ(called, 1000);
+  EXPECT_THROW(together(2, [] { parallel_for(2, 2, [](std::size_t) { throw std::runtime_error("job"); }); }),
+               std::runtime_error);
+  EXPECT_TRUE(two_meet()) << "after it was left by an exception";
+}
+
+TEST(Parallel, SleepsWhileThereIsNothingToDo) {
+  const auto spent_s = [] {
+    timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+  };
+  ASSERT_TRUE(two_meet());
+  const double before = spent_s();
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_LT(spent_s() - before, 2e-3);  // OpenMP that waits as it likes spends 5e-3 or more
+  together(2, [&] {
+    ASSERT_TRUE(two_meet());
+    const double inside = spent_s();
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    EXPECT_LT(spent_s() - inside, 2e-3);
+  });
+}
+
+TEST(Parallel, RunsInAChildThatWasForkedAfterALoop) {
+  const auto child_meets = [] {
+    const pid_t child = fork();
+    if (child == 0) {
+      alarm(20);
+      _exit(two_meet() ? 0 : 1);
+    }
+    int status = -1;
+    waitpid(child, &status, 0);
+    return status == 0;
+  };
+  ASSERT_TRUE(two_meet());
+  EXPECT_TRUE(child_meets());
+  EXPECT_TRUE(two_meet()) << "the parent goes on";
+  std::atomic<bool> loops = false, end = false;
+  std::thread beside([&] {
+    together(2, [&] {
+      loops = true;
+      while (!end) std::this_thread::yield();
+    });
+  });
+  while (!loops) std::this_thread::yield();
+  EXPECT_TRUE(child_meets()) << "while another thread had the team";
+  end = true;
+  beside.join();
 }
 
 TEST(Parallel, KnowsWhatItsControlGroupPaysFor) {

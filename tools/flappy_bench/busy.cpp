@@ -106,12 +106,14 @@ Part training(const model::Vehicle& vehicle, const std::string& configs, const l
   return {
       "training", "updates", threads, [learner, &replay, fleet = hovering_fleet(vehicle, configs, threads)] {
         constexpr std::size_t kUpdates = 6;
-        fleet->begin(5);
-        for (std::size_t u = 0; u < kUpdates; ++u) {
-          const std::size_t first = fleet->blocks() * u / kUpdates, last = fleet->blocks() * (u + 1) / kUpdates;
-          learner->update(replay, kRate, kRate, {last - first, [&](std::size_t i) { fleet->fly_block(first + i); }});
-        }
-        fleet->end();
+        io::together(learner->options().threads, [&] {
+          fleet->begin(5);
+          for (std::size_t u = 0; u < kUpdates; ++u) {
+            const std::size_t first = fleet->blocks() * u / kUpdates, last = fleet->blocks() * (u + 1) / kUpdates;
+            learner->update(replay, kRate, kRate, {last - first, [&](std::size_t i) { fleet->fly_block(first + i); }});
+          }
+          fleet->end();
+        });
         return static_cast<double>(kUpdates);
       }};
 }

@@ -1,6 +1,9 @@
 #include "engines.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <functional>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "io/files.hpp"
@@ -11,29 +14,26 @@
 
 namespace flappy::bench {
 
-std::vector<EngineRow> measure_engines(int seeds) {
+std::vector<EngineRow> measure_engines(int seeds, const std::string& beside) {
   const io::TemporaryFolder work;
-  const auto train = [&](const std::string& engine, int seed, const std::vector<std::string>& more,
-                         double& peak_bytes) {
-    const std::filesystem::path folder = work / (engine + std::to_string(seed) + (more.empty() ? "" : "_start"));
-    std::vector<std::string> command = {io::beside_program("bin/flappy-train"),
-                                        io::config_path("train/escape.toml"),
-                                        "--out",
-                                        folder,
-                                        "--json",
-                                        folder.string() + ".json",
-                                        "--set",
-                                        "learn.engine=" + engine,
-                                        "--set",
-                                        "seed=" + std::to_string(seed)};
+  const auto train = [&](const EngineRow& row, int seed, const std::vector<std::string>& more, double& peak_bytes) {
+    const std::string name = row.name + std::to_string(seed) + (more.empty() ? "" : "_start");
+    const std::filesystem::path folder = work / name;
+    std::vector<std::string> command = {row.program, io::config_path("train/escape.toml"),
+                                        "--out",     folder,
+                                        "--json",    folder.string() + ".json",
+                                        "--set",     "learn.engine=" + row.engine,
+                                        "--set",     "seed=" + std::to_string(seed)};
     for (const std::string& word : more) command.insert(command.end(), {"--set", word});
     const io::Finished done = io::run(command);
     if (done.exit_code != 0) throw io::InputError(done.err.substr(0, done.err.find('\n')));
     peak_bytes = std::max(peak_bytes, done.peak_bytes);
     return nlohmann::json::parse(io::read_text(folder.string() + ".json"));
   };
-  std::vector<EngineRow> rows = {{"lanes"}};
-  if (learn::has_libtorch()) rows.push_back({"libtorch"});
+  const std::string own = io::beside_program("bin/flappy-train");
+  std::vector<EngineRow> rows = {{"lanes", "lanes", own}};
+  if (!beside.empty()) rows.push_back({"beside", "lanes", beside});
+  else if (learn::has_libtorch()) rows.push_back({"libtorch", "libtorch", own});
   struct Runs {
     std::vector<double> updates_per_s, to_90_s, best;
   };
@@ -41,7 +41,7 @@ std::vector<EngineRow> measure_engines(int seeds) {
   for (EngineRow& row : rows) {
     double peak_bytes = 0;
     const auto from = std::chrono::steady_clock::now();
-    train(row.engine, 0,
+    train(row, 0,
           {"learn.updates=1", "learn.updates_per_step=1", "collect.flappers=64", "collect.vehicles=1",
            "collect.steps_before=4", "evaluate.vehicles=1", "learn.replay=1024"},
           peak_bytes);
@@ -49,13 +49,18 @@ std::vector<EngineRow> measure_engines(int seeds) {
   }
   for (int seed = 0; seed < seeds; ++seed)
     for (std::size_t e = 0; e < rows.size(); ++e) {
-      const auto trained = train(rows[e].engine, seed, {}, rows[e].peak_bytes);
+      const auto trained = train(rows[e], seed, {}, rows[e].peak_bytes);
       runs[e].updates_per_s.push_back(trained["updates"].get<double>() / trained["wall_s"].get<double>());
       runs[e].best.push_back(trained["best_success_rate"].get<double>());
       if (!trained["time_to_90_s"].is_number()) continue;
       runs[e].to_90_s.push_back(trained["time_to_90_s"].get<double>());
       ++rows[e].reached;
     }
+  if (runs.size() > 1 && rows[0].reached == seeds && rows[1].reached == seeds) {
+    std::vector<double> times;
+    std::ranges::transform(runs[1].to_90_s, runs[0].to_90_s, std::back_inserter(times), std::divides());
+    rows[1].times_lanes = summary(std::move(times));
+  }
   for (std::size_t e = 0; e < rows.size(); ++e) {
     rows[e].updates_per_s = summary(std::move(runs[e].updates_per_s));
     rows[e].best_success = summary(std::move(runs[e].best));

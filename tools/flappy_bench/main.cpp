@@ -327,8 +327,8 @@ Json busy(const model::Vehicle& vehicle, const SpeedOptions& options) {
   return {{"busy", list}, {"processors", io::processors()}, {"instruction_set", sim::best_instruction_set()}};
 }
 
-Json engines(int seeds) {
-  const std::vector<EngineRow> rows = measure_engines(seeds);
+Json engines(int seeds, const std::string& beside) {
+  const std::vector<EngineRow> rows = measure_engines(seeds, beside);
   std::printf("configs/train/escape.toml, seeds 0 to %d, %d processors, %s\n", seeds - 1, io::processors(),
               sim::best_instruction_set().c_str());
   std::printf("  %-10s %8s %10s %12s %24s %10s\n", "", "start", "memory", "updates/s", "to 90 %: median [range]",
@@ -336,9 +336,9 @@ Json engines(int seeds) {
   Json list = Json::array();
   for (const EngineRow& r : rows) {
     std::printf("  %-10s %6.2f s %7.0f MB %12.0f %8.1f s [%5.1f .. %5.1f] %8.2f %%  reached by %d of %d\n",
-                r.engine.c_str(), r.start_s, r.peak_bytes / 1e6, r.updates_per_s.median, r.to_90_s.median,
-                r.to_90_s.low, r.to_90_s.high, 100 * r.best_success.median, r.reached, seeds);
-    list.push_back({{"engine", r.engine},
+                r.name.c_str(), r.start_s, r.peak_bytes / 1e6, r.updates_per_s.median, r.to_90_s.median, r.to_90_s.low,
+                r.to_90_s.high, 100 * r.best_success.median, r.reached, seeds);
+    list.push_back({{"engine", r.name},
                     {"start_s", r.start_s},
                     {"peak_bytes", r.peak_bytes},
                     {"updates_per_s", r.updates_per_s.median},
@@ -348,8 +348,9 @@ Json engines(int seeds) {
                     {"best_success", r.best_success.median},
                     {"reached", r.reached}});
   }
-  if (rows.size() > 1)
-    std::printf("libtorch takes %.1f x the time of lanes to 90 %%\n", rows[1].to_90_s.median / rows[0].to_90_s.median);
+  if (rows.size() > 1 && rows[1].times_lanes.median > 0)
+    std::printf("%s takes %.2f x [%.2f .. %.2f] the time of lanes to 90 %%\n", rows[1].name.c_str(),
+                rows[1].times_lanes.median, rows[1].times_lanes.low, rows[1].times_lanes.high);
   return {{"engines", list}, {"processors", io::processors()}, {"instruction_set", sim::best_instruction_set()}};
 }
 
@@ -399,6 +400,8 @@ int main(int argc, char** argv) {
       app.command("engines", "training on lanes and on LibTorch: start, memory, updates/s, time to 90 %");
   int seeds = 5;
   engines.option("--seeds", seeds, "of each engine").range(1, 100).shows_default();
+  std::string beside;
+  engines.option("--beside", beside, "in place of LibTorch, the flappy-train of another build");
   io::Command telemetry =
       app.command("telemetry", "what it costs to show 1 and 16 flappers over DDS, and how late they are");
   double telemetry_s = 10;
@@ -415,7 +418,7 @@ int main(int argc, char** argv) {
     if (batch.given()) return program.write_json(bench::fly_batch(config, overrides));
     if (learner.given()) return program.write_json(bench::learner(options));
     if (telemetry.given()) return program.write_json(bench::telemetry(telemetry_s));
-    if (engines.given()) return program.write_json(bench::engines(seeds));
+    if (engines.given()) return program.write_json(bench::engines(seeds, beside));
     const model::Vehicle v = model::read_vehicle(vehicle);
     program.write_json(convergence.given()      ? bench::convergence(v)
                        : work_precision.given() ? bench::error_against_work(v, options)
