@@ -140,8 +140,7 @@ bool Collector::end(Replay& replay, bool wants_end) {
   const TransitionLayout& at = replay.layout();
   const auto add = [&](std::span<const float> rows) {
     for (const float* row = rows.data(); row != rows.data() + rows.size(); row += at.row)
-      replay.add({row + at.actor_observation, nullptr, row + at.action, row + at.next_actor_observation, nullptr,
-                  row[at.reward], row[at.discount]});
+      replay.add({row + at.observation, row + at.action, row + at.next_observation, row[at.reward], row[at.discount]});
   };
   if (ranks_ == nullptr) {
     for (const std::vector<float>& rows : staged_) add(rows);

@@ -61,21 +61,20 @@ class TorchEngine : public LearnerEngine {
                            " ranks; accepted: a larger one, or fewer ranks");
     learner_ = torch_functions().make(o, false);
     std::vector<double> weights;
-    const int seen = o.shape.critic_observation > 0 ? o.shape.critic_observation : o.shape.actor_observation;
-    for (int c = 0; c < (o.twin ? 2 : 1); ++c) start(1 + c, seen + o.shape.action, o.critic_hidden, 1, weights);
+    for (int c = 0; c < (o.twin ? 2 : 1); ++c)
+      start(1 + c, o.shape.observation + o.shape.action, o.critic_hidden, 1, weights);
     actor_at_ = weights.size();
-    blank_.widths = start(0, o.shape.actor_observation, o.actor_hidden, o.shape.action, weights);
+    blank_.widths = start(0, o.shape.observation, o.actor_hidden, o.shape.action, weights);
     blank_.hidden = o.actor_activation;
     blank_.layer_norm = o.layer_norm;
-    blank_.mean = o.actor_input.mean, blank_.scale = o.actor_input.scale, blank_.clip = o.actor_input.clip;
+    blank_.mean = o.input.mean, blank_.scale = o.input.scale, blank_.clip = o.input.clip;
     learner_->set(TorchLearner::Kind::weights, weights);
     learner_->set(TorchLearner::Kind::targets, weights);
   }
 
   void update(const Replay& replay, double actor_rate, double critic_rate, const Companion& beside) override {
     const TransitionShape &have = replay.shape(), &want = o_.shape;
-    if (replay.size() == 0 || have.actor_observation != want.actor_observation ||
-        have.critic_observation != want.critic_observation || have.action != want.action)
+    if (replay.size() == 0 || have.observation != want.observation || have.action != want.action)
       throw std::invalid_argument("a replay memory that is empty or of another shape");
     LearnerCounters& n = counters_;
     const bool actor_learns = (n.updates + 1) % static_cast<std::uint64_t>(o_.policy_delay) == 0;
@@ -228,9 +227,10 @@ class TorchEngine : public LearnerEngine {
 }  // namespace
 
 const TorchLearnerFunctions& torch_functions() {
-  static const auto* const functions = io::plugin<TorchLearnerFunctions>(
-      kPlugin, "flappy_torch_learner_functions",
-      "learn.engine: libtorch is not in this build; accepted: \"lanes\", or a build with libtorch-dev installed");
+  static const auto* const functions =
+      io::plugin<TorchLearnerFunctions>(kPlugin, "flappy_torch_learner_functions",
+                                        "learn.engine: libtorch is not in this build; accepted: \"lanes\", or all that "
+                                        "scripts/build builds where libtorch-dev is installed");
   return *functions;
 }
 

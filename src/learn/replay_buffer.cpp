@@ -9,21 +9,17 @@
 namespace flappy::learn {
 
 TransitionLayout::TransitionLayout(const TransitionShape& shape) {
-  const auto seen = static_cast<std::size_t>(shape.actor_observation);
-  const auto privileged = static_cast<std::size_t>(shape.critic_observation);
-  actor_observation = 0;
-  critic_observation = privileged > 0 ? seen : 0;
-  action = seen + privileged;
+  observation = 0;
+  action = static_cast<std::size_t>(shape.observation);
   reward = action + static_cast<std::size_t>(shape.action);
   discount = reward + 1;
-  next_actor_observation = discount + 1;
-  next_critic_observation = next_actor_observation + critic_observation;
-  row = next_actor_observation + seen + privileged;
+  next_observation = discount + 1;
+  row = next_observation + static_cast<std::size_t>(shape.observation);
 }
 
 Replay::Replay(const TransitionShape& shape, std::size_t capacity)
     : shape_(shape), layout_(shape), capacity_(capacity) {
-  if (shape.actor_observation < 1 || shape.critic_observation < 0 || shape.action < 1)
+  if (shape.observation < 1 || shape.action < 1)
     throw std::invalid_argument("a transition needs an observation and an action");
   if (capacity < 1 || capacity > std::numeric_limits<std::uint32_t>::max())
     throw std::invalid_argument("a replay memory holds 1 to 2^32 - 1 transitions");
@@ -33,13 +29,9 @@ Replay::Replay(const TransitionShape& shape, std::size_t capacity)
 void Replay::put(std::size_t ahead, const Transition& t) {
   float* row = &rows_[(cursor_ + ahead) % capacity_ * layout_.row];
   const auto copy = [&](std::size_t to, const float* from, int count) { std::copy_n(from, count, row + to); };
-  copy(layout_.actor_observation, t.actor_observation, shape_.actor_observation);
+  copy(layout_.observation, t.observation, shape_.observation);
   copy(layout_.action, t.action, shape_.action);
-  copy(layout_.next_actor_observation, t.next_actor_observation, shape_.actor_observation);
-  if (shape_.critic_observation > 0) {
-    copy(layout_.critic_observation, t.critic_observation, shape_.critic_observation);
-    copy(layout_.next_critic_observation, t.next_critic_observation, shape_.critic_observation);
-  }
+  copy(layout_.next_observation, t.next_observation, shape_.observation);
   row[layout_.reward] = t.reward;
   row[layout_.discount] = t.discount;
 }

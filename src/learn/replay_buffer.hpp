@@ -13,24 +13,20 @@ inline constexpr std::size_t kChunk = 64;
 
 /// Numbers in the parts of a transition.
 struct TransitionShape {
-  int actor_observation = 0;
-  int critic_observation = 0;  ///< 0: the critics see what the actor sees, and it is kept once
-  int action = 0;
+  int observation = 0, action = 0;
 };
 
-/// One transition, as seen from outside. What the critics see is not read where they see what the actor sees.
+/// One transition, as seen from outside.
 struct Transition {
-  const float *actor_observation, *critic_observation, *action, *next_actor_observation, *next_critic_observation;
+  const float *observation, *action, *next_observation;
   float reward;    ///< summed over n steps and scaled
   float discount;  ///< gamma^n; 0: the episode terminated, so the next observation does not count
 };
 
-/// Where the parts of a transition stand in its row; `row` is the row's length. Where the critics see what the actor sees,
-/// both begin at the same place.
+/// Where the parts of a transition stand in its row; `row` is the row's length.
 struct TransitionLayout {
   explicit TransitionLayout(const TransitionShape& shape);
-  std::size_t actor_observation, critic_observation, action, reward, discount, next_actor_observation,
-      next_critic_observation, row;
+  std::size_t observation, action, reward, discount, next_observation, row;
 };
 
 class Replay {

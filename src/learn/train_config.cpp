@@ -86,17 +86,17 @@ class Reader {
       std::vector<double> given;
       if (scales && scales->has(part)) given = scales->numbers(part, signals.size(), io::positive(1e6));
       for (std::size_t i = 0; i < signals.size(); ++i) {
-        l.actor_input.mean.push_back((signals[i].low + signals[i].high) / 2);
+        l.input.mean.push_back((signals[i].low + signals[i].high) / 2);
         const double range = signals[i].high - signals[i].low;  // 0 of an action that may not change
-        l.actor_input.scale.push_back(!given.empty() ? given[i] : range > 0 ? 2 / range : 1);
+        l.input.scale.push_back(!given.empty() ? given[i] : range > 0 ? 2 / range : 1);
       }
     }
-    for (std::vector<double>* list : {&l.actor_input.mean, &l.actor_input.scale}) {
+    for (std::vector<double>* list : {&l.input.mean, &l.input.scale}) {
       const std::vector<double> now = *list;  // and as it was at each of the last actions
       for (std::uint32_t ago = 1; ago < c_.fly.fleet.task.history; ++ago)
         list->insert(list->end(), now.begin(), now.end());
     }
-    l.shape = {static_cast<int>(l.actor_input.mean.size()), 0, c_.fly.fleet.task.actions()};
+    l.shape = {static_cast<int>(l.input.mean.size()), c_.fly.fleet.task.actions()};
   }
 
   void read_collection() {

@@ -491,9 +491,9 @@ TrainCosts costs_of(const TrainConfig& config) {
     widths.push_back(outputs);
     return policy::weight_count(widths, l.layer_norm);
   };
-  const auto inputs = static_cast<std::size_t>(l.shape.actor_observation);
-  const std::size_t numbers = (weights(l.shape.actor_observation, l.actor_hidden, l.shape.action) +
-                               2 * weights(l.shape.actor_observation + l.shape.action, l.critic_hidden, 1)) *
+  const auto inputs = static_cast<std::size_t>(l.shape.observation);
+  const std::size_t numbers = (weights(l.shape.observation, l.actor_hidden, l.shape.action) +
+                               2 * weights(l.shape.observation + l.shape.action, l.critic_hidden, 1)) *
                               sizeof(float);
   const std::size_t history = inputs * sizeof(float), pending = (config.return_steps + 1) * history;
   const std::size_t own = config.flappers * (kFlapper + history + pending);

@@ -58,7 +58,7 @@ Overrides plain(std::size_t steps) {
 class Transitions {
  public:
   Transitions(const TrainConfig& c, const Replay& replay)
-      : replay_(replay), flappers_(c.flappers), inputs_(c.learner.shape.actor_observation) {
+      : replay_(replay), flappers_(c.flappers), inputs_(c.learner.shape.observation) {
     const auto signals = c.fly.fleet.task.observation();
     for (std::size_t k = 0; k < signals.size(); ++k)
       if (signals[k].name == "time") time_ = k;
@@ -67,8 +67,8 @@ class Transitions {
   const float* row(int step, std::size_t i) const {
     return replay_.row(static_cast<std::size_t>(step) * flappers_ + i);
   }
-  const float* seen(const float* row) const { return row + replay_.layout().actor_observation; }
-  const float* next(const float* row) const { return row + replay_.layout().next_actor_observation; }
+  const float* seen(const float* row) const { return row + replay_.layout().observation; }
+  const float* next(const float* row) const { return row + replay_.layout().next_observation; }
   float reward(const float* row) const { return row[replay_.layout().reward]; }
   float discount(const float* row) const { return row[replay_.layout().discount]; }
   double time_s(const float* observation) const { return observation[time_]; }
@@ -117,7 +117,7 @@ TEST(Collector, ReturnsAreSumsOverTheirSteps) {
   const Transitions s(one, single.replay);
   // by their first observation, which no two transitions share
   const auto key = [&](const Transitions& t, const float* row) {
-    return std::vector<float>(t.seen(row), t.seen(row) + one.learner.shape.actor_observation);
+    return std::vector<float>(t.seen(row), t.seen(row) + one.learner.shape.observation);
   };
   const Transitions m(three, summed.replay);
   std::map<std::vector<float>, const float*> rows;
@@ -218,7 +218,7 @@ TEST(Collector, KeepsTwoVoltagesOfEachAction) {
   for (std::size_t k = 0; k < all.replay.size(); ++k) {
     const float* row = all.replay.row(k);
     std::vector<L> seen, acted(2);
-    for (std::size_t i = 0; i < a.observation.size(); ++i) seen.push_back(L::load(row + at.actor_observation + i));
+    for (std::size_t i = 0; i < a.observation.size(); ++i) seen.push_back(L::load(row + at.observation + i));
     policy::evaluate(view, seen.data(), acted.data());
     for (std::size_t i = 0; i < 2; ++i) ASSERT_EQ(row[at.action + i], acted[i].raw[0]) << k;
     ASSERT_GT(row[at.reward], 0);

@@ -43,7 +43,7 @@ void expect_equal_updates(const LearnerOptions& options, int updates) {
 
 TEST(Engines, DoOneAlgorithm) {
   expect_equal_updates(td3(kPlain), 4);
-  expect_equal_updates(td3(kPrivileged), 4);
+  expect_equal_updates(td3(kWide), 4);
   expect_equal_updates(ddpg(kPlain), 4);
   LearnerOptions huber = td3(kPlain);
   huber.huber = 0.3;
@@ -52,7 +52,7 @@ TEST(Engines, DoOneAlgorithm) {
 
 /// In double, the plugin's update is that of the lanes.
 TEST(Engines, AgreeInDoubleToRounding) {
-  LearnerOptions o = td3(kPrivileged);
+  LearnerOptions o = td3(kWide);
   o.noise_sd = 0;  // which is drawn in float for the one, in double for the other
   o.policy_delay = 1;
   const Replay replay = random_replay(o.shape, 1000);
@@ -151,8 +151,7 @@ TEST(Engines, ActAsTheirActors) {
   const Replay replay = random_replay(o.shape, 100);
   const auto lanes = make_engine(EngineKind::lanes, o), torch = make_engine(EngineKind::libtorch, o);
   std::vector<float> seen, a(100 * 4), b(100 * 4);
-  for (std::size_t i = 0; i < 100; ++i)
-    seen.insert(seen.end(), replay.row(i), replay.row(i) + o.shape.actor_observation);
+  for (std::size_t i = 0; i < 100; ++i) seen.insert(seen.end(), replay.row(i), replay.row(i) + o.shape.observation);
   lanes->act(seen.data(), 100, a.data());
   torch->act(seen.data(), 100, b.data());
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 2e-6);

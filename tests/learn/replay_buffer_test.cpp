@@ -13,31 +13,22 @@ namespace {
 /// A transition whose numbers all tell its number.
 void add_numbered(Replay& replay, int number) {
   const std::vector<float> many(32, static_cast<float>(number));
-  replay.add({many.data(), many.data(), many.data(), many.data(), many.data(), many[0], many[0]});
+  replay.add({many.data(), many.data(), many.data(), many[0], many[0]});
 }
 
 TEST(Replay, parts_stand_where_the_layout_says) {
   const std::array<float, 2> seen = {1, 2}, next = {7, 8};
-  const std::array<float, 3> more = {3, 4, 5}, more_next = {9, 10, 11};
   const std::array<float, 1> action = {6};
-  Replay privileged({2, 3, 1}, 4);
-  privileged.add({seen.data(), more.data(), action.data(), next.data(), more_next.data(), 20, 30});
-  EXPECT_EQ(privileged.layout().row, 13U);
-  const std::vector<float> row(privileged.row(0), privileged.row(0) + 13);
-  EXPECT_EQ(row, (std::vector<float>{1, 2, 3, 4, 5, 6, 20, 30, 7, 8, 9, 10, 11}));
-  EXPECT_EQ(privileged.layout().next_critic_observation, 10U);
-  EXPECT_EQ(privileged.bytes(), 4 * 13 * sizeof(float));
-
-  Replay plain({2, 0, 1}, 4);
-  plain.add({seen.data(), nullptr, action.data(), next.data(), nullptr, 20, 30});
-  EXPECT_EQ(plain.layout().row, 7U);
-  EXPECT_EQ(plain.layout().critic_observation, plain.layout().actor_observation);
-  EXPECT_EQ(plain.layout().next_critic_observation, plain.layout().next_actor_observation);
-  EXPECT_EQ(std::vector<float>(plain.row(0), plain.row(0) + 7), (std::vector<float>{1, 2, 6, 20, 30, 7, 8}));
+  Replay replay({2, 1}, 4);
+  replay.add({seen.data(), action.data(), next.data(), 20, 30});
+  EXPECT_EQ(replay.layout().row, 7U);
+  EXPECT_EQ(replay.layout().next_observation, 5U);
+  EXPECT_EQ(replay.bytes(), 4 * 7 * sizeof(float));
+  EXPECT_EQ(std::vector<float>(replay.row(0), replay.row(0) + 7), (std::vector<float>{1, 2, 6, 20, 30, 7, 8}));
 }
 
 TEST(Replay, the_oldest_is_overwritten) {
-  Replay replay({3, 0, 2}, 5);
+  Replay replay({3, 2}, 5);
   for (int i = 0; i < 3; ++i) add_numbered(replay, i);
   EXPECT_EQ(replay.size(), 3U);
   EXPECT_EQ(replay.cursor(), 3U);
@@ -50,11 +41,11 @@ TEST(Replay, the_oldest_is_overwritten) {
 }
 
 TEST(Replay, putting_many_at_once_is_adding_them) {
-  Replay one = random_replay(kPrivileged, 7), other = random_replay(kPrivileged, 7);
+  Replay one = random_replay(kWide, 7), other = random_replay(kWide, 7);
   for (int i = 0; i < 5; ++i) add_numbered(one, i);
   for (const std::size_t i : {3U, 0U, 4U, 1U, 2U}) {
     const std::vector<float> many(32, static_cast<float>(i));
-    other.put(i, {many.data(), many.data(), many.data(), many.data(), many.data(), many[0], many[0]});
+    other.put(i, {many.data(), many.data(), many.data(), many[0], many[0]});
   }
   other.advance(5);
   EXPECT_EQ(one.cursor(), other.cursor());
@@ -62,7 +53,7 @@ TEST(Replay, putting_many_at_once_is_adding_them) {
 }
 
 TEST(Replay, samples_are_uniform_among_those_held) {
-  Replay replay({1, 0, 1}, 1000);
+  Replay replay({1, 1}, 1000);
   for (int i = 0; i < 10; ++i) add_numbered(replay, i);
   std::array<int, 10> counts{};
   constexpr int kUpdates = 500, kBatch = 64;
@@ -76,7 +67,7 @@ TEST(Replay, samples_are_uniform_among_those_held) {
 }
 
 TEST(Replay, a_sample_depends_on_its_place_in_the_batch_alone) {
-  const Replay replay = random_replay({1, 0, 1}, 1000);
+  const Replay replay = random_replay({1, 1}, 1000);
   std::array<std::uint32_t, 128> all;
   std::array<std::uint32_t, 64> half;
   replay.sample(9, 5, 0, all);
@@ -91,20 +82,20 @@ TEST(Replay, a_sample_depends_on_its_place_in_the_batch_alone) {
 
 TEST(Replay, what_was_saved_is_restored) {
   for (const int held : {3, 5, 8}) {
-    Replay saved({3, 0, 2}, 5), restored({3, 0, 2}, 5);
+    Replay saved({3, 2}, 5), restored({3, 2}, 5);
     for (int i = 0; i < held; ++i) add_numbered(saved, i);
     restored.restore(saved.rows(), saved.cursor());
     for (int i = 20; i < 24; ++i) add_numbered(saved, i), add_numbered(restored, i);
     EXPECT_EQ(restored.size(), saved.size());
     EXPECT_TRUE(std::ranges::equal(restored.rows(), saved.rows()));
   }
-  Replay small({3, 0, 2}, 4);
+  Replay small({3, 2}, 4);
   const std::vector<float> rows(5 * small.layout().row);
   EXPECT_THROW(small.restore(rows, 0), std::invalid_argument);                                       // too many
   EXPECT_THROW(small.restore(std::span(rows).first(3), 0), std::invalid_argument);                   // half a row
   EXPECT_THROW(small.restore(std::span(rows).first(small.layout().row), 3), std::invalid_argument);  // a gap
-  EXPECT_THROW(Replay({0, 0, 1}, 4), std::invalid_argument);
-  EXPECT_THROW(Replay({1, 0, 1}, 0), std::invalid_argument);
+  EXPECT_THROW(Replay({0, 1}, 4), std::invalid_argument);
+  EXPECT_THROW(Replay({1, 1}, 0), std::invalid_argument);
 }
 
 }  // namespace

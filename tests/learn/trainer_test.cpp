@@ -355,7 +355,7 @@ TEST(TrainConfig, SeesItsHistory) {
   const std::size_t now = one.blank_actor().observation.size();
   ASSERT_EQ(seen.size(), 3 * now);
   EXPECT_EQ(seen[now], seen[0] + "_1_ago");
-  EXPECT_EQ(three.learner.actor_input.scale[2 * now + 4], one.learner.actor_input.scale[4]);
+  EXPECT_EQ(three.learner.input.scale[2 * now + 4], one.learner.input.scale[4]);
 }
 
 TEST(TrainConfig, CountsInWholeSteps) {
@@ -369,11 +369,11 @@ TEST(TrainConfig, ScalesObservationsByTheirRangeUnlessTold) {
   const TrainConfig c = small_training();
   const auto signals = c.fly.fleet.task.observation();
   for (std::size_t k = 0; k < signals.size(); ++k) {
-    EXPECT_EQ(c.learner.actor_input.mean[k], (signals[k].low + signals[k].high) / 2);
-    if (signals[k].name == "x_error") EXPECT_EQ(c.learner.actor_input.scale[k], 5);
-    if (signals[k].name == "added_bias") EXPECT_EQ(c.learner.actor_input.scale[k], 1 / 3.5);
+    EXPECT_EQ(c.learner.input.mean[k], (signals[k].low + signals[k].high) / 2);
+    if (signals[k].name == "x_error") EXPECT_EQ(c.learner.input.scale[k], 5);
+    if (signals[k].name == "added_bias") EXPECT_EQ(c.learner.input.scale[k], 1 / 3.5);
   }
-  for (const double scale : small_training({"task.action.split_cycle=[0, 0]"}).learner.actor_input.scale)
+  for (const double scale : small_training({"task.action.split_cycle=[0, 0]"}).learner.input.scale)
     EXPECT_LT(scale, 100);  // of an action that may not change, too
 }
 

@@ -75,10 +75,8 @@ void follow(Perceptron& target, const Perceptron& leader, double tau) {
 struct TorchLearner::Storage {
   LearnerOptions o;
   torch::Dtype type;
-  torch::Tensor actor_seen, critic_seen, action, reward, discount, next_actor_seen,
-      next_critic_seen;  // of all transitions
-  torch::Tensor actor_mean, actor_scale, critic_mean, critic_scale;
-  double critic_clip;
+  torch::Tensor seen, action, reward, discount, next_seen;  // of all transitions
+  torch::Tensor mean, scale;
   std::vector<std::shared_ptr<Perceptron>> critics, critic_targets;
   std::shared_ptr<Perceptron> actor, actor_target;
   std::unique_ptr<torch::optim::Adam> critic_adam, actor_adam;
@@ -86,10 +84,7 @@ struct TorchLearner::Storage {
   double loss = 0;
 
   torch::Tensor tensor(const std::vector<double>& x) const { return torch::tensor(x, torch::kDouble).to(type); }
-  torch::Tensor see(const torch::Tensor& x, bool by_actor) const {
-    if (by_actor) return ((x - actor_mean) * actor_scale).clamp(-o.actor_input.clip, o.actor_input.clip);
-    return ((x - critic_mean) * critic_scale).clamp(-critic_clip, critic_clip);
-  }
+  torch::Tensor see(const torch::Tensor& x) const { return ((x - mean) * scale).clamp(-o.input.clip, o.input.clip); }
 };
 
 TorchLearner::TorchLearner(const LearnerOptions& o, const learn::Replay& replay, bool twice,
@@ -99,8 +94,6 @@ TorchLearner::TorchLearner(const LearnerOptions& o, const learn::Replay& replay,
   Storage& s = *storage_;
   s.o = o;
   s.type = twice ? torch::kDouble : torch::kFloat;
-  const bool privileged = o.shape.critic_observation > 0;
-  const int seen = privileged ? o.shape.critic_observation : o.shape.actor_observation;
   const learn::TransitionLayout& at = replay.layout();
   const torch::Tensor all =
       torch::from_blob(const_cast<float*>(replay.row(0)),
@@ -109,17 +102,12 @@ TorchLearner::TorchLearner(const LearnerOptions& o, const learn::Replay& replay,
   const auto columns = [&](std::size_t first, int count) {
     return all.narrow(1, static_cast<std::int64_t>(first), count).contiguous();
   };
-  s.actor_seen = columns(at.actor_observation, o.shape.actor_observation);
-  s.critic_seen = columns(at.critic_observation, seen);
+  s.seen = columns(at.observation, o.shape.observation);
   s.action = columns(at.action, o.shape.action);
   s.reward = columns(at.reward, 1);
   s.discount = columns(at.discount, 1);
-  s.next_actor_seen = columns(at.next_actor_observation, o.shape.actor_observation);
-  s.next_critic_seen = columns(at.next_critic_observation, seen);
-  const learn::Normaliser& critic_input = privileged ? o.critic_input : o.actor_input;
-  s.actor_mean = s.tensor(o.actor_input.mean), s.actor_scale = s.tensor(o.actor_input.scale);
-  s.critic_mean = s.tensor(critic_input.mean), s.critic_scale = s.tensor(critic_input.scale);
-  s.critic_clip = critic_input.clip;
+  s.next_seen = columns(at.next_observation, o.shape.observation);
+  s.mean = s.tensor(o.input.mean), s.scale = s.tensor(o.input.scale);
 
   const auto widths = [](int inputs, std::vector<int> list, int outputs) {
     list.insert(list.begin(), inputs);
@@ -127,14 +115,14 @@ TorchLearner::TorchLearner(const LearnerOptions& o, const learn::Replay& replay,
     return list;
   };
   const auto actor = [&] {
-    return std::make_shared<Perceptron>(widths(o.shape.actor_observation, o.actor_hidden, o.shape.action),
-                                        o.actor_activation, true, s.type, start[2]);
+    return std::make_shared<Perceptron>(widths(o.shape.observation, o.actor_hidden, o.shape.action), o.actor_activation,
+                                        true, s.type, start[2]);
   };
   s.actor = actor(), s.actor_target = actor();
   std::vector<torch::Tensor> parameters;
   for (int c = 0; c < (o.twin ? 2 : 1); ++c) {
     for (auto* list : {&s.critics, &s.critic_targets})
-      list->push_back(std::make_shared<Perceptron>(widths(seen + o.shape.action, o.critic_hidden, 1),
+      list->push_back(std::make_shared<Perceptron>(widths(o.shape.observation + o.shape.action, o.critic_hidden, 1),
                                                    o.critic_activation, false, s.type,
                                                    start.at(static_cast<std::size_t>(c))));
     for (const auto& p : s.critics.back()->parameters()) parameters.push_back(p);
@@ -158,22 +146,22 @@ void TorchLearner::update(std::span<const std::uint32_t> rows, std::span<const d
   torch::Tensor goal;
   {
     const torch::NoGradGuard none;
-    torch::Tensor next = s.actor_target->forward(s.see(pick(s.next_actor_seen), true));
+    const torch::Tensor next_seen = s.see(pick(s.next_seen));
+    torch::Tensor next = s.actor_target->forward(next_seen);
     if (o.noise_sd > 0) {
       const torch::Tensor n =
           noise.empty() ? torch::randn_like(next)
                         : torch::from_blob(const_cast<double*>(noise.data()), next.sizes(), torch::kDouble).to(s.type);
       next = (next + (n * o.noise_sd).clamp(-o.noise_clip, o.noise_clip)).clamp(-1, 1);
     }
-    const torch::Tensor in = torch::cat({s.see(pick(s.next_critic_seen), false), next}, 1);
+    const torch::Tensor in = torch::cat({next_seen, next}, 1);
     torch::Tensor q = s.critic_targets[0]->forward(in);
     if (o.twin) q = torch::min(q, s.critic_targets[1]->forward(in));
     goal = pick(s.reward) + pick(s.discount) * q;
   }
-  const torch::Tensor seen = s.see(pick(s.critic_seen), false);
+  const torch::Tensor seen = s.see(pick(s.seen));
   if (actor_learns) {  // by the critic as it is before its step
-    const torch::Tensor q =
-        s.critics[0]->forward(torch::cat({seen, s.actor->forward(s.see(pick(s.actor_seen), true))}, 1));
+    const torch::Tensor q = s.critics[0]->forward(torch::cat({seen, s.actor->forward(seen)}, 1));
     const auto parameters = s.actor->parameters();
     const auto slopes = torch::autograd::grad({-q.mean()}, parameters);
     for (std::size_t i = 0; i < parameters.size(); ++i) torch::Tensor(parameters[i]).mutable_grad() = slopes[i];

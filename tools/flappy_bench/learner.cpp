@@ -16,7 +16,7 @@ using learn::Learner;
 using learn::LearnerOptions;
 using learn::Replay;
 
-constexpr learn::TransitionShape kShape{24, 0, 4};
+constexpr learn::TransitionShape kShape{24, 4};
 constexpr std::size_t kTransitions = 200'000;  // more than the caches hold
 constexpr double kRate = 1e-4;
 
@@ -33,7 +33,7 @@ double weights(int inputs, const std::vector<int>& hidden, int outputs) {
 
 /// A forward pass uses each weight once; gradients by weights once more; slopes by inputs again, but for a first layer.
 double multiply_adds(const LearnerOptions& o) {
-  const int in = o.shape.actor_observation, critic_in = in + o.shape.action, critics = o.twin ? 2 : 1;
+  const int in = o.shape.observation, critic_in = in + o.shape.action, critics = o.twin ? 2 : 1;
   const double actor = weights(in, o.actor_hidden, o.shape.action), critic = weights(critic_in, o.critic_hidden, 1);
   const double actor_first = (in + 1.0) * o.actor_hidden[0], critic_first = (critic_in + 1.0) * o.critic_hidden[0];
   const double goal = actor + critics * critic, descent = critics * (3 * critic - critic_first);
@@ -81,7 +81,7 @@ Replay random_replay() {
   std::vector<float> row(52);
   for (std::size_t i = 0; i < kTransitions; ++i) {
     for (float& x : row) x = unit(engine);
-    replay.add({row.data(), nullptr, &row[24], &row[28], nullptr, unit(engine), 0.99F});
+    replay.add({row.data(), &row[24], &row[28], unit(engine), 0.99F});
   }
   return replay;
 }
@@ -89,7 +89,7 @@ Replay random_replay() {
 LearnerOptions learner_options(std::vector<int> critic, std::size_t batch, bool td3) {
   LearnerOptions o;
   o.shape = kShape;
-  o.actor_input = {std::vector<double>(24, 0.0), std::vector<double>(24, 1.0), 10};
+  o.input = {std::vector<double>(24, 0.0), std::vector<double>(24, 1.0), 10};
   o.critic_hidden = std::move(critic);
   o.batch = batch;
   if (!td3) o.twin = false, o.policy_delay = 1, o.noise_sd = 0;

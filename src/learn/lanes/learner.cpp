@@ -61,13 +61,8 @@ void each_weight(const NetworkShape& net, const Visit& visit) {
 }  // namespace
 
 void check_options(const LearnerOptions& o) {
-  const bool privileged = o.shape.critic_observation > 0;
-  const Normaliser& critic_input = privileged ? o.critic_input : o.actor_input;
-  const int seen = privileged ? o.shape.critic_observation : o.shape.actor_observation;
-  const auto fits = [](const Normaliser& n, int inputs) {
-    return static_cast<int>(n.mean.size()) == inputs && static_cast<int>(n.scale.size()) == inputs && n.clip > 0;
-  };
-  if (!fits(o.actor_input, o.shape.actor_observation) || !fits(critic_input, seen))
+  const auto inputs = static_cast<std::size_t>(o.shape.observation);
+  if (o.input.mean.size() != inputs || o.input.scale.size() != inputs || !(o.input.clip > 0))
     throw std::invalid_argument("a normaliser has one mean and one scale for each input, and a clip above 0");
   if (o.batch < kChunk || o.batch % kChunk != 0)
     throw std::invalid_argument("a batch is a multiple of " + std::to_string(kChunk));
@@ -108,15 +103,13 @@ struct Learner<T>::Storage {
         plan(p),
         count(p.weight_count()),
         parts(std::min(kMostParts, o.batch / kChunk)),
-        input_numbers(2 * static_cast<std::size_t>(p.actor_input.count + p.critic_input.count)),
+        input_numbers(2 * static_cast<std::size_t>(p.input.count)),
         numbers(static_cast<std::size_t>(4 * count)),
         gradients(static_cast<std::size_t>(count) * parts),
         work(static_cast<std::size_t>(o.threads * work_room(p))),
         sums(o.batch / kChunk),
         work_size(work_room(p)) {
-    put_input(plan.actor_input, o.actor_input, input_numbers.data());
-    put_input(plan.critic_input, o.shape.critic_observation > 0 ? o.critic_input : o.actor_input,
-              input_numbers.data() + 2 * plan.actor_input.count);
+    put_input(plan.input, o.input, input_numbers.data());
     plan.weights = numbers.data();
     plan.targets = numbers.data() + count;
     for (int c = 0; c < plan.critics; ++c) start(plan.critic, c * plan.critic.weight_count(), 1 + c);
@@ -144,14 +137,14 @@ struct Learner<T>::Storage {
     });
   }
 
-  policy::Actor actor(bool target) {
+  policy::Actor actor() {
     policy::Actor a;
     a.widths.assign(plan.actor.widths, plan.actor.widths + plan.actor.layers + 1);
     a.hidden = plan.actor.hidden;
-    a.mean = options.actor_input.mean;
-    a.scale = options.actor_input.scale;
-    a.clip = options.actor_input.clip;
-    const T* from = weights_at(plan.actor_at(), target);
+    a.mean = options.input.mean;
+    a.scale = options.input.scale;
+    a.clip = options.input.clip;
+    const T* from = weights_at(plan.actor_at(), false);
     each_weight(plan.actor, [&](int, int, int, std::ptrdiff_t place) { a.weights.push_back(from[place]); });
     return a;
   }
@@ -226,19 +219,15 @@ Learner<T>::Learner(const LearnerOptions& o) {
   if (o.layer_norm || o.weight_decay > 0 || o.gradient_clip > 0 || o.device != "cpu" ||
       std::max(o.actor_activation, o.critic_activation) > policy::Activation::tanh)
     throw std::invalid_argument("lanes learn neither layer norm, decay of weights, clipped gradients, elu nor silu");
-  const int seen = o.shape.critic_observation > 0 ? o.shape.critic_observation : o.shape.actor_observation;
   UpdatePlan<T> plan;
-  plan.actor = network_shape(o.shape.actor_observation, o.actor_hidden, o.shape.action, o.actor_activation, true);
-  plan.critic = network_shape(seen + o.shape.action, o.critic_hidden, 1, o.critic_activation, false);
+  plan.actor = network_shape(o.shape.observation, o.actor_hidden, o.shape.action, o.actor_activation, true);
+  plan.critic = network_shape(o.shape.observation + o.shape.action, o.critic_hidden, 1, o.critic_activation, false);
   plan.critics = o.twin ? 2 : 1;
   const TransitionLayout layout(o.shape);
   const auto column = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i); };
-  plan.actor_input.count = o.shape.actor_observation;
-  plan.actor_input.now = column(layout.actor_observation);
-  plan.actor_input.next = column(layout.next_actor_observation);
-  plan.critic_input.count = seen;
-  plan.critic_input.now = column(layout.critic_observation);
-  plan.critic_input.next = column(layout.next_critic_observation);
+  plan.input.count = o.shape.observation;
+  plan.input.now = column(layout.observation);
+  plan.input.next = column(layout.next_observation);
   plan.action = column(layout.action);
   plan.reward = column(layout.reward);
   plan.discount = column(layout.discount);
@@ -263,8 +252,7 @@ template <class T>
 void Learner<T>::update(const Replay& replay, double actor_rate, double critic_rate, const Companion& beside) {
   Storage& s = *storage_;
   const TransitionShape &have = replay.shape(), &want = s.options.shape;
-  if (replay.size() == 0 || have.actor_observation != want.actor_observation ||
-      have.critic_observation != want.critic_observation || have.action != want.action)
+  if (replay.size() == 0 || have.observation != want.observation || have.action != want.action)
     throw std::invalid_argument("a replay memory that is empty or of another shape");
   LearnerCounters& n = s.counters;
   s.plan.update = static_cast<std::uint32_t>(n.updates);
@@ -305,11 +293,7 @@ const UpdateMetrics& Learner<T>::metrics() const {
 }
 template <class T>
 policy::Actor Learner<T>::actor() const {
-  return storage_->actor(false);
-}
-template <class T>
-policy::Actor Learner<T>::target_actor() const {
-  return storage_->actor(true);
+  return storage_->actor();
 }
 
 template <class T>
@@ -329,7 +313,7 @@ void Learner<T>::set_actor(const policy::Actor& a) {
 template <class T>
 void Learner<T>::act(const float* observations, std::size_t count, T* actions) const {
   const Storage& s = *storage_;
-  const auto inputs = static_cast<std::size_t>(s.options.shape.actor_observation);
+  const auto inputs = static_cast<std::size_t>(s.options.shape.observation);
   const auto outputs = static_cast<std::size_t>(s.options.shape.action);
   AlignedArray<T> work(static_cast<std::size_t>(s.work_size));
   std::vector<float> in(kChunk * inputs);

@@ -30,8 +30,8 @@ struct LearnerOptions {
   TransitionShape shape;
   std::vector<int> actor_hidden = {32, 32}, critic_hidden = {64, 64};  ///< widths
   policy::Activation actor_activation = policy::Activation::relu, critic_activation = policy::Activation::relu;
-  Normaliser actor_input, critic_input;  ///< the latter is not read where critics see what the actor sees
-  double last_layer_scale = 0.1;         ///< of the first weights of the actor's last layer and the critics'
+  Normaliser input;               ///< of the actor and the critics
+  double last_layer_scale = 0.1;  ///< of the first weights of the actor's last layer and the critics'
 
   bool twin = true;
   int policy_delay = 2;
@@ -96,9 +96,8 @@ class Learner {
   const LearnerOptions& options() const;
   const UpdateMetrics& metrics() const;
 
-  /// The actor as it is, and its target; task and names of inputs and outputs are left to the caller.
+  /// The actor as it is; task and names of inputs and outputs are left to the caller.
   policy::Actor actor() const;
-  policy::Actor target_actor() const;
   /// Starts from this actor instead: weights and target's. std::invalid_argument where its shape is another.
   void set_actor(const policy::Actor& actor);
   /// Actions of `count` observations, row by row: what flight::evaluate gives, to the bit.

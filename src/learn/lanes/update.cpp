@@ -74,12 +74,12 @@ template <class T>
 FLAPPY_INLINE void find_targets(const UpdatePlan<T>& plan, const Workspace<T>& w, std::uint32_t sample) {
   const int actions = plan.actor.widths[plan.actor.layers];
   T* critic_in = rows_of(plan.critic, w.critic, 0);
-  T* action = critic_in + plan.critic_input.count * kRow;
-  normalise(plan.actor_input, w.columns + plan.actor_input.next * kRow, rows_of(plan.actor, w.actor, 0));
+  T* action = critic_in + plan.input.count * kRow;
+  normalise(plan.input, w.columns + plan.input.next * kRow, rows_of(plan.actor, w.actor, 0));
   forward(plan.actor, plan.targets + plan.actor_at(), w.actor);
   copy_rows(actions, rows_of(plan.actor, w.actor, plan.actor.layers), action);
   if (plan.noise_sd > 0) add_noise(plan, sample, actions, action);
-  normalise(plan.critic_input, w.columns + plan.critic_input.next * kRow, critic_in);
+  normalise(plan.input, w.columns + plan.input.next * kRow, critic_in);
   const T* q = rows_of(plan.critic, w.critic, plan.critic.layers);
   for (int c = 0; c < plan.critics; ++c) {
     forward(plan.critic, plan.targets + c * plan.critic.weight_count(), w.critic);
@@ -124,7 +124,7 @@ template <class T>
 ChunkSums<T> chunk(const UpdatePlan<T>& plan, T* work, const float* memory, const std::uint32_t* rows,
                    std::uint32_t sample, T* gradient, bool accumulate) {
   Workspace<T> w(plan, work);
-  const int actions = plan.actor.widths[plan.actor.layers], seen = plan.critic_input.count;
+  const int actions = plan.actor.widths[plan.actor.layers], seen = plan.input.count;
   T* critic_in = rows_of(plan.critic, w.critic, 0);
   const T* q = rows_of(plan.critic, w.critic, plan.critic.layers);
   ChunkSums<T> sums;
@@ -134,7 +134,7 @@ ChunkSums<T> chunk(const UpdatePlan<T>& plan, T* work, const float* memory, cons
 
   find_targets(plan, w, sample);
 
-  normalise(plan.critic_input, w.columns + plan.critic_input.now * kRow, critic_in);
+  normalise(plan.input, w.columns + plan.input.now * kRow, critic_in);
   copy_rows(actions, w.columns + plan.action * kRow, critic_in + seen * kRow);
   for (int c = 0; c < plan.critics; ++c) {
     const std::ptrdiff_t at = c * plan.critic.weight_count();
@@ -146,7 +146,7 @@ ChunkSums<T> chunk(const UpdatePlan<T>& plan, T* work, const float* memory, cons
 
   if (plan.actor_learns) {
     const T* mine = plan.weights + plan.actor_at();
-    normalise(plan.actor_input, w.columns + plan.actor_input.now * kRow, rows_of(plan.actor, w.actor, 0));
+    normalise(plan.input, w.columns + plan.input.now * kRow, rows_of(plan.actor, w.actor, 0));
     forward(plan.actor, mine, w.actor);
     copy_rows(actions, rows_of(plan.actor, w.actor, plan.actor.layers), critic_in + seen * kRow);
     forward(plan.critic, plan.weights, w.critic);
@@ -181,11 +181,11 @@ void adam(const AdamPlan<T>& p, std::ptrdiff_t begin, std::ptrdiff_t end) {
 template <class T>
 void act(const UpdatePlan<T>& plan, T* work, const float* observations, T* actions) {
   const Workspace<T> w(plan, work);
-  const int inputs = plan.actor_input.count, outputs = plan.actor.widths[plan.actor.layers];
+  const int inputs = plan.input.count, outputs = plan.actor.widths[plan.actor.layers];
   put_ones(plan.actor, w.actor);
   for (std::ptrdiff_t s = 0; s < kRow; ++s)
     for (std::ptrdiff_t i = 0; i < inputs; ++i) w.columns[i * kRow + s] = static_cast<T>(observations[s * inputs + i]);
-  normalise(plan.actor_input, w.columns, rows_of(plan.actor, w.actor, 0));
+  normalise(plan.input, w.columns, rows_of(plan.actor, w.actor, 0));
   forward(plan.actor, plan.weights + plan.actor_at(), w.actor);
   const T* out = rows_of(plan.actor, w.actor, plan.actor.layers);
   for (std::ptrdiff_t s = 0; s < kRow; ++s)

@@ -5,7 +5,7 @@
 
 namespace flappy::learn {
 
-/// What a network sees: columns of a transition now and next, normalised as flight::ActorView has it.
+/// What networks see: columns of a transition now and next, normalised as flight::ActorView has it.
 template <class T>
 struct InputView {
   int count = 0;
@@ -20,7 +20,7 @@ struct UpdatePlan {
   NetworkShape actor, critic;
   int critics = 1;
   const T *weights = nullptr, *targets = nullptr;  // of the critics, then of the actor
-  InputView<T> actor_input, critic_input;
+  InputView<T> input;
   std::ptrdiff_t action = 0, reward = 0, discount = 0, row = 0;  // columns of a transition, and how many
   T noise_sd = 0, noise_clip = 0, huber = 0;
   T critic_share = 0, actor_share = 0;  // weight of one sample in the gradients of the losses

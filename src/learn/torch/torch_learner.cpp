@@ -92,17 +92,16 @@ class Learner : public TorchLearner {
   Learner(const LearnerOptions& o, bool twice)
       : o_(o), as_(torch::device(o.device).dtype(twice ? torch::kDouble : torch::kFloat)) {
     alone();
-    const bool privileged = o.shape.critic_observation > 0;
-    seen_ = privileged ? o.shape.critic_observation : o.shape.actor_observation;
     const auto widths = [](int inputs, std::vector<int> list, int outputs) {
       list.insert(list.begin(), inputs);
       list.push_back(outputs);
       return list;
     };
     for (int c = 0; c < (o.twin ? 2 : 1); ++c)
-      shapes_.push_back({widths(seen_ + o.shape.action, o.critic_hidden, 1), o.critic_activation, o.layer_norm, false});
+      shapes_.push_back(
+          {widths(o.shape.observation + o.shape.action, o.critic_hidden, 1), o.critic_activation, o.layer_norm, false});
     shapes_.push_back(
-        {widths(o.shape.actor_observation, o.actor_hidden, o.shape.action), o.actor_activation, o.layer_norm, true});
+        {widths(o.shape.observation, o.actor_hidden, o.shape.action), o.actor_activation, o.layer_norm, true});
     std::int64_t count = 0;
     for (const Shape& s : shapes_) count += s.count();
     for (torch::Tensor& t : numbers_) t = torch::zeros({count}, as_);
@@ -117,10 +116,7 @@ class Learner : public TorchLearner {
       actor_at_ = at;
       at += s.count();
     }
-    const Normaliser& critic = privileged ? o.critic_input : o.actor_input;
-    actor_mean_ = of(o.actor_input.mean), actor_scale_ = of(o.actor_input.scale);
-    critic_mean_ = of(critic.mean), critic_scale_ = of(critic.scale);
-    critic_clip_ = critic.clip;
+    mean_ = of(o.input.mean), scale_ = of(o.input.scale);
   }
 
   UpdateMetrics differentiate(const Replay& replay, const Batch& batch, double share) override {
@@ -138,22 +134,22 @@ class Learner : public TorchLearner {
     torch::Tensor goal;
     {
       const torch::NoGradGuard none;
-      torch::Tensor next = targets_.back().forward(see(part(layout.next_actor_observation, actor_inputs()), true));
+      const torch::Tensor seen_next = see(part(layout.next_observation, inputs()));
+      torch::Tensor next = targets_.back().forward(seen_next);
       if (!batch.noise.empty()) {
         const torch::Tensor n = torch::from_blob(const_cast<float*>(batch.noise.data()), next.sizes()).to(as_);
         next = (next + (n * o_.noise_sd).clamp(-o_.noise_clip, o_.noise_clip)).clamp(-1, 1);
       }
-      const torch::Tensor in = torch::cat({see(part(layout.next_critic_observation, seen_), false), next}, 1);
+      const torch::Tensor in = torch::cat({seen_next, next}, 1);
       torch::Tensor q = targets_[0].forward(in);
       if (o_.twin) q = torch::min(q, targets_[1].forward(in));
       goal = torch::addcmul(part(layout.reward, 1), part(layout.discount, 1), q);
     }
     gradients_.zero_();
     UpdateMetrics m;
-    const torch::Tensor seen = see(part(layout.critic_observation, seen_), false);
+    const torch::Tensor seen = see(part(layout.observation, inputs()));
     if (batch.actor_learns) {  // by the critic as it is before its step, whose own gradient of this is thrown away
-      const torch::Tensor q = networks_[0].forward(
-          torch::cat({seen, networks_.back().forward(see(part(layout.actor_observation, actor_inputs()), true))}, 1));
+      const torch::Tensor q = networks_[0].forward(torch::cat({seen, networks_.back().forward(seen)}, 1));
       const std::vector<torch::Tensor> parameters = networks_.back().parameters();
       const torch::Tensor loss = -share * q.mean();
       const auto slopes = torch::autograd::grad({loss}, parameters);
@@ -197,10 +193,9 @@ class Learner : public TorchLearner {
   void act(const float* observations, std::size_t count, float* actions) const override {
     alone();
     const torch::NoGradGuard none;
-    const torch::Tensor in = torch::from_blob(const_cast<float*>(observations),
-                                              {static_cast<std::int64_t>(count), std::int64_t{actor_inputs()}});
-    const torch::Tensor out =
-        networks_.back().forward(see(in.to(as_), true)).to(torch::kCPU, torch::kFloat).contiguous();
+    const torch::Tensor in =
+        torch::from_blob(const_cast<float*>(observations), {static_cast<std::int64_t>(count), std::int64_t{inputs()}});
+    const torch::Tensor out = networks_.back().forward(see(in.to(as_))).to(torch::kCPU, torch::kFloat).contiguous();
     std::copy_n(out.data_ptr<float>(), out.numel(), actions);
   }
 
@@ -218,10 +213,9 @@ class Learner : public TorchLearner {
   }
 
  private:
-  int actor_inputs() const { return o_.shape.actor_observation; }
-  torch::Tensor see(const torch::Tensor& x, bool by_actor) const {
-    if (by_actor) return ((x - actor_mean_) * actor_scale_).clamp_(-o_.actor_input.clip, o_.actor_input.clip);
-    return ((x - critic_mean_) * critic_scale_).clamp_(-critic_clip_, critic_clip_);
+  int inputs() const { return o_.shape.observation; }
+  torch::Tensor see(const torch::Tensor& x) const {
+    return ((x - mean_) * scale_).clamp_(-o_.input.clip, o_.input.clip);
   }
   torch::Tensor of(std::span<const double> numbers) const {
     const auto count = static_cast<std::int64_t>(numbers.size());
@@ -260,14 +254,12 @@ class Learner : public TorchLearner {
   }
 
   LearnerOptions o_;
-  torch::TensorOptions as_;  // device and precision
-  int seen_ = 0;
+  torch::TensorOptions as_;    // device and precision
   std::vector<Shape> shapes_;  // critics, then the actor
   torch::Tensor numbers_[4], gradients_;
   std::int64_t actor_at_ = 0;
   std::vector<Perceptron> networks_, targets_;
-  torch::Tensor actor_mean_, actor_scale_, critic_mean_, critic_scale_;
-  double critic_clip_ = 0;
+  torch::Tensor mean_, scale_;
 };
 
 std::unique_ptr<TorchLearner> make(const LearnerOptions& options, bool twice) {

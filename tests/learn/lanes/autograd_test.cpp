@@ -24,7 +24,7 @@ std::vector<Case> cases() {
   huber.huber = 0.3;
   huber.actor_activation = policy::Activation::relu;
   many.batch = 18 * kChunk;  // two chunks share a part of the gradients
-  return {{"td3", td3(kPlain)}, {"td3 with privileged critics", td3(kPrivileged)}, {"huber", huber}, {"ddpg", many}};
+  return {{"td3", td3(kPlain)}, {"td3 of another shape", td3(kWide)}, {"huber", huber}, {"ddpg", many}};
 }
 
 using Network = TorchLearner::Network;

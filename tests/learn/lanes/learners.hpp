@@ -20,11 +20,8 @@ inline Replay random_replay(const TransitionShape& shape, std::size_t count, std
   };
   Replay replay(shape, count);
   for (std::size_t i = 0; i < count; ++i) {
-    const auto seen = row(shape.actor_observation), next = row(shape.actor_observation);
-    const auto more = row(shape.critic_observation), more_next = row(shape.critic_observation);
-    const auto action = row(shape.action);
-    replay.add(
-        {seen.data(), more.data(), action.data(), next.data(), more_next.data(), unit(), i % 10 == 3 ? 0.0F : 0.97F});
+    const auto seen = row(shape.observation), next = row(shape.observation), action = row(shape.action);
+    replay.add({seen.data(), action.data(), next.data(), unit(), i % 10 == 3 ? 0.0F : 0.97F});
   }
   return replay;
 }
@@ -46,8 +43,7 @@ inline LearnerOptions td3(const TransitionShape& shape) {
   o.actor_hidden = {19, 33};
   o.critic_hidden = {45, 37};
   o.actor_activation = policy::Activation::tanh;
-  o.actor_input = normaliser(shape.actor_observation);
-  o.critic_input = normaliser(shape.critic_observation);
+  o.input = normaliser(shape.observation);
   o.batch = 192;
   o.last_layer_scale = 1;
   o.tau = 0.05;
@@ -68,6 +64,6 @@ inline LearnerOptions ddpg(const TransitionShape& shape) {
   return o;
 }
 
-inline constexpr TransitionShape kPlain{17, 0, 4}, kPrivileged{13, 22, 5};
+inline constexpr TransitionShape kPlain{17, 4}, kWide{35, 5};
 
 }  // namespace flappy::learn
