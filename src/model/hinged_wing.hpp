@@ -17,13 +17,6 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
-/// The step as it was before, at rates of its start, is compiled with this for flappy-bench alone.
-#ifdef FLAPPY_OLD_RATES
-inline constexpr bool kOldRates = true;
-#else
-inline constexpr bool kOldRates = false;
-#endif
-
 /// How the hinges of one side turn: psi', theta', and theta'^2, which in a step is a mean of squares.
 template <class T>
 struct HingeRates {

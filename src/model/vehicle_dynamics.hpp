@@ -313,10 +313,7 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
   const Inverse<Sym2<T>, T> free = inverse(h.strokes);
   accelerate(free, T(0), T(0));
   const auto beyond = [](const Hinge<T>& q, const T& turn) { return (turn < q.lowest_turn) | (turn > q.highest_turn); };
-  const auto lands = [&](const Hinge<T>& q, const T& turn) {
-    if constexpr (kOldRates) return beyond(q, turn);
-    else return beyond(q, turn) | beyond(q, T(step * q.rate));
-  };
+  const auto lands = [&](const Hinge<T>& q, const T& turn) { return beyond(q, turn) | beyond(q, T(step * q.rate)); };
   auto out_l = lands(stroke_l, m.stroke_left), out_r = lands(stroke_r, m.stroke_right);
   if (rarely(out_l | out_r)) {  // a stroke reaches its stop: once more, with its turn given and its row of K gone
     const T zero(0);
@@ -341,7 +338,7 @@ FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const Bo
       const T coast = step * q.rate;
       const auto second = ((q.lowest_turn == zero) & (q.rate < zero)) | ((q.highest_turn == zero) & (q.rate > zero));
       const T tau = clamp(T(q.rate / where(second, q.before, T(1))), zero, T(1));
-      const T pulled_off = kOldRates ? turn : where(pushed, turn, T(T(T(1.5) - tau) * T(turn - coast)));
+      const T pulled_off = where(pushed, turn, T(T(T(1.5) - tau) * T(turn - coast)));
       return T(T(stopped(q, where(second, pulled_off, turn)) - coast) * per_step2);
     };
     T stop_l = landing(stroke_l, m.stroke_left, hit), stop_r = landing(stroke_r, m.stroke_right, hit);

@@ -82,7 +82,6 @@ template <class T>
 FLAPPY_INLINE HingeRates<T> mid_step_rates(const SideParameters<T>& p, const SideState<T>& q,
                                            const T& rotation_lower_rad, const T& rotation_upper_rad, const T& step,
                                            const T& per_step) {
-  if constexpr (kOldRates) return hinge_rates(q);
   const auto next = [&](const T& rate, const T& before, const T& angle, const T& lower, const T& upper) {
     const T ahead = where(on_stop(angle, lower, upper), rate, T(T(2) * rate - before));
     return T(clamp(T(step * ahead), T(lower - angle), T(upper - angle)) * per_step);

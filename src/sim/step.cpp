@@ -118,7 +118,6 @@ class Prefetch {
 template <bool with_effects, class L>
 FLAPPY_INLINE void shift_positions(const Parameters<L>& p, const L& reach_rad, const L& time_s, State<L>& x,
                                    Vec3<L>& com_m) {
-  if constexpr (kOldRates) return;
   const auto shift = [&](const SideParameters<L>& side, SideState<L>& q) {
     L lower_rad = side.rotation_lower_rad, upper_rad = side.rotation_upper_rad;
     if constexpr (with_effects) widen_stops(reach_rad, lower_rad, upper_rad);
@@ -250,9 +249,9 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
 template <class T>
 void step_any_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan, std::int64_t first, int steps,
                     const Ahead& ahead) {
-  if (kOldRates || (in_force.set == 0 && in_force.meter == nullptr && in_force.contact.points == 0))
+  if (in_force.set == 0 && in_force.meter == nullptr && in_force.contact.points == 0)
     step_block<false>(block, in_force, plan, first, steps, ahead);
-  else if constexpr (!kOldRates) step_block<true>(block, in_force, plan, first, steps, ahead);
+  else step_block<true>(block, in_force, plan, first, steps, ahead);
 }
 
 }  // namespace

@@ -138,20 +138,17 @@ Json convergence(const model::Vehicle& vehicle) {
   }
   Json many = Json::array();
   std::printf("256 randomised vehicles, rms: 0.3 s of free flight against the 1 us run, mean thrust welded\n");
-  std::printf("  %10s %10s %8s %10s %13s %10s\n", "volts", "", "step us", "torso mm", "attitude deg", "thrust");
-  std::vector<Scheme> schemes;
-  if (has_old_rates()) schemes.push_back({100e-6, true});
-  for (const double us : {500, 250, 200, 125, 100, 50, 20}) schemes.push_back({us * 1e-6});
+  std::printf("  %10s %8s %10s %13s %10s\n", "volts", "step us", "torso mm", "attitude deg", "thrust");
+  const std::vector<double> steps_s = {500e-6, 250e-6, 200e-6, 125e-6, 100e-6, 50e-6, 20e-6};
   for (const auto& [low_V, high_V] : {std::pair{6.0, 18.0}, {6.0, 8.0}, {8.0, 12.0}, {12.0, 15.0}, {15.0, 18.0}}) {
-    const std::vector<Errors> errors = errors_of(vehicle, {.low_V = low_V, .high_V = high_V}, schemes);
-    for (std::size_t i = 0; i < schemes.size(); ++i) {
-      const auto& [step_s, old_rates] = schemes[i];
+    const std::vector<Errors> errors = errors_of(vehicle, {.low_V = low_V, .high_V = high_V}, steps_s);
+    for (std::size_t i = 0; i < steps_s.size(); ++i) {
+      const double step_s = steps_s[i];
       const Errors& e = errors[i];
-      std::printf("  %4.0f to %2.0f %10s %9.0f %10.3f %13.3f %8.3f %%\n", low_V, high_V, old_rates ? "old rates" : "",
-                  step_s * 1e6, e.position_m * 1e3, e.attitude_rad * kDegrees, 100 * e.thrust);
+      std::printf("  %4.0f to %2.0f %9.0f %10.3f %13.3f %8.3f %%\n", low_V, high_V, step_s * 1e6, e.position_m * 1e3,
+                  e.attitude_rad * kDegrees, 100 * e.thrust);
       many.push_back({{"low_V", low_V},
                       {"high_V", high_V},
-                      {"old_rates", old_rates},
                       {"step_s", step_s},
                       {"position_error_m", e.position_m},
                       {"attitude_error_rad", e.attitude_rad},
@@ -162,17 +159,17 @@ Json convergence(const model::Vehicle& vehicle) {
   std::printf("the same at 6 to 12 V with an effect of typical size, 64 vehicles\n");
   std::printf("  %-24s %8s %10s %13s %10s\n", "", "step us", "torso mm", "attitude deg", "thrust");
   for (const model::EffectEntry& effect : model::effects()) {
-    const std::vector<Scheme> at = {{sim::kDefaultStep_s}, {100e-6}};
+    const std::vector<double> at = {sim::kDefaultStep_s, 100e-6};
     // a delay is kept in steps, of which there are not enough for finer ones
     const double exact_step_s = effect.info.id == std::string("command_delay") ? 40e-6 : 5e-6;
     const std::vector<Errors> errors =
         errors_of(vehicle, {.flights = 64, .high_V = 12, .effect = effect.info.id, .exact_step_s = exact_step_s}, at);
     for (std::size_t i = 0; i < at.size(); ++i) {
       const Errors& e = errors[i];
-      std::printf("  %-24s %8.0f %10.3f %13.3f %8.3f %%\n", effect.info.id, at[i].step_s * 1e6, e.position_m * 1e3,
+      std::printf("  %-24s %8.0f %10.3f %13.3f %8.3f %%\n", effect.info.id, at[i] * 1e6, e.position_m * 1e3,
                   e.attitude_rad * kDegrees, 100 * e.thrust);
       effects.push_back({{"effect", effect.info.id},
-                         {"step_s", at[i].step_s},
+                         {"step_s", at[i]},
                          {"position_error_m", e.position_m},
                          {"attitude_error_rad", e.attitude_rad},
                          {"thrust_error", e.thrust}});
@@ -240,23 +237,14 @@ Json error_against_work(const model::Vehicle& vehicle, const SpeedOptions& optio
   };
   Json result = {{"rows", list},
                  {"flapper_s_per_cpu_s", speed_at("flappy", sim::kDefaultStep_s)},
-                 {"flapper_s_per_cpu_s_reference", speed_at("flappy, old rates", 100e-6)},
                  {"mujoco_ratio_equal_error", ratio("MuJoCo")},
                  {"dart_ratio_equal_error", ratio("DART")}};
-  std::vector<Scheme> schemes = {{}};
-  if (has_old_rates()) schemes.push_back({100e-6, true});
-  const std::vector<Errors> errors = errors_of(vehicle, {}, schemes);
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    const std::string of = i == 0 ? "" : "_reference";
-    std::printf("6 to 18 V, %s: %.2f mm, %.2f deg, thrust %.3f %%\n", i == 0 ? "default step" : "old rates at 100 us",
-                errors[i].position_m * 1e3, errors[i].attitude_rad * kDegrees, 100 * errors[i].thrust);
-    result["position_error" + of + "_m"] = errors[i].position_m;
-    result["attitude_error" + of + "_rad"] = errors[i].attitude_rad;
-    result["thrust_error" + of] = errors[i].thrust;
-  }
-  if (has_old_rates())
-    std::printf("default step beside old rates at 100 us: %.2f x the flight per CPU second\n",
-                result["flapper_s_per_cpu_s"].get<double>() / result["flapper_s_per_cpu_s_reference"].get<double>());
+  const Errors e = errors_of(vehicle, {}, {sim::kDefaultStep_s}).front();
+  std::printf("6 to 18 V, default step: %.2f mm, %.2f deg, thrust %.3f %%\n", e.position_m * 1e3,
+              e.attitude_rad * kDegrees, 100 * e.thrust);
+  result["position_error_m"] = e.position_m;
+  result["attitude_error_rad"] = e.attitude_rad;
+  result["thrust_error"] = e.thrust;
   return result;
 }
 

@@ -8,7 +8,6 @@
 #include "accuracy.hpp"
 #include "io/config.hpp"
 #include "io/installation.hpp"
-#include "sim/kernels.hpp"
 #include "sim/randomise.hpp"
 #include "sim/storage.hpp"
 #include "speed.hpp"
@@ -16,17 +15,6 @@
 #include "dart_peer.hpp"
 #include "mujoco_peer.hpp"
 #endif
-
-namespace flappy::sim {
-inline namespace old_rates_v3 {
-extern const Kernel<float> kernel_float;
-extern const Kernel<double> kernel_double;
-}  // namespace old_rates_v3
-inline namespace old_rates_v4 {
-extern const Kernel<float> kernel_float;
-extern const Kernel<double> kernel_double;
-}  // namespace old_rates_v4
-}  // namespace flappy::sim
 
 namespace flappy::bench {
 namespace {
@@ -63,15 +51,8 @@ std::vector<OwnFlight> draw(const model::Vehicle& vehicle, const Manoeuvre& mano
 }
 
 template <class T>
-sim::Batch<T> batch_of(const std::vector<OwnFlight>& flights, const Scheme& scheme, sim::Start start) {
-  sim::Batch<T> batch(flights.size(), flights[0].vehicle, {.step_s = scheme.step_s, .threads = 1});
-  if (scheme.old_rates)
-    sim::storage_of(batch).kernel = [] {
-      const bool v4 = sim::best_instruction_set() == "x86-64-v4";
-      if constexpr (sizeof(T) == sizeof(float))
-        return (v4 ? sim::old_rates_v4::kernel_float : sim::old_rates_v3::kernel_float).step;
-      else return (v4 ? sim::old_rates_v4::kernel_double : sim::old_rates_v3::kernel_double).step;
-    }();
+sim::Batch<T> batch_of(const std::vector<OwnFlight>& flights, double step_s, sim::Start start) {
+  sim::Batch<T> batch(flights.size(), flights[0].vehicle, {.step_s = step_s, .threads = 1});
   for (std::size_t i = 0; i < flights.size(); ++i) {
     batch.set_vehicle(i, flights[i].vehicle);
     batch.reset(i, flights[i].start, start);
@@ -81,8 +62,8 @@ sim::Batch<T> batch_of(const std::vector<OwnFlight>& flights, const Scheme& sche
 }
 
 template <class T>
-void advance(sim::Batch<T>& batch, double seconds, const Scheme& scheme) {
-  batch.step(static_cast<int>(std::lround(seconds / scheme.step_s)));
+void advance(sim::Batch<T>& batch, double seconds, double step_s) {
+  batch.step(static_cast<int>(std::lround(seconds / step_s)));
 }
 
 Flight end_of(const sim::FlapperState& s) {
@@ -90,22 +71,22 @@ Flight end_of(const sim::FlapperState& s) {
       s.position_m[0], s.position_m[1], s.position_m[2], {s.attitude[0], s.attitude[1], s.attitude[2], s.attitude[3]}};
 }
 
-std::vector<Flight> free_flights(const std::vector<OwnFlight>& flights, const Scheme& scheme) {
-  auto batch = batch_of<double>(flights, scheme, sim::Start::flying);
-  advance(batch, kFlight_s, scheme);
+std::vector<Flight> free_flights(const std::vector<OwnFlight>& flights, double step_s) {
+  auto batch = batch_of<double>(flights, step_s, sim::Start::flying);
+  advance(batch, kFlight_s, step_s);
   std::vector<Flight> ends;
   for (std::size_t i = 0; i < flights.size(); ++i) ends.push_back(end_of(batch.state(i)));
   return ends;
 }
 
 /// Mean over whole beats, welded.
-std::vector<double> thrusts_N(const std::vector<OwnFlight>& flights, const Scheme& scheme) {
-  auto batch = batch_of<double>(flights, scheme, sim::Start::welded);
-  advance(batch, kSettles_s, scheme);
+std::vector<double> thrusts_N(const std::vector<OwnFlight>& flights, double step_s) {
+  auto batch = batch_of<double>(flights, step_s, sim::Start::welded);
+  advance(batch, kSettles_s, step_s);
   std::vector<double> thrust_N;
   for (std::size_t i = 0; i < flights.size(); ++i) thrust_N.push_back(-batch.held_impulse(i).force_N_s[2]);
   const double beats_s = kBeats / flights[0].vehicle.driver.flapping_Hz;
-  advance(batch, beats_s, scheme);
+  advance(batch, beats_s, step_s);
   for (std::size_t i = 0; i < flights.size(); ++i)
     thrust_N[i] = (thrust_N[i] + batch.held_impulse(i).force_N_s[2]) / beats_s;
   return thrust_N;
@@ -123,14 +104,14 @@ std::array<double, 2> rms(const std::vector<Flight>& flights, const std::vector<
 }
 
 /// Seconds of flight per second of one processor, in float, a control period of 2 ms at a time: the median of five goes.
-double flapper_s_per_cpu_s(const std::vector<OwnFlight>& few, const Scheme& scheme) {
+double flapper_s_per_cpu_s(const std::vector<OwnFlight>& few, double step_s) {
   std::vector<OwnFlight> flights;
   while (flights.size() < 1024) flights.insert(flights.end(), few.begin(), few.end());
   std::vector<double> goes;
   for (int go = 0; go < 5; ++go) {
-    auto batch = batch_of<float>(flights, scheme, sim::Start::flying);
+    auto batch = batch_of<float>(flights, step_s, sim::Start::flying);
     const double begin_s = processor_seconds();
-    for (int period = 0; period < std::lround(kFlight_s / kPeriod_s); ++period) advance(batch, kPeriod_s, scheme);
+    for (int period = 0; period < std::lround(kFlight_s / kPeriod_s); ++period) advance(batch, kPeriod_s, step_s);
     goes.push_back(kFlight_s * static_cast<double>(flights.size()) / (processor_seconds() - begin_s));
   }
   return summary(goes).median;
@@ -139,11 +120,11 @@ double flapper_s_per_cpu_s(const std::vector<OwnFlight>& few, const Scheme& sche
 #ifdef FLAPPY_HAVE_PEERS
 /// Voltages of the driver, held for a millisecond each, left and right.
 std::vector<std::vector<std::array<double, 2>>> voltages_of(const std::vector<OwnFlight>& flights) {
-  const Scheme coarse{kHold_s / 2};
-  auto batch = batch_of<double>(flights, coarse, sim::Start::welded);
+  const double coarse_s = kHold_s / 2;
+  auto batch = batch_of<double>(flights, coarse_s, sim::Start::welded);
   std::vector<std::vector<std::array<double, 2>>> voltages(flights.size());
   for (double t_s = 0; t_s < kFlight_s - kHold_s / 2; t_s += kHold_s) {
-    advance(batch, kHold_s, coarse);
+    advance(batch, kHold_s, coarse_s);
     for (std::size_t i = 0; i < flights.size(); ++i) {
       const auto at = sim::storage_of(batch).at(i);
       const auto v = sim::get<sim::Drive<double>>(at.block.drive, at.lane).voltages;
@@ -215,20 +196,15 @@ WorkPrecisionRow row_of(const PeerSettings& peer, double step_s, const std::vect
 
 }  // namespace
 
-bool has_old_rates() {
-  const std::string set = sim::best_instruction_set();
-  return set == "x86-64-v3" || set == "x86-64-v4";
-}
-
 std::vector<Errors> errors_of(const model::Vehicle& vehicle, const Manoeuvre& manoeuvre,
-                              const std::vector<Scheme>& schemes) {
+                              const std::vector<double>& steps_s) {
   const std::vector<OwnFlight> flights = draw(vehicle, manoeuvre);
-  const std::vector<Flight> exact = free_flights(flights, {manoeuvre.exact_step_s});
-  const std::vector<double> exact_N = thrusts_N(flights, {manoeuvre.exact_step_s});
+  const std::vector<Flight> exact = free_flights(flights, manoeuvre.exact_step_s);
+  const std::vector<double> exact_N = thrusts_N(flights, manoeuvre.exact_step_s);
   std::vector<Errors> errors;
-  for (const Scheme& scheme : schemes) {
-    const auto [position_m, attitude_rad] = rms(free_flights(flights, scheme), exact);
-    const std::vector<double> thrust_N = thrusts_N(flights, scheme);
+  for (const double step_s : steps_s) {
+    const auto [position_m, attitude_rad] = rms(free_flights(flights, step_s), exact);
+    const std::vector<double> thrust_N = thrusts_N(flights, step_s);
     double thrust = 0, mean_N = 0;
     for (std::size_t i = 0; i < flights.size(); ++i) {
       thrust += std::pow(thrust_N[i] - exact_N[i], 2);
@@ -244,21 +220,18 @@ std::vector<WorkPrecisionRow> work_precision(const model::Vehicle& vehicle, [[ma
                                              bool peers,
                                              const std::function<void(double done, const std::string& now)>& tell) {
   const std::vector<OwnFlight> flights = draw(vehicle, kAboutHover);
-  const std::vector<Flight> exact = free_flights(flights, {kAboutHover.exact_step_s});
+  const std::vector<Flight> exact = free_flights(flights, kAboutHover.exact_step_s);
   std::vector<WorkPrecisionRow> rows;
-  const double most = peers ? 76 : 16;  // rows
+  const double most = peers ? 68 : 8;  // rows
   const auto tell_of = [&](const std::string& engine, double us) {
     tell(static_cast<double>(rows.size()) / most, engine + " at " + std::to_string(static_cast<int>(us)) + " us");
   };
-  for (const bool old_rates : {false, true})
-    for (const double us : {500, 250, 200, 125, 100, 50, 25, 10}) {
-      if (old_rates && !has_old_rates()) continue;
-      const Scheme scheme{us * 1e-6, old_rates};
-      tell_of("flappy", us);
-      const auto [position_m, attitude_rad] = rms(free_flights(flights, scheme), exact);
-      rows.push_back({old_rates ? "flappy, old rates" : "flappy", "float", scheme.step_s, position_m, attitude_rad,
-                      flapper_s_per_cpu_s(flights, scheme)});
-    }
+  for (const double us : {500, 250, 200, 125, 100, 50, 25, 10}) {
+    const double step_s = us * 1e-6;
+    tell_of("flappy", us);
+    const auto [position_m, attitude_rad] = rms(free_flights(flights, step_s), exact);
+    rows.push_back({"flappy", "float", step_s, position_m, attitude_rad, flapper_s_per_cpu_s(flights, step_s)});
+  }
 #ifdef FLAPPY_HAVE_PEERS
   if (!peers) return rows;
   const auto voltages = voltages_of(flights);

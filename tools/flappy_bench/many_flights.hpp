@@ -24,18 +24,9 @@ struct Errors {
   double position_m, attitude_rad, thrust;
 };
 
-/// A step of the simulator, ours or the old one, at which rates of a step's start were taken.
-struct Scheme {
-  double step_s = sim::kDefaultStep_s;
-  bool old_rates = false;
-};
-
-/// The old step where this processor runs it.
-bool has_old_rates();
-
-/// Errors of each scheme against our own fine run, in double.
+/// Errors at each step against our own fine run, in double.
 std::vector<Errors> errors_of(const model::Vehicle& vehicle, const Manoeuvre& manoeuvre,
-                              const std::vector<Scheme>& schemes);
+                              const std::vector<double>& steps_s);
 
 /// One engine at one of its settings and one step.
 struct WorkPrecisionRow {
