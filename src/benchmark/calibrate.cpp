@@ -10,6 +10,7 @@
 #include "gap/diagnose/verdict.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
+#include "io/text.hpp"
 
 namespace flappy::benchmark {
 namespace {
@@ -172,11 +173,7 @@ class Calibration {
   std::vector<Case> cases_;
 };
 
-std::string rounded(double x) {
-  char text[24];
-  std::snprintf(text, sizeof text, "%.4g", x);
-  return text;
-}
+std::string rounded(double x) { return io::format("%.4g", x); }
 
 /// The file with other figures: all else stays as it is.
 void set_figure(std::string& text, const std::string& table, const std::string& key, const std::string& value) {

@@ -15,6 +15,7 @@
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/statistics.hpp"
+#include "io/text.hpp"
 
 namespace flappy::benchmark {
 namespace {
@@ -40,11 +41,7 @@ struct Found {
   Shown where;  ///< at size 1
 };
 
-std::string three_digits(double x) {
-  char text[24];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return text;
-}
+std::string three_digits(double x) { return io::format("%.3g", x); }
 
 struct Size {
   double detectable = 0, low = 0, high = 0, hover = 0;

@@ -1,7 +1,7 @@
 #include "benchmark/families.hpp"
 
-#include "blind/family_a.hpp"
-#include "blind/sampled_robot.hpp"
+#include "blind/a/family_a.hpp"
+#include "blind/a/sampled_robot.hpp"
 #ifdef FLAPPY_FAMILIES
 #include "blind/b/family_b.hpp"
 #endif

@@ -5,7 +5,7 @@
 
 #include "benchmark/records.hpp"
 #include "benchmark/work.hpp"
-#include "blind/sampled_robot.hpp"
+#include "blind/a/sampled_robot.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "io/append_file.hpp"
 #include "io/config.hpp"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "benchmark/score.hpp"
-#include "blind/effects.hpp"
+#include "blind/a/effects.hpp"
 #include "blind/family.hpp"
 
 namespace flappy::benchmark {

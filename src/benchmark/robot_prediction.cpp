@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "blind/robot_controller.hpp"
+#include "blind/a/robot_controller.hpp"
 #include "flightlog/rotation.hpp"
 #include "io/parallel.hpp"
 

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "blind/robot.hpp"
+#include "blind/a/robot.hpp"
 #include "gap/evidence/evidence.hpp"
 
 namespace flappy::benchmark {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "blind/flights.hpp"
+#include "blind/a/flights.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::benchmark {

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "blind/escape.hpp"
+#include "blind/a/escape.hpp"
 #include "blind/family.hpp"
 #include "rollout/outcome.hpp"
 

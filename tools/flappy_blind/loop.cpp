@@ -7,7 +7,7 @@
 #include "benchmark/families.hpp"
 #include "benchmark/records.hpp"
 #include "benchmark/work.hpp"
-#include "blind/family_a.hpp"
+#include "blind/a/family_a.hpp"
 #include "escape_rules.hpp"
 #include "io/append_file.hpp"
 #include "io/files.hpp"

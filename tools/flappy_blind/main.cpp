@@ -9,7 +9,7 @@
 #include "benchmark/make.hpp"
 #include "benchmark/score_bench.hpp"
 #include "benchmark/true_values.hpp"
-#include "blind/family_a.hpp"
+#include "blind/a/family_a.hpp"
 #include "escapes.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "blind/sampled_robot.hpp"
+#include "blind/a/sampled_robot.hpp"
 #include "io/installation.hpp"
 #include "io/program.hpp"
 

@@ -97,11 +97,6 @@ void Mechanism::move_torso(const Motion& motion) {
   vector_at(data_->qvel + 3) = motion.rate_B;
 }
 
-void Mechanism::set_stroke(std::size_t side, double angle_rad, double rate_rad_s) {
-  data_->qpos[stroke_q_[side]] = data_->qpos[drive_q_[side]] = angle_rad;
-  data_->qvel[stroke_v_[side]] = data_->qvel[drive_v_[side]] = rate_rad_s;
-}
-
 void Mechanism::set_wind(const Eigen::Vector3d& wind_W) { vector_at(model_->opt.wind) = wind_W; }
 
 void Mechanism::scale_air(std::size_t side, std::size_t strip, double factor) {

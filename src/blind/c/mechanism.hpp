@@ -76,7 +76,6 @@ class Mechanism {
 
   void place(const Eigen::Vector3d& position_W, const Eigen::Quaterniond& q_WB);
   void move_torso(const Motion& motion);
-  void set_stroke(std::size_t side, double angle_rad, double rate_rad_s);
   void set_wind(const Eigen::Vector3d& wind_W);
   /// Scales all force of the air on one ellipsoid.
   void scale_air(std::size_t side, std::size_t strip, double factor);

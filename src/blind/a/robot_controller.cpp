@@ -1,6 +1,6 @@
-#include "blind/robot_controller.hpp"
+#include "blind/a/robot_controller.hpp"
 
-#include "blind/view.hpp"
+#include "blind/a/view.hpp"
 
 namespace flappy::blind {
 namespace {

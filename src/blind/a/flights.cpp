@@ -1,4 +1,4 @@
-#include "blind/flights.hpp"
+#include "blind/a/flights.hpp"
 
 #include <cstdio>
 

@@ -4,7 +4,7 @@
 //   F = 1/2 rho C_N(alpha) c U^2 dr, along the wing's x, at d_cp(alpha) c below the leading edge
 //   M_rd = -1/8 rho |thetadot| thetadot C_rd sum of c^4 dr, about y
 // C_N and d_cp: Fei et al., ICRA 2019 (arXiv 1902.09628). Sines and cosines of alpha come from the velocity itself.
-#include "blind/robot.hpp"
+#include "blind/a/robot.hpp"
 
 namespace flappy::blind {
 

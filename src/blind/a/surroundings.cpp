@@ -1,5 +1,5 @@
 // What the place and the weather do: ground, ceiling, wall, wind, drag, cables. Slow things change each millisecond.
-#include "blind/robot.hpp"
+#include "blind/a/robot.hpp"
 
 namespace flappy::blind {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "blind/flights.hpp"
+#include "blind/a/flights.hpp"
 #include "io/files.hpp"
 #include "sim/randomise.hpp"
 

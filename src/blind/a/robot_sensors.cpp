@@ -1,4 +1,4 @@
-#include "blind/robot_sensors.hpp"
+#include "blind/a/robot_sensors.hpp"
 
 namespace flappy::blind {
 double bandwidth_hz(double interval_s, double low_pass_hz) {

@@ -12,9 +12,9 @@
 #include <deque>
 #include <vector>
 
-#include "blind/effects.hpp"
-#include "blind/maths.hpp"
-#include "blind/planform.hpp"
+#include "blind/a/effects.hpp"
+#include "blind/a/maths.hpp"
+#include "blind/a/planform.hpp"
 
 namespace flappy::blind {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "blind/a/robot_controller.hpp"
+#include "blind/a/robot_sensors.hpp"
 #include "blind/family.hpp"
-#include "blind/robot_controller.hpp"
-#include "blind/robot_sensors.hpp"
 
 namespace flappy::blind {
 

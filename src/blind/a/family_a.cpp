@@ -1,6 +1,6 @@
-#include "blind/family_a.hpp"
+#include "blind/a/family_a.hpp"
 
-#include "blind/sampled_robot.hpp"
+#include "blind/a/sampled_robot.hpp"
 
 namespace flappy::blind {
 namespace {

@@ -1,4 +1,4 @@
-#include "blind/sampled_robot.hpp"
+#include "blind/a/sampled_robot.hpp"
 
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "blind/robot.hpp"
+#include "blind/a/robot.hpp"
 
 namespace flappy::blind {
 

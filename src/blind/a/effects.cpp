@@ -1,4 +1,4 @@
-#include "blind/effects.hpp"
+#include "blind/a/effects.hpp"
 
 #include <algorithm>
 #include <sstream>

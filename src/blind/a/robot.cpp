@@ -1,4 +1,4 @@
-#include "blind/robot.hpp"
+#include "blind/a/robot.hpp"
 
 #include <Eigen/Cholesky>
 

@@ -1,6 +1,6 @@
-#include "blind/escape.hpp"
+#include "blind/a/escape.hpp"
 
-#include "blind/view.hpp"
+#include "blind/a/view.hpp"
 
 namespace flappy::blind {
 namespace {

@@ -2,7 +2,7 @@
 // gyro, a position that wanders by 1 mm.
 #pragma once
 
-#include "blind/robot.hpp"
+#include "blind/a/robot.hpp"
 #include "flight/pid.hpp"
 
 namespace flappy::blind {

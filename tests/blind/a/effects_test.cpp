@@ -1,12 +1,12 @@
 // Everything that may be wrong with the blind robot: nothing at size 0, something at size 1, and of the size it should be.
-#include "blind/effects.hpp"
+#include "blind/a/effects.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <set>
 
-#include "blind/robot_sensors.hpp"
+#include "blind/a/robot_sensors.hpp"
 #include "full.hpp"
 #include "refusal.hpp"
 #include "vehicles.hpp"

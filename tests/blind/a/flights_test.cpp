@@ -1,5 +1,5 @@
 // Flights of the blind robot: they stay up, their logs read back and pass the check, and the same seed flies the same.
-#include "blind/flights.hpp"
+#include "blind/a/flights.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <string>
 
-#include "blind/family_b.hpp"
+#include "blind/b/family_b_tests.hpp"
 
 namespace flappy::blind::b {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "blind/b/contrast.hpp"
 #include "blind/b/escape.hpp"
+#include "blind/b/family_b_tests.hpp"
 #include "blind/b/flight.hpp"
-#include "blind/family_b.hpp"
 #include "flightlog/flight_log.hpp"
 #include "io/parallel.hpp"
 #include "refusal.hpp"

@@ -1,7 +1,7 @@
 // From what the driver is told to the torque at a wing: command -> delay -> limit, dead zone, lag -> battery -> motor ->
 // gear.
 //   torque = N eta (K i - J N a - b N psidot - f sgn psidot)      i = (V - K N psidot) / R
-#include "blind/robot.hpp"
+#include "blind/a/robot.hpp"
 
 namespace flappy::blind {
 

@@ -4,7 +4,7 @@
 // Motion capture: pose of the torso origin with noise, late, arriving with jitter; short bursts are lost.
 #pragma once
 
-#include "blind/robot.hpp"
+#include "blind/a/robot.hpp"
 #include "flightlog/flight_log.hpp"
 
 namespace flappy::blind {

@@ -1,9 +1,9 @@
 // Family A is the blind robot of its own programs, with figures and sensors drawn where an assignment asks for it.
-#include "blind/family_a.hpp"
+#include "blind/a/family_a.hpp"
 
 #include <gtest/gtest.h>
 
-#include "blind/sampled_robot.hpp"
+#include "blind/a/sampled_robot.hpp"
 #include "full.hpp"
 
 namespace flappy::blind {

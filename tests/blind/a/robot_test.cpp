@@ -1,5 +1,5 @@
 // The blind robot without anything wrong: against other engines (tests/data/trajectories) and against what mechanics says.
-#include "blind/robot.hpp"
+#include "blind/a/robot.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The blind robot under a policy: what the policy is shown and when, when its work is done, and what is a success.
-#include "blind/escape.hpp"
+#include "blind/a/escape.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "blind/flights.hpp"
+#include "blind/a/flights.hpp"
 #include "flight/episode.hpp"
 
 namespace flappy::blind {

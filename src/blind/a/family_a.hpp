@@ -3,8 +3,8 @@
 
 #include <memory>
 
+#include "blind/a/flights.hpp"
 #include "blind/family.hpp"
-#include "blind/flights.hpp"
 
 namespace flappy::blind {
 
