@@ -121,18 +121,6 @@ void Fleet<T>::set_actor(const std::shared_ptr<const policy::Actor>& actor) {
 }
 
 template <class T>
-void Fleet<T>::set_action(std::size_t i, std::span<const T> action) {
-  const auto [f, lane] = storage_->at(i);
-  storage_->check_count(action.size());
-  for (std::size_t k = 0; k < action.size(); ++k) {
-    f.episode[offsetof(Episode<T>, action) / sizeof(T) + k][lane] = action[k];
-    f.episode[offsetof(Episode<T>, adds) / sizeof(T) + k][lane] = storage_->scaled(static_cast<int>(k), action[k]);
-  }
-  f.episode[offsetof(Episode<T>, action_reward) / sizeof(T)][lane] = 0;
-  storage_->remember(i);
-}
-
-template <class T>
 void Fleet<T>::set_actions(std::size_t block, const T* actions) {
   const auto [first, last] = flappers(block);
   const auto count = static_cast<std::size_t>(storage_->plan.actions);
@@ -352,12 +340,6 @@ void Fleet<T>::observation(std::size_t i, T* row) const {
   const FlightPlan<T>& plan = storage_->plan;
   for (int k = 0; k < plan.observed; ++k) row[k] = f.observation[k][lane];
   for (int k = 0; k < plan.past; ++k) row[plan.observed + k] = *storage_->past_at(i, k);
-}
-template <class T>
-void Fleet<T>::true_observation(std::size_t i, T* row) const {
-  const auto [f, lane] = storage_->at(i);
-  storage_->observe_as(i, get<Truth<double>>(f.truth, lane), row);
-  for (int k = 0; k < storage_->plan.past; ++k) row[storage_->plan.observed + k] = *storage_->past_at(i, k);
 }
 template <class T>
 std::array<T, kMaxActions> Fleet<T>::action(std::size_t i) const {

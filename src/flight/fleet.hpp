@@ -91,12 +91,11 @@ class Fleet {
   /// The actor that acts from now on, or none: then the last actions stay. std::invalid_argument unless its observation and
   /// action are those of the task.
   void set_actor(const std::shared_ptr<const policy::Actor>& actor);
-  /// Action of flapper `i` for the next period, each in [-1, 1], for what it observes now; an actor would overwrite it.
-  /// std::invalid_argument unless it has as many numbers as the task's actions.
-  void set_action(std::size_t i, std::span<const T> action);
-  /// Of all flappers of a block, row after row.
+  /// Actions of all flappers of a block for the next period, row after row, each number in [-1, 1], for what they observe now; an actor
+  /// would overwrite them.
   void set_actions(std::size_t block, const T* actions);
-  /// The same by what the action adds to the controller's output, or the voltages that it sets, each within the task's range.
+  /// The action of flapper `i` by what it adds to the controller's output, or the voltages that it sets, each within the task's range.
+  /// std::invalid_argument unless they are as many as the task's actions.
   void set_adds(std::size_t i, std::span<const double> adds);
   /// Adds to the controller's output from now on: open-loop flight, excitation. std::invalid_argument for anything but nothing
   /// where the task is one of voltages.
@@ -133,8 +132,6 @@ class Fleet {
   double lost_s(std::size_t i) const;      ///< when it was first not kept, as the task asks; 0: never
   std::vector<double> observation(std::size_t i) const;
   void observation(std::size_t i, T* row) const;
-  /// What the policy would observe if the estimate were true; what it remembers stays.
-  void true_observation(std::size_t i, T* row) const;
   /// Of the policy, its noise included, and what that adds to the controller's output, or the voltages that it sets: numbers of the
   /// task's actions, then zeros.
   std::array<T, kMaxActions> action(std::size_t i) const;

@@ -189,7 +189,7 @@ struct Fleet<T>::Storage {
   Snapshot<T> snapshot(std::size_t i, const Target& target);
   void start_lane(std::size_t i, std::uint32_t episode, const Truth<double>& truth);
   void show(std::size_t i);
-  void observe_as(std::size_t i, const Estimate<double>& x, T* row);
+  void observe_lane(std::size_t i, T* row);
   void start_estimator(std::size_t i, const Truth<double>& truth, sim::RandomKey key);
 };
 
@@ -223,16 +223,17 @@ template <class T>
 void Fleet<T>::Storage::show(std::size_t i) {
   const auto [f, lane] = at(i);
   T row[kMaxObservation] = {};
-  observe_as(i, get<Estimate<double>>(f.estimate, lane), row);
+  observe_lane(i, row);
   for (int k = 0; k < kMaxObservation; ++k) f.observation[k][lane] = row[k];
   for (int k = 0; k < plan.past; ++k) *past_at(i, k) = row[k % plan.observed];
 }
 
 /// In the arithmetic of the lanes, to the bit.
 template <class T>
-void Fleet<T>::Storage::observe_as(std::size_t i, const Estimate<double>& x, T* row) {
+void Fleet<T>::Storage::observe_lane(std::size_t i, T* row) {
   using L = model::Lanes<T, 1>;
   const auto [f, lane] = at(i);
+  const auto x = get<Estimate<double>>(f.estimate, lane);
   WingBeat<L> learnt{L(0), L(0), L(0), L(0)};
   change_controller(
       i, [&]<class C>(C, auto& memory) { learnt = C::trim(plan.controller.template of<C>(), rounded<L>(memory)); });

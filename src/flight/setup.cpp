@@ -25,7 +25,6 @@ double low_pass_lag_s(const ImuSensor& imu) {
 Sensors read_sensors(const io::Table& table) {
   constexpr io::Range kRate{10, 10000}, kNoise = io::non_negative(100);
   table.schema(1);
-  table.renamed("fusion", "estimator, with the same keys");
   Sensors s;
   s.imu.rate_hz = table.number("imu.rate_hz", kRate);
   s.imu.latency_s = table.number("imu.latency_s", io::non_negative(0.1));

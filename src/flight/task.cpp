@@ -384,7 +384,6 @@ Task read_task(const io::Table& table, double tick_s) {
     table.fail("observation", "has " + std::to_string(numbers) + " numbers",
                "parts of at most " + std::to_string(kMaxObservation));
   TaskConstants<double>& k = task.constants;
-  table.renamed("action.hold_s", "action.repeat_s");
   const double repeat_s = table.number_or("action.repeat_s", tick_s, {tick_s, 1});
   task.action_repeat = static_cast<std::uint32_t>(std::lround(repeat_s / tick_s));
   if (std::abs(repeat_s / tick_s - task.action_repeat) > 1e-6)

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "io/csv.hpp"
+#include "io/text.hpp"
 #include "io/toml_writer.hpp"
 #include "model/jointed.hpp"
 #include "model/math.hpp"
@@ -16,11 +17,7 @@ namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-std::string digits(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return text;
-}
+std::string digits(double x) { return io::format("%.3g", x); }
 
 [[noreturn]] void fail(const io::CsvTable& table, const std::string& column, const std::string& what,
                        const std::string& accepted) {

@@ -10,6 +10,7 @@
 #include "identify/measured_map.hpp"
 #include "io/csv.hpp"
 #include "io/gnuplot.hpp"
+#include "io/text.hpp"
 
 namespace flappy::identify {
 namespace {
@@ -92,11 +93,7 @@ double rms(const std::vector<double>& a, const std::vector<double>& b) {
   return std::sqrt(sum / static_cast<double>(a.size()));
 }
 
-std::string milliseconds(double seconds) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f ms", 1e3 * seconds);
-  return text;
-}
+std::string milliseconds(double seconds) { return io::format("%.1f ms", 1e3 * seconds); }
 
 std::vector<double> beat_phases() {
   std::vector<double> phases(kBeatPoints);

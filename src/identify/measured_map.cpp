@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <set>
 
+#include "io/text.hpp"
+
 namespace flappy::identify {
 namespace {
 
@@ -142,10 +144,7 @@ std::array<double, 4> numbers_of(const sim::Input& input) {
 }
 
 std::string text_of(const sim::Input& input) {
-  char text[96];
-  std::snprintf(text, sizeof text, "%g V, %g V, %g V, %g", input.amplitude_V, input.difference_V, input.bias_V,
-                input.split_cycle);
-  return text;
+  return io::format("%g V, %g V, %g V, %g", input.amplitude_V, input.difference_V, input.bias_V, input.split_cycle);
 }
 
 void refuse_apart(const std::string& where, const sim::Input& input) {
@@ -204,10 +203,6 @@ void check_scales(const MeasuredMap& map) {
                            " are zero; accepted: measured forces and torques");
 }
 
-std::string in_short(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+std::string in_short(double value) { return io::format("%.3g", value); }
 
 }  // namespace flappy::identify

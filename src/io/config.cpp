@@ -504,10 +504,6 @@ void Table::accept(const std::vector<std::string>& names) const {
     if (!section_->accepted.contains(key.str())) refuse_unknown(*section_, key, section_->accepted);
 }
 
-void Table::renamed(std::string_view before, std::string_view now) const {
-  if (section_->table->at_path(before)) fail(before, "has another name now", now);
-}
-
 bool Table::has(std::string_view key) const { return find(*section_, key).node != nullptr; }
 
 std::vector<std::string> Table::keys() const {

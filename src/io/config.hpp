@@ -73,8 +73,6 @@ class Table {
   /// Refuses every other key of this table (not of those below), before a missing key that it may be a misspelling of. It
   /// is a fault of the reader to ask for a key that is not among these.
   void accept(const std::vector<std::string>& names) const;
-  /// Refuses a key by the name that it had before, and says the new one.
-  void renamed(std::string_view before, std::string_view now) const;
   /// Whether a key is present; it counts as asked for.
   bool has(std::string_view key) const;
   /// Names of the keys present, sorted.

@@ -62,6 +62,7 @@ Program::Program(const std::string& name, const std::string& description, const 
              std::to_string(NLOHMANN_JSON_VERSION_MINOR) + "." + std::to_string(NLOHMANN_JSON_VERSION_PATCH);
   app_->set_version_flag("--version", version);
   app_->add_option("--json", json_path_, "write the results as JSON to this file");
+  app_->add_option("--progress", progress_path_, "tell in this file how far it is, as JSON, once a second");
   app_->add_option("--log-level", log_level_, "least level of what is noted on stderr")
       ->check(CLI::IsMember(std::vector<std::string>(kLevels.begin(), kLevels.end())))
       ->capture_default_str();
@@ -85,6 +86,10 @@ int Program::run(int argc, char** argv, const std::function<void()>& job) {
       }
     }
     if (!json_path_.empty() && writes()) check_output(json_path_);
+    if (!progress_path_.empty() && writes()) {
+      check_output(progress_path_);
+      write_progress(progress_path_);
+    }
     job();
     if (ranks_) ranks_->finish();
     return 0;

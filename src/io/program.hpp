@@ -44,7 +44,7 @@ class Program {
 
  private:
   std::unique_ptr<CLI::App> app_;
-  std::string json_path_, log_level_ = "warning";
+  std::string json_path_, progress_path_, log_level_ = "warning";
   bool takes_ranks_ = false, allow_network_ = false;
   Rank rank_;
   std::unique_ptr<Ranks> ranks_;

@@ -7,8 +7,12 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <nlohmann/json.hpp>
 #include <thread>
 #include <utility>
+
+#include "io/files.hpp"
+#include "io/text.hpp"
 
 namespace flappy::io {
 namespace {
@@ -18,14 +22,13 @@ constexpr std::size_t kPoints = 4;  // where the last three advances began and e
 volatile std::sig_atomic_t interrupted_flag = 0;
 ProgressLine* visible_line = nullptr;  // on the terminal
 bool silent = false;
+std::filesystem::path progress_file;  // none where empty
+constexpr double kFileEvery_s = 1;
 
 /// "9 s", "12 min", "3.4 h"
 std::string duration_text(double s) {
-  char text[32];
-  if (s < 100) std::snprintf(text, sizeof text, "%.0f s", s);
-  else if (s < 6000) std::snprintf(text, sizeof text, "%.0f min", s / 60);
-  else std::snprintf(text, sizeof text, "%.1f h", s / 3600);
-  return text;
+  if (s < 100) return format("%.0f s", s);
+  return s < 6000 ? format("%.0f min", s / 60) : format("%.1f h", s / 3600);
 }
 
 /// What does not fit would wrap, and the next line would not cover it.
@@ -37,6 +40,7 @@ std::size_t width_of(std::FILE* terminal) {
 }  // namespace
 
 void silence_progress() { silent = true; }
+void write_progress(const std::filesystem::path& file) { progress_file = file; }
 
 void stop_on_interrupt() {
   struct sigaction action {};
@@ -75,28 +79,37 @@ std::optional<double> TimeLeft::seconds(double now_s) const {
 
 ProgressLine::ProgressLine(std::string what, double plain_every_s, std::FILE* stream, std::function<double()> clock_s)
     : what_(std::move(what)),
+      file_(silent ? "" : progress_file),
       stream_(stream),
       terminal_(!silent && isatty(fileno(stream)) != 0),
       every_s_(silent      ? HUGE_VAL
                : terminal_ ? 0.2
                            : plain_every_s),
       clock_s_(std::move(clock_s)),
-      shown_s_(clock_s_()) {}
+      shown_s_(clock_s_()),
+      filed_s_(file_.empty() ? HUGE_VAL : shown_s_ - kFileEvery_s) {}
 
 ProgressLine::~ProgressLine() { clear(); }
 
-bool ProgressLine::due() const { return clock_s_() - shown_s_ >= every_s_; }
+bool ProgressLine::due() const {
+  const double now_s = clock_s_();
+  return now_s - shown_s_ >= every_s_ || now_s - filed_s_ >= kFileEvery_s;
+}
 
 void ProgressLine::show(double done, const std::string& more) {
   const double now_s = clock_s_();
   left_.add(now_s, done);
-  if (now_s - shown_s_ < every_s_) return;
-  shown_s_ = now_s;
-  char share[16];
-  std::snprintf(share, sizeof share, " %.0f %%", std::floor(100 * done + 1e-9));  // 100 % is for what is done
-  std::string text = what_ + share;
+  const bool shows = now_s - shown_s_ >= every_s_, files = now_s - filed_s_ >= kFileEvery_s;
+  if (!shows && !files) return;
+  std::string text = what_ + format(" %.0f %%", std::floor(100 * done + 1e-9));  // 100 % is for what is done
   if (const auto left_s = left_.seconds(now_s)) text += ", " + duration_text(*left_s) + " left";
   if (!more.empty()) text += ", " + more;
+  if (files) {
+    filed_s_ = now_s;
+    write_atomically(file_, nlohmann::ordered_json{{"share", done}, {"message", text}}.dump() + "\n");
+  }
+  if (!shows) return;
+  shown_s_ = now_s;
   if (terminal_) {
     std::fprintf(stream_, "\r%s\x1b[K", text.substr(0, width_of(stream_)).c_str());
   } else {

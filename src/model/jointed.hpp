@@ -34,7 +34,7 @@
 //   tangential_cos = [0.4]                   #   C_T = sum of a_k cos(k a), k = 1, ..., 4, towards the trailing edge where a < pi/2; none unless there
 //
 // E is R_y(-Phi) R_z(s psi) R_x(s phi) from B, s = +1 left, -1 right, and the wing R_y(theta) from E: a side in a mirror has the same four angles (the
-// published Phi, wing_angles.hpp, has the other sign on the right). Phi > 0 tilts the lift of the strokes backward. Every angle stays within
+// published Phi has the other sign on the right). Phi > 0 tilts the lift of the strokes backward. Every angle stays within
 // kLargestAngle_rad, whatever the inputs add.
 #pragma once
 

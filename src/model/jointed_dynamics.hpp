@@ -1,7 +1,7 @@
 // Exact dynamics of a torso and two sides of four angles each, of which any may be fixed, driven or free.
 //
 // Coordinates. A side's leading edge has the frame E, from B by R_y(-Phi) R_z(s psi) R_x(s phi), its wing R_y(theta) from E, all about the
-// shoulder at r_s: what wing_angles.hpp has, but for the sign of Phi on the right, so that a vehicle in a mirror has the same numbers. With the axes e_j of the four angles and w_0 the body rate,
+// shoulder at r_s: as published (Fei et al. 2019), but for the sign of Phi on the right, so that a vehicle in a mirror has the same numbers. With the axes e_j of the four angles and w_0 the body rate,
 //   w_j = w_(j-1) + e_j q_j'        a_j = a_(j-1) + e_j q_j'' + w_(j-1) x e_j q_j'         E: j = 3, wing: j = 4
 // Newton and Euler about the shoulder, h the first and P the second moment of mass of a body, A the acceleration of the shoulder less gravity:
 //   force = m A + a x h + w x (w x h)            moment = h x A + (tr P - P) a - w x (P w)

@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "io/parallel.hpp"
 #include "io/toml_writer.hpp"
 #include "sim/storage.hpp"
 
@@ -124,10 +125,12 @@ Evaluation fly_all(FlyConfig config, const EvaluationOptions& options, Hovers<T>
     if (hovers[p].empty()) result.steps += flappers * hover_s / config.fleet.batch.step_s;
     Part<T> part(config, count, agent.policy, hovers[p], detail);
     result.stopped = !progress.add(flappers * hover_ticks);
-    while (!part.over() && !result.stopped) {
-      part.step();
-      result.stopped = !progress.add(flappers);
-    }
+    io::together(config.fleet.batch.threads, [&] {
+      while (!part.over() && !result.stopped) {
+        part.step();
+        result.stopped = !progress.add(flappers);
+      }
+    });
     if (!result.stopped) part.finish(result);
   }
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

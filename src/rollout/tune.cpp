@@ -11,6 +11,7 @@
 #include <pagmo/problem.hpp>
 #include <span>
 
+#include "io/text.hpp"
 #include "rollout/flight_score.hpp"
 #include "rollout/rollout.hpp"
 
@@ -52,11 +53,7 @@ double cost_of(const Score& s) {
 }
 
 /// What a file of gains has of one, so that its cost is that of the file.
-double four_digits(double gain) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", gain);
-  return std::strtod(text, nullptr);
-}
+double four_digits(double gain) { return std::stod(io::format("%.4g", gain)); }
 
 struct Problem {
   const TuneConfig* config = nullptr;

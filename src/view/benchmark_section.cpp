@@ -3,9 +3,9 @@
 #include <cmath>
 #include <map>
 
-#include "flightlog/check/check_parts.hpp"
 #include "io/files.hpp"
 #include "io/statistics.hpp"
+#include "io/text.hpp"
 #include "view/results.hpp"
 #include "view/sections.hpp"
 
@@ -13,7 +13,7 @@ namespace flappy::view {
 namespace {
 
 namespace fs = std::filesystem;
-using flightlog::format;
+using io::format;
 
 constexpr std::size_t kBins = 10, kRivals = 8;
 

@@ -6,8 +6,8 @@
 #include <set>
 
 #include "flappy/vehicle.hpp"
-#include "flightlog/check/check_parts.hpp"
 #include "io/files.hpp"
+#include "io/text.hpp"
 #include "model/effects/registry.hpp"
 #include "view/results.hpp"
 #include "view/sections.hpp"
@@ -15,7 +15,7 @@
 namespace flappy::view {
 namespace {
 
-using flightlog::format;
+using io::format;
 
 constexpr const char* kWriter = "flappy-gap diagnose";
 constexpr std::size_t kBars = 10, kShownRows = 6;

@@ -1,14 +1,14 @@
 // What flappy-eval found of a policy.
 #include <cmath>
 
-#include "flightlog/check/check_parts.hpp"
+#include "io/text.hpp"
 #include "view/results.hpp"
 #include "view/sections.hpp"
 
 namespace flappy::view {
 namespace {
 
-using flightlog::format;
+using io::format;
 
 struct Flown {
   std::string name;

@@ -2,14 +2,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "flightlog/check/check_parts.hpp"
+#include "io/text.hpp"
 #include "view/results.hpp"
 #include "view/sections.hpp"
 
 namespace flappy::view {
 namespace {
 
-using flightlog::format;
+using io::format;
 
 /// Fitted values over the file's own, with their intervals.
 void add_parameters(Section& section, const Json& parameters) {

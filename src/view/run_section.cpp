@@ -5,8 +5,8 @@
 #include <map>
 #include <sstream>
 
-#include "flightlog/check/check_parts.hpp"
 #include "io/installation.hpp"
+#include "io/text.hpp"
 #include "learn/metrics.hpp"
 #include "learn/train_config.hpp"
 #include "view/results.hpp"
@@ -16,7 +16,7 @@ namespace flappy::view {
 namespace {
 
 namespace fs = std::filesystem;
-using flightlog::format;
+using io::format;
 
 struct Run {
   std::string name;

@@ -4,14 +4,14 @@
 #include <filesystem>
 #include <map>
 
-#include "flightlog/check/check_parts.hpp"
+#include "io/text.hpp"
 #include "view/results.hpp"
 #include "view/sections.hpp"
 
 namespace flappy::view {
 namespace {
 
-using flightlog::format;
+using io::format;
 
 constexpr Colour kColourOf[] = {Colour::blue,   Colour::vermillion, Colour::green,
                                 Colour::purple, Colour::black,      Colour::grey};

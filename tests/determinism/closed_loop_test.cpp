@@ -311,7 +311,7 @@ TEST(ClosedLoopDeterminism, HashSeesNoiseActionsAndTime) {
   const FleetOptions o = options("pid");
   Fleet<float> a = fly<float>(o, "pid", 0, 3, 1, ""), b = fly<float>(o, "pid", 0, 3, 1, "");
   EXPECT_EQ(a.hash(), b.hash());
-  b.set_action(1, std::array{0.0F, 0.0F, 0.0F, 1e-6F});
+  b.set_adds(1, std::array{0.0, 0.0, 0.0, 1e-6});
   EXPECT_NE(a.hash(), b.hash());
   EXPECT_EQ(a.hash(0, 1), b.hash(0, 1));
   FleetOptions other = o;

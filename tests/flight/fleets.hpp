@@ -1,14 +1,32 @@
 // What flies in the tests of the closed loop: shipped configurations with keys replaced.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "flight/fleet.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::flight {
+
+/// Action of flapper `i` alone, of a task without history: the others of its block keep theirs.
+template <class T>
+void set_action(Fleet<T>& fleet, std::size_t i, std::type_identity_t<std::span<const T>> action) {
+  std::size_t block = 0;
+  while (fleet.flappers(block).second <= i) ++block;
+  const auto [first, last] = fleet.flappers(block);
+  std::vector<T> all;
+  for (std::size_t k = first; k < last; ++k) {
+    const auto own = fleet.action(k);
+    all.insert(all.end(), own.begin(), own.begin() + static_cast<std::ptrdiff_t>(action.size()));
+  }
+  std::ranges::copy(action, all.begin() + static_cast<std::ptrdiff_t>((i - first) * action.size()));
+  fleet.set_actions(block, all.data());
+}
 
 using Overrides = std::vector<std::string>;
 

@@ -7,9 +7,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <memory>
+
+#include "io/files.hpp"
+#include "io/temporary_folder.hpp"
 
 namespace flappy::io {
 namespace {
@@ -135,6 +139,26 @@ TEST(ProgressLine, IsClearedForWhoKnowsItNot) {
   clear_progress();
   EXPECT_EQ(screen.written(), "\r\x1b[K");
   clear_progress();
+  EXPECT_EQ(screen.written(), "");
+}
+
+TEST(ProgressLine, StandsInAFileAsJson) {
+  const TemporaryFolder folder;
+  Screen screen(false);
+  double now_s = 100;
+  write_progress(folder / "progress.json");
+  ProgressLine line("flown", HUGE_VAL, screen.stream.get(), [&] { return now_s; });
+  write_progress({});
+  EXPECT_TRUE(line.due()) << "at once";
+  line.show(0.25, "of \"all\"");
+  EXPECT_EQ(read_text(folder / "progress.json"), "{\"share\":0.25,\"message\":\"flown 25 %, of \\\"all\\\"\"}\n");
+  now_s += 0.9;
+  EXPECT_FALSE(line.due());
+  line.show(0.5);
+  EXPECT_EQ(read_text(folder / "progress.json").substr(0, 14), "{\"share\":0.25,") << "a second has not passed";
+  now_s += 0.1;
+  line.show(0.5);
+  EXPECT_EQ(read_text(folder / "progress.json").substr(0, 13), "{\"share\":0.5,");
   EXPECT_EQ(screen.written(), "");
 }
 

@@ -167,6 +167,7 @@ TEST(Actor, ActsInAFleetOnWhatItObserves) {
   with.set_actor(actor);
   std::vector<double> past[3];
   for (int period = 0; period < 50; ++period) {
+    std::vector<double> actions;
     for (std::size_t i = 0; i < 3 && period % 2 == 0; ++i) {
       // what it sees now, and saw at its last two actions, or first
       const std::vector<double> seen = by_hand.observation(i);
@@ -178,8 +179,9 @@ TEST(Actor, ActsInAFleetOnWhatItObserves) {
       if (past[i].empty()) past[i].insert(past[i].end(), seen.begin(), seen.begin() + 18);
       past[i].insert(past[i].end(), seen.begin(), seen.begin() + 18);
       const std::vector<double> y = expected(*actor, seen);
-      by_hand.set_action(i, std::array{y[0], y[1], y[2], y[3]});
+      actions.insert(actions.end(), y.begin(), y.begin() + 4);
     }
+    if (!actions.empty()) by_hand.set_actions(0, actions.data());
     with.step();
     by_hand.step();
     for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(with.input(i).bias_V, by_hand.input(i).bias_V, 1e-9);

@@ -83,12 +83,7 @@ TEST(Environments, FlyAsFlappyFlyDoes) {
             ASSERT_EQ(bench.row(i)[k], static_cast<float>(seen[k])) << path << i << k;
         }
         const auto action = some_actions(3, bench.actions(), step);
-        for (std::size_t i = 0; i < 3; ++i) {
-          const std::size_t n = bench.actions();
-          std::vector<T> own(action.begin() + static_cast<std::ptrdiff_t>(n * i),
-                             action.begin() + static_cast<std::ptrdiff_t>(n * i + n));
-          fleet.set_action(i, std::span<const T>(own));
-        }
+        fleet.set_actions(0, std::vector<T>(action.begin(), action.end()).data());
         std::vector<double> reward(3);
         for (std::uint32_t k = 0; k < config.fleet.task.action_repeat; ++k) {
           fleet.step();

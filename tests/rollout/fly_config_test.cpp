@@ -82,11 +82,6 @@ TEST(FlyConfig, RefusesInOneLine) {
   EXPECT_EQ(
       refusal({"controller.attitude.pitch.p=-1"}),
       "--set controller.attitude.pitch.p=-1: attitude.pitch.p: -1 is out of range; accepted: a number from 0 to 1000");
-  EXPECT_EQ(refusal({"sensors.fusion.angle_drift_rad_sqrt_s=0.1"}),
-            "--set sensors.fusion.angle_drift_rad_sqrt_s=0.1: fusion: has another name now; accepted: estimator, with "
-            "the same keys");
-  EXPECT_EQ(refusal({"task.action.hold_s=0.01"}),
-            "--set task.action.hold_s=0.01: action.hold_s: has another name now; accepted: action.repeat_s");
   EXPECT_EQ(refusal({"controller=3"}), "--set controller=3: controller: is an integer; accepted: the name of a file");
   EXPECT_EQ(refusal({"controller=none_such.toml"}),
             source_path("configs/fly/none_such.toml") + ": cannot be read: No such file or directory");

@@ -169,4 +169,4 @@ expect_refused("task \"escape\" would be flown without its excitation, which fla
 expect_refused("flappy-eval: --episodes: Value 0 not in range 1 to 100000; see flappy-eval --help" ${WORK}/best.json --episodes 0)
 expect_refused("flappy-eval: --stream: training not in {test,validation}; see flappy-eval --help" ${WORK}/best.json --stream training)
 expect_refused("flappy-eval: policy is required; see flappy-eval --help")
-expect_refused("flappy-eval: --episode: no such option; accepted: --allow-network, --config, --effects, --episodes, --help, --json, --log-level, --no-baselines, --seed, --set, --stream, --task, --threads, --vehicle, --version; did you mean \"--episodes\"?; see flappy-eval --help" ${WORK}/best.json --episode=5)
+expect_refused("flappy-eval: --episode: no such option; accepted: --allow-network, --config, --effects, --episodes, --help, --json, --log-level, --no-baselines, --progress, --seed, --set, --stream, --task, --threads, --vehicle, --version; did you mean \"--episodes\"?; see flappy-eval --help" ${WORK}/best.json --episode=5)

@@ -56,7 +56,7 @@ class OwnFlight {
     f.tick[0] = f.segment[0] = 0;
     set_handed_back(false);
     const float middle[flight::kMaxActions] = {};
-    fleet_.set_action(0, middle);
+    fleet_.set_actions(0, middle);
     // what the end of the period before would have shown
     flight::Segment<float> goal{0, {}};
     for (int i = 0; i < 4; ++i)
@@ -71,7 +71,7 @@ class OwnFlight {
                         lanes_of<flight::Episode>(f.episode), L(model::beat_fraction<float>(fleet_.snapshot(0).phase)),
                         L(0), flight::PidController::trim(pid, lanes_of<flight::Pid>(f.controller)), {}, row);
     for (int i = 0; i < rows; ++i) f.observation[i][0] = row[i].raw[0];
-    for (std::uint32_t ago = 1; ago < task.history; ++ago) fleet_.set_action(0, middle);  // remembers it
+    for (std::uint32_t ago = 1; ago < task.history; ++ago) fleet_.set_actions(0, middle);  // remembers it
   }
   flight::Fleet<float>& fleet() { return fleet_; }
 

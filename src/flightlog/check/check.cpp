@@ -67,15 +67,6 @@ void check_latencies(const FlightHeader& h, Findings& findings) {
 
 }  // namespace
 
-std::string format(const char* pattern, ...) {
-  char text[512];
-  va_list arguments;
-  va_start(arguments, pattern);
-  std::vsnprintf(text, sizeof text, pattern, arguments);
-  va_end(arguments);
-  return text;
-}
-
 std::size_t index_before(const std::vector<double>& times, double t) {
   const auto after = std::ranges::upper_bound(times, t);
   return after == times.begin() ? times.size() : static_cast<std::size_t>(after - times.begin()) - 1;

@@ -1,23 +1,21 @@
 // The parts of check_flight().
 #pragma once
 
-#include <cstdarg>
 #include <string>
 #include <vector>
 
 #include "flightlog/check/check.hpp"
+#include "io/text.hpp"
 
 namespace flappy::flightlog {
 
 /// What a deviation must exceed to be no accident, in standard deviations: one in 16,000.
 inline constexpr double kSigmas = 4;
 
+using io::format;
 using log_file::kAttitude, log_file::kCommand, log_file::kImu, log_file::kMocap, log_file::kPower, log_file::kWings;
 
 using Findings = std::vector<Finding>;
-
-/// As printf.
-[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
 
 /// Index of the last time not after t; times.size() where there is none.
 std::size_t index_before(const std::vector<double>& times, double t);

@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <numbers>
 
-#include "flightlog/check/check_parts.hpp"
 #include "io/config.hpp"
+#include "io/text.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -21,8 +21,8 @@ std::string listed(const std::vector<std::string>& words, const char* last) {
 }
 
 std::string size_line(const SizeEstimate& s) {
-  return flightlog::format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
-                           s.unit.empty() ? "" : " ", s.unit.c_str());
+  return io::format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
+                    s.unit.empty() ? "" : " ", s.unit.c_str());
 }
 
 std::string place_of(const Unexplained& u) {
@@ -33,18 +33,18 @@ std::string verdict_line(const Conclusion& c) {
   const double p = c.probability;
   switch (c.kind) {
     case Conclusion::Kind::effect:
-      return flightlog::format("Missing in the model: %s%s (probability %.2f%s)", listed(c.effects, "and").c_str(),
-                               c.remainder ? ", and something more" : "", p, p < 0.5 ? ", no more than a guess" : "");
+      return io::format("Missing in the model: %s%s (probability %.2f%s)", listed(c.effects, "and").c_str(),
+                        c.remainder ? ", and something more" : "", p, p < 0.5 ? ", no more than a guess" : "");
     case Conclusion::Kind::group:
-      return flightlog::format("Missing in the model: one of %s, which these flights cannot tell apart (together %.2f)",
-                               listed(c.effects, "or").c_str(), p);
+      return io::format("Missing in the model: one of %s, which these flights cannot tell apart (together %.2f)",
+                        listed(c.effects, "or").c_str(), p);
     case Conclusion::Kind::parameters:
-      return flightlog::format("Nothing is missing in the model, its parameters are off (probability %.2f)", p);
+      return io::format("Nothing is missing in the model, its parameters are off (probability %.2f)", p);
     case Conclusion::Kind::none:
-      return flightlog::format("No gap beyond noise: the vehicle's file explains the flights (probability %.2f)", p);
+      return io::format("No gap beyond noise: the vehicle's file explains the flights (probability %.2f)", p);
     case Conclusion::Kind::unknown:
-      return flightlog::format(
-          "Something is missing in the model that no entry of the catalogue explains (probability %.2f)", p);
+      return io::format("Something is missing in the model that no entry of the catalogue explains (probability %.2f)",
+                        p);
     case Conclusion::Kind::data:
       return "The data are at fault; nothing was diagnosed";
   }
@@ -100,8 +100,8 @@ std::string sensor_line(const SizeEstimate& s) {
   const bool more = s.value > 0;
   const auto told = [&](const std::string& what, double factor, const char* unit, const std::string& how) {
     const double a = factor * (more ? s.low : -s.high), b = factor * (more ? s.high : -s.low);
-    return flightlog::format("  %s %.2g %s %s (%.2g to %.2g)", what.c_str(), factor * std::abs(s.value), unit,
-                             how.c_str(), a, b);
+    return io::format("  %s %.2g %s %s (%.2g to %.2g)", what.c_str(), factor * std::abs(s.value), unit, how.c_str(), a,
+                      b);
   };
   const std::string axis = s.name.substr(s.name.rfind('.') + 1, 1), way = more ? "+" : "-";
   if (s.name == "imu.latency_s") return told("the IMU's samples are", 1e3, "ms", more ? "older" : "younger");
@@ -126,8 +126,7 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
                  : "Stopped before every effect was weighed: this is no verdict, only what was weighed until then"};
   if (r.conclusion.kind == Conclusion::Kind::data) {
     for (std::size_t i = 0; i < r.faults.size() && i + 3 < kSummaryLines; ++i)
-      lines.push_back(
-          flightlog::format("  %s:%zu: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
+      lines.push_back(io::format("  %s:%zu: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
     lines.push_back(next_line(r, out));
     return lines;
   }
@@ -148,9 +147,9 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
       lines.push_back(size_line(concluded->sizes[i]));
   }
   if (r.otherwise)
-    lines.push_back(flightlog::format("by another law than the entry's, most so in %s, on %s (%s)",
-                                      place_of(*r.otherwise).c_str(), r.otherwise->regime.c_str(),
-                                      r.otherwise->function.c_str()));
+    lines.push_back(io::format("by another law than the entry's, most so in %s, on %s (%s)",
+                               place_of(*r.otherwise).c_str(), r.otherwise->regime.c_str(),
+                               r.otherwise->function.c_str()));
   if (!r.background.empty()) {
     lines.push_back("besides, in the corrected vehicle, not told from chance:");
     for (std::size_t i = 0; i < r.background.size() && i < kBackground; ++i)
@@ -161,16 +160,16 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
                         ? "what is left depends on:"
                         : "what is left, with " + listed(r.jointly_with, "and") + " in force, depends on:");
     for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
-      lines.push_back(flightlog::format("  %s on %s (%s), %.1f times what models of this robot get wrong",
-                                        place_of(r.unexplained[i]).c_str(), r.unexplained[i].regime.c_str(),
-                                        r.unexplained[i].function.c_str(), r.unexplained[i].times));
+      lines.push_back(io::format("  %s on %s (%s), %.1f times what models of this robot get wrong",
+                                 place_of(r.unexplained[i]).c_str(), r.unexplained[i].regime.c_str(),
+                                 r.unexplained[i].function.c_str(), r.unexplained[i].times));
   }
   std::string others;
   std::size_t shown = 0;
   for (const Reported* c : ranked) {
     const bool is = named ? c == concluded : kind_name(c->kind) == std::string(kind_name(r.conclusion.kind));
     if (is || shown == kRunnersUp) continue;
-    others += flightlog::format("%s%s %.2g", shown == 0 ? "" : ", ", name_of(*c).c_str(), c->probability);
+    others += io::format("%s%s %.2g", shown == 0 ? "" : ", ", name_of(*c).c_str(), c->probability);
     ++shown;
   }
   lines.push_back("runners-up: " + others);
@@ -178,20 +177,19 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   lines.push_back(places.empty() ? "with parameters refitted nothing stands out of the noise"
                                  : "where the gap lies, with parameters refitted (rms, that of noise):");
   for (const GapLocation& p : places)
-    lines.push_back(flightlog::format("  %-12s %-34s %8.3g, noise %.3g %s", channel_name(p.channel), p.regime.c_str(),
-                                      p.gap, p.noise_floor, channel_unit(p.channel)));
-  const auto loss = [](const std::optional<double>& e) { return e ? flightlog::format("%.3g", *e) : std::string("-"); };
+    lines.push_back(io::format("  %-12s %-34s %8.3g, noise %.3g %s", channel_name(p.channel), p.regime.c_str(), p.gap,
+                               p.noise_floor, channel_unit(p.channel)));
+  const auto loss = [](const std::optional<double>& e) { return e ? io::format("%.3g", *e) : std::string("-"); };
   lines.push_back("mean loss in flights held out: vehicle's file " + loss(r.nominal) + ", parameters refitted " +
                   loss(r.refit) + ", with the best effect " + loss(r.effect) + ", noise alone " + loss(r.noise_floor));
   if (r.closure)
-    lines.push_back(
-        flightlog::format("the best effect closes %.0f %% of what refitting leaves (90 %%: %.0f to %.0f %%)",
-                          100 * r.closure->value, 100 * r.closure->low, 100 * r.closure->high));
+    lines.push_back(io::format("the best effect closes %.0f %% of what refitting leaves (90 %%: %.0f to %.0f %%)",
+                               100 * r.closure->value, 100 * r.closure->low, 100 * r.closure->high));
   else lines.push_back("how much of that an effect closes cannot be told from noise");
   if (!r.moved.empty() && r.conclusion.kind != Conclusion::Kind::none) {
     lines.push_back("parameters that moved most, in standard deviations of what was believed:");
     for (std::size_t i = 0; i < r.moved.size() && i < kMoved; ++i)
-      lines.push_back(flightlog::format("  %-36s %+10.2f", r.moved[i].name.c_str(), r.moved[i].prior_sd));
+      lines.push_back(io::format("  %-36s %+10.2f", r.moved[i].name.c_str(), r.moved[i].prior_sd));
   }
   if (!r.sensors.empty()) {
     lines.push_back("beside what the headers declare (90 %):");
@@ -200,29 +198,28 @@ std::vector<std::string> summary_of(const Report& r, const std::string& out) {
   if (!r.untestable.empty()) lines.push_back("cannot be tested on these logs: " + io::joined(r.untestable));
   if (r.validation) {
     std::string head = "rms in flights held out (in kinds of flights):";
-    for (const HeldOutError& e : r.validation->ladder.front().errors)
-      head += flightlog::format(" %18s", e.channel.c_str());
+    for (const HeldOutError& e : r.validation->ladder.front().errors) head += io::format(" %18s", e.channel.c_str());
     lines.push_back(head);
     for (const Validation::Rung& rung : r.validation->ladder) {
-      std::string line = flightlog::format(
+      std::string line = io::format(
           "  %-44s",
           ((&rung == &r.validation->ladder.front() || rung.added == "parameters" ? "" : "+ ") + rung.added).c_str());
-      for (const HeldOutError& e : rung.errors) line += flightlog::format("  %8.3f (%6.3f)", e.rms, e.by_type);
+      for (const HeldOutError& e : rung.errors) line += io::format("  %8.3f (%6.3f)", e.rms, e.by_type);
       lines.push_back(line);
     }
     for (const Validation::Control& c : r.validation->controls)
-      lines.push_back(flightlog::format("  %-24s takes %4.1f %% off %s; shifted in time, at best %4.1f %%",
-                                        c.effect.c_str(), 100 * c.gain, c.channel.c_str(), 100 * c.best_of_shifted));
+      lines.push_back(io::format("  %-24s takes %4.1f %% off %s; shifted in time, at best %4.1f %%", c.effect.c_str(),
+                                 100 * c.gain, c.channel.c_str(), 100 * c.best_of_shifted));
   }
   if (const ClosedLoop* c = most_corrected(r.closed_loop))
     lines.push_back(
-        flightlog::format("in closed loop, %s: %s recorded %.3g, by the vehicle's file %.3g, by the corrected one %.3g",
-                          std::filesystem::path(c->flight).filename().c_str(), c->quantity.c_str(), c->recorded,
-                          c->nominal, c->corrected));
+        io::format("in closed loop, %s: %s recorded %.3g, by the vehicle's file %.3g, by the corrected one %.3g",
+                   std::filesystem::path(c->flight).filename().c_str(), c->quantity.c_str(), c->recorded, c->nominal,
+                   c->corrected));
   if (r.next)
-    lines.push_back(flightlog::format("%s and %s differ most in configs/gap/experiments/%s.toml (%.3g nats expected)",
-                                      r.next->separates.front().c_str(), r.next->separates.back().c_str(),
-                                      r.next->manoeuvre.c_str(), r.next->expected_nats));
+    lines.push_back(io::format("%s and %s differ most in configs/gap/experiments/%s.toml (%.3g nats expected)",
+                               r.next->separates.front().c_str(), r.next->separates.back().c_str(),
+                               r.next->manoeuvre.c_str(), r.next->expected_nats));
   lines.push_back(r.complete ? next_line(r, out) : "next: the same command again, to its end");
   return lines;
 }

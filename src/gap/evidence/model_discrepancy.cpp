@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "io/config.hpp"
+#include "io/text.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
@@ -79,10 +80,7 @@ Tail ModelDiscrepancy::tail_of(const std::string& effect) const {
 }
 
 std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learnt) {
-  const auto number = [](double v) {
-    char text[32];
-    return std::string(text, static_cast<std::size_t>(std::snprintf(text, sizeof text, "%.4g", v)));
-  };
+  const auto number = [](double v) { return io::format("%.4g", v); };
   const auto sensor = [&](const char* id) {
     return number(std::ranges::find(d.nuisances, id, &ModelDiscrepancy::Nuisance::id)->sd);
   };

@@ -7,6 +7,7 @@
 
 #include "gap/localise/significance.hpp"
 #include "io/statistics.hpp"
+#include "io/text.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -29,11 +30,7 @@ double share_below(double frequency, double past) {
   return 2 / std::numbers::pi * std::atan((1 + past) / (1 - past) * std::tan(std::numbers::pi / 2 * frequency));
 }
 
-std::string in_short(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
+std::string in_short(double value) { return io::format("%.4g", value); }
 
 struct TestedBeat {
   std::size_t flight, beat;

@@ -16,8 +16,8 @@
 #include <thread>
 
 #include "server/dds/participant.hpp"
-#include "server/http/watched.hpp"
 #include "server/jobs/commands.hpp"
+#include "server/watched.hpp"
 
 namespace flappy::server {
 

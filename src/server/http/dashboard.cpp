@@ -14,6 +14,7 @@
 #include "io/progress.hpp"
 #include "server/http/listener.hpp"
 #include "server/http/web.hpp"
+#include "server/jobs/commands.hpp"
 #include "server/jobs/kinds.hpp"
 #include "server/jobs/minder.hpp"
 
@@ -203,6 +204,12 @@ void Dashboard::Parts::route() {
          [this](const Job& job, Response& response) { answer(response, curve_of(output / job.folder / "run")); });
   of_job("log", [this](const Job& job, Response& response) {
     response.set_content(tail_of(output / job.folder / kLogName, kLogBytes), "text/plain; charset=utf-8");
+  });
+  of_job("files", [this](const Job& job, Response& response) {
+    Json list = Json::array();
+    for (const JobFile& file : files_of(output / job.folder))
+      list.push_back({{"name", file.name}, {"bytes", file.bytes}});
+    answer(response, list);
   });
   of_job("history", [this](const Job& job, Response& response) {
     Json list = Json::array();

@@ -12,9 +12,9 @@
 #include <memory>
 #include <string>
 
-#include "server/http/watched.hpp"
 #include "server/jobs/queue.hpp"
 #include "server/jobs/server_config.hpp"
+#include "server/watched.hpp"
 
 namespace flappy::server {
 

@@ -112,8 +112,7 @@ std::vector<JobStatus> Commands::statuses() const {
   return all;
 }
 
-std::vector<JobFile> Commands::files(std::uint64_t job) const {
-  const fs::path folder = config_.folders.output / queue_.job(job).folder;
+std::vector<JobFile> files_of(const fs::path& folder) {
   std::vector<JobFile> all;
   std::error_code error;
   fs::recursive_directory_iterator each(folder, error);
@@ -125,6 +124,10 @@ std::vector<JobFile> Commands::files(std::uint64_t job) const {
   }
   std::ranges::sort(all, {}, &JobFile::name);
   return all;
+}
+
+std::vector<JobFile> Commands::files(std::uint64_t job) const {
+  return files_of(config_.folders.output / queue_.job(job).folder);
 }
 
 std::string Commands::chunk(std::uint64_t job, const std::string& file, std::uint64_t offset) const {

@@ -51,6 +51,8 @@ struct JobFile {
   std::uint64_t bytes = 0;
 };
 inline constexpr std::size_t kMostFiles = 10'000, kMostOfChunk = 65'536, kMostListed = 1000;
+/// The files of a job's folder by name, links left out; at most kMostFiles.
+std::vector<JobFile> files_of(const std::filesystem::path& folder);
 
 /// Any thread may call it.
 class Commands {
@@ -63,7 +65,7 @@ class Commands {
 
   /// The newest kMostListed ones, newest first.
   std::vector<JobStatus> statuses() const;
-  /// io::InputError where there is no such job. Links are left out.
+  /// io::InputError where there is no such job.
   std::vector<JobFile> files(std::uint64_t job) const;
   /// At most kMostOfChunk bytes from `offset` on; none at the end. io::InputError for a name that is none of files().
   std::string chunk(std::uint64_t job, const std::string& file, std::uint64_t offset) const;

@@ -48,7 +48,8 @@ Words train(const Launch& launch) {
     add(words, {config.string(), "--out", run.string()});
     for (const std::string& override : launch.asked.overrides) add(words, {"--set", override});
   }
-  add(words, {"--threads", std::to_string(launch.threads), "--json", (launch.folder / kResult).string()});
+  add(words, {"--threads", std::to_string(launch.threads), "--json", (launch.folder / kResult).string(), "--progress",
+              (launch.folder / kProgress).string()});
   return words;
 }
 
@@ -64,7 +65,8 @@ Words evaluate(const Launch& launch) {
       refuse_override(override, key + "=N");
     add(words, {"--" + key, value});
   }
-  add(words, {"--threads", std::to_string(launch.threads), "--json", (launch.folder / kResult).string()});
+  add(words, {"--threads", std::to_string(launch.threads), "--json", (launch.folder / kResult).string(), "--progress",
+              (launch.folder / kProgress).string()});
   return words;
 }
 
@@ -74,7 +76,7 @@ Words export_policy(const Launch& launch) {
     if (override != "int8=true" && override != "prove=true") refuse_override(override, "int8=true, prove=true");
     words.push_back("--" + key_of(override));
   }
-  add(words, {"--json", (launch.folder / kResult).string()});
+  add(words, {"--json", (launch.folder / kResult).string(), "--progress", (launch.folder / kProgress).string()});
   return words;
 }
 
@@ -90,6 +92,8 @@ Words diagnose(const Launch& launch) {
                  std::to_string(launch.threads),
                  "--json",
                  (launch.folder / kResult).string(),
+                 "--progress",
+                 (launch.folder / kProgress).string(),
                  "--flights"};
   if (launch.folders.data.empty())
     throw io::InputError("kind: this server has no flights; accepted: diagnose where jobs.data is set");
@@ -102,50 +106,14 @@ Words diagnose(const Launch& launch) {
   return words;
 }
 
-/// "trained 43 %, 12 s left", of the program's last lines.
-Progress progress_of_log(const fs::path& folder) {
-  Progress progress;
-  std::string text = tail_of(folder / kLogName, 4096);
-  std::ranges::replace(text, '\r', '\n');
-  while (!text.empty() && text.back() == '\n') text.pop_back();
-  progress.message = text.substr(text.rfind('\n') + 1);
-  const std::size_t sign = progress.message.find(" %");
-  if (sign == std::string::npos) return progress;
-  std::size_t first = sign;
-  while (first > 0 && progress.message[first - 1] >= '0' && progress.message[first - 1] <= '9') --first;
-  if (first < sign && sign - first <= 3)
-    progress.share = std::min(1.0, std::stod(progress.message.substr(first)) / 100);
-  return progress;
-}
-
-/// Of the last record that the run has.
-Progress progress_of_run(const fs::path& folder) {
-  Progress progress = progress_of_log(folder);
-  try {
-    const std::string text = tail_of(folder / "run" / "metrics.jsonl", 4096);
-    const std::size_t end = text.rfind('\n');
-    if (end == std::string::npos || end == 0) return progress;
-    const std::size_t begin = text.rfind('\n', end - 1);
-    const std::size_t first = begin == std::string::npos ? 0 : begin + 1;
-    const Json record = Json::parse(text.substr(first, end - first), nullptr, false);
-    const auto updates =
-        io::Config::load(folder / "run" / "config" / "train.toml").root().integer("learn.updates", 1, INT64_MAX);
-    if (!record.is_object() || !record.value("update", Json()).is_number()) return progress;
-    const double update = record["update"];
-    progress.share = std::max(progress.share, std::min(1.0, update / static_cast<double>(updates)));
-  } catch (const io::InputError&) {  // the run is about to begin
-  }
-  return progress;
-}
-
 }  // namespace
 
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> all = {
-      {"train", train, progress_of_run, true},
-      {"evaluate", evaluate, progress_of_log, true},
-      {"export", export_policy, progress_of_log, false},
-      {"diagnose", diagnose, progress_of_log, false},
+      {"train", train, true},
+      {"evaluate", evaluate, true},
+      {"export", export_policy, false},
+      {"diagnose", diagnose, false},
   };
   return all;
 }
@@ -167,6 +135,14 @@ bool is_complete(const Kind& kind, const fs::path& folder, bool asked_to_stop) {
   if (!result.is_object()) return false;
   const auto stopped = [](const Json& json) { return json.is_object() && json.value("stopped", false); };
   return !stopped(result) && !stopped(result.value("pid", Json())) && !stopped(result.value("arc", Json()));
+}
+
+Progress progress_of(const fs::path& folder) {
+  const Json told = Json::parse(tail_of(folder / kProgress, 4096), nullptr, false);
+  if (!told.is_object()) return {};  // the program is about to begin
+  const auto share = told.value("share", Json()), message = told.value("message", Json());
+  if (!share.is_number() || !message.is_string()) return {};
+  return {std::clamp(share.get<double>(), 0.0, 1.0), message.get<std::string>()};
 }
 
 std::string tail_of(const fs::path& file, std::size_t most) {

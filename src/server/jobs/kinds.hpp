@@ -36,13 +36,14 @@ struct Progress {
   std::string message;
 };
 
-inline constexpr const char* kResult = "result.json";  ///< in the job's folder; the last that a program writes
+// In the job's folder.
+inline constexpr const char* kResult = "result.json";      ///< the last that a program writes
+inline constexpr const char* kProgress = "progress.json";  ///< written over as it goes on
 
 struct Kind {
   std::string name;
   /// Goes on from what an earlier attempt left. io::InputError for what is not accepted.
   std::function<std::vector<std::string>(const Launch&)> command;
-  std::function<Progress(const std::filesystem::path& folder)> progress;
   /// Whether its result says that the program was stopped before its end; else one that was asked to stop counts as stopped.
   bool says_stopped = false;
 };
@@ -53,6 +54,8 @@ const Kind& kind_named(const std::vector<Kind>& kinds, const std::string& name);
 
 /// Whether an attempt came to its end, by the result that it left.
 bool is_complete(const Kind& kind, const std::filesystem::path& folder, bool asked_to_stop);
+/// What the job's program told last; nothing before it does.
+Progress progress_of(const std::filesystem::path& folder);
 /// The last bytes of a file, from the beginning of a line on; empty where there is none.
 std::string tail_of(const std::filesystem::path& file, std::size_t most);
 

@@ -114,7 +114,7 @@ void Runner::tell_progress(const Job& job) {
   const auto [reported, first] = reported_s_.emplace(job.id, now);
   if (!first && now < reported->second + kReportEvery_s) return;
   reported->second = now;
-  const Progress progress = kind_named(options_.kinds, job.asked.kind).progress(folder_of(job));
+  const Progress progress = progress_of(folder_of(job));
   if (std::abs(progress.share - job.progress) < 1e-3 && shown(progress.message) == job.message) return;
   queue_.report(job.id, progress.share, progress.message);
 }
@@ -183,6 +183,7 @@ void Runner::start(const Job& queued) {
   }
   std::error_code none;
   fs::remove(folder / kResult, none);
+  fs::remove(folder / kProgress, none);
   Job job;
   try {
     job = queue_.start(queued.id);

@@ -93,6 +93,9 @@ TEST_F(Page, ShowsWhatThereIs) {
   EXPECT_EQ(json("/api/jobs/1/curve"),
             Json::parse(R"({"update":[10,20],"success_rate":[null,0.5],"return_mean":[-1,2]})"));
   EXPECT_EQ(get("/api/jobs/1/log")->body, "first\nlast\n");
+  const Json files = json("/api/jobs/1/files");
+  ASSERT_EQ(files.size(), 2U) << files;
+  EXPECT_EQ(files[0], Json({{"name", "job.log"}, {"bytes", 11}}));
   EXPECT_EQ(json("/api/jobs/1/history")[0]["why"], "submitted");
   EXPECT_TRUE(json("/api/watched").is_null());
   WatchedState state;

@@ -95,14 +95,19 @@ TEST_F(CommandsOf, NameWhatEachKindNeeds) {
   const std::string a = (folders.configs / "a.toml").string(), output = folders.output.string(),
                     data = folders.data.string();
   EXPECT_EQ(command({"", "train", "a.toml", {"seed=1"}}),
-            "/bin/flappy-train " + a + " --out /job/run --set seed=1 --threads 2 --json /job/result.json");
-  EXPECT_EQ(command({"", "evaluate", "7", {"episodes=100", "task.x=1"}}),
-            "/bin/flappy-eval " + output + "/7/run --episodes 100 --set task.x=1 --threads 2 --json /job/result.json");
+            "/bin/flappy-train " + a +
+                " --out /job/run --set seed=1 --threads 2 --json /job/result.json --progress /job/progress.json");
+  EXPECT_EQ(
+      command({"", "evaluate", "7", {"episodes=100", "task.x=1"}}),
+      "/bin/flappy-eval " + output +
+          "/7/run --episodes 100 --set task.x=1 --threads 2 --json /job/result.json --progress /job/progress.json");
   EXPECT_EQ(command({"", "export", "old", {"int8=true"}}),
-            "/bin/flappy-export " + output + "/old --out /job/exported --int8 --json /job/result.json");
+            "/bin/flappy-export " + output +
+                "/old --out /job/exported --int8 --json /job/result.json --progress /job/progress.json");
   EXPECT_EQ(command({"", "diagnose", "a.toml", {"flight=flight_1"}}),
             "/bin/flappy-gap diagnose --vehicle " + a +
-                " --out /job/diagnosis --threads 2 --json /job/result.json --flights " + data + "/flight_1");
+                " --out /job/diagnosis --threads 2 --json /job/result.json --progress /job/progress.json --flights " +
+                data + "/flight_1");
   const auto refused = [&](const char* kind, const char* config, std::vector<std::string> overrides = {}) {
     return refusal([&] { command({"", kind, config, overrides}); });
   };

@@ -59,11 +59,6 @@ inline std::vector<Kind> fake_kinds() {
              return std::vector<std::string>{"/bin/sh",          "-c", kScript, "sh", launch.folder.string(), steps,
                                              launch.asked.config};
            },
-           [](const fs::path& folder) {
-             Progress progress;
-             progress.message = tail_of(folder / kLogName, 100);
-             return progress;
-           },
            true}};
 }
 

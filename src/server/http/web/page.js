@@ -91,8 +91,8 @@ async function showChosen() {
   at("job-title").textContent = `Job ${job.id}: ${job.kind} ${job.config}`;
   at("message").textContent = [job.state, `attempt ${job.attempts}`, ...job.overrides, job.message].filter(Boolean).join(" · ");
   const of = (what) => ask(`api/jobs/${job.id}/${what}`);
-  const [log, history, curve] = await Promise.all([
-    of("log").then((r) => r.text()), of("history").then((r) => r.json()), of("curve").then((r) => r.json())]);
+  const [log, history, curve, files] = await Promise.all([of("log").then((r) => r.text()),
+    of("history").then((r) => r.json()), of("curve").then((r) => r.json()), of("files").then((r) => r.json())]);
   if (job.id !== chosen) return;
   const box = at("log");
   const following = box.scrollTop + box.clientHeight >= box.scrollHeight - 8;
@@ -100,6 +100,7 @@ async function showChosen() {
   if (following) box.scrollTop = box.scrollHeight;
   at("history").replaceChildren(...history.map((step) =>
     element("li", `${time(step.time_s)}  ${step.state}${step.attempt > 0 ? `, attempt ${step.attempt}` : ""}: ${step.why}`)));
+  at("files").replaceChildren(...files.map((file) => element("li", `${file.name}  ${file.bytes.toLocaleString("en")} bytes`)));
   showCurve(curve);
 }
 

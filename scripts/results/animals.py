@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Animals beside what was published of them. Prints the tables of docs/animals.md.
 
-    tests/tools/animals.py BIN ROOT FOLDER
+    scripts/results/animals.py BIN ROOT FOLDER
 
 BIN holds the programs, ROOT is the project, FOLDER the published figures: bumblebee_cfd_right_wing.csv and bumblebee_wing.csv (computed flow of a
 bumblebee), hydei_hover.csv and hydei_wing.csv (kinematics and planform of D. hydei). What is missing is left out and said.

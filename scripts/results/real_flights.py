@@ -2,7 +2,7 @@
 """Diagnoses flights that others measured: a Flapper Nimble+ and a Crazyflie 2.1, from a folder with flapper/*.csv.gz and
 nanobench/*.csv.gz. Prints the tables of docs/real.md; keeps every diagnosis in OUT.
 
-    tests/tools/real_flights.py BIN PROJECT DATA OUT
+    scripts/results/real_flights.py BIN PROJECT DATA OUT
 """
 
 import itertools

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The trained escape of the bird beside the robot's: prints the trained columns of docs/animals.md.
 
-    tests/tools/escape_beside.py BIN ROOT BIRD_RUN ROBOT_RUN OUT
+    scripts/results/escape_beside.py BIN ROOT BIRD_RUN ROBOT_RUN OUT
 
 BIN holds the programs, ROOT is the project, the runs are folders of flappy-train configs/train/escape_hummingbird.toml and escape.toml, OUT takes the logs.
 Each figure is the median of 50 flights of randomised vehicles, from the start to the hand-back at 0.35 s: angles are Euler's of z, y, x from the
