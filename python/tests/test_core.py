@@ -1,5 +1,8 @@
 """What the module itself does: batches, fleets, environments, flights, policies, and what it says of bad inputs."""
 
+import multiprocessing
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -272,3 +275,38 @@ def test_diagnosis_and_identification_refuse(tmp_path):
         flappy.diagnose("vehicles/hummingbird_nominal.toml", [str(tmp_path / "nowhere")])
     with pytest.raises(flappy.InputError, match="nowhere"):
         flappy.identify("vehicles/hummingbird_nominal.toml", tmp_path / "nowhere.csv")
+
+
+def flown(threads: int) -> np.ndarray:
+    batch = flappy.Batch(4000, flappy.Vehicle("vehicles/hummingbird_nominal.toml"), threads=threads, precision="float")
+    batch.set_inputs([9.8, 0.1, 0, 0])
+    for _ in range(3):
+        batch.step(8)
+    return batch.states()["position_m"]
+
+
+def test_forked_processes_fly_on_threads_of_their_own():
+    wanted = flown(2)  # from now on this process has threads, which a child has not
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        for positions in pool.map_async(flown, [2, 1]).get(timeout=60):
+            assert (positions == wanted).all()
+    assert (flown(2) == wanted).all()
+
+
+def test_threads_sleep_between_steps():
+    """Even where somebody loaded OpenMP before us, whose threads then look on for milliseconds."""
+    program = """
+import ctypes, time
+ctypes.CDLL("libgomp.so.1", mode=ctypes.RTLD_GLOBAL)
+import flappy
+batch = flappy.Batch(4000, flappy.Vehicle("vehicles/hummingbird_nominal.toml"), threads=2)
+spent = []
+for _ in range(5):
+    batch.step(8)
+    before = time.process_time()
+    time.sleep(0.05)
+    spent.append(time.process_time() - before)
+print(min(spent))
+"""
+    said = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout
+    assert float(said) < 1e-3

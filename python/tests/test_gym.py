@@ -165,3 +165,15 @@ def test_refuses(call, error, said):
 def test_gymnasium_finds_it_by_its_module():
     code = "import gymnasium; print(gymnasium.make('flappy:flappy/Escape-v0').reset(seed=1)[0].shape)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "(29,)\n"
+
+
+def test_forked_environments():
+    here = gymnasium.make_vec("flappy/Hover-v0", num_envs=200, overrides=BRIEF, threads=2)
+    wanted, _ = here.reset(seed=5)
+    here.step(np.zeros((200, 4), np.float32))  # from now on this process has threads, which a child has not
+    envs = gymnasium.vector.AsyncVectorEnv(
+        [lambda i=i: gymnasium.make("flappy/Hover-v0", overrides=BRIEF, first=i) for i in range(2)], context="fork"
+    )
+    assert data_equivalence(envs.reset(seed=[5, 5])[0], wanted[:2], exact=True)
+    assert envs.step(np.zeros((2, 4), np.float32))[0].shape == wanted[:2].shape
+    envs.close()

@@ -54,8 +54,7 @@ Diagnosis diagnose_visibly(const std::vector<PredictedFlight>& flights, const si
 
 /// The files of a diagnosis.
 constexpr const char *kJson = "diagnosis.json", *kVehicle = "vehicle_corrected.toml";
-constexpr const char* kFiles[] = {
-    kJson, kVehicle, "residuals.csv", "candidates.csv", "unexplained.csv", "residuals.svg", "probabilities.svg"};
+constexpr const char* kFiles[] = {kJson, kVehicle, "residuals.csv", "candidates.csv", "unexplained.csv"};
 
 /// All but diagnosis.json, which is that too until what lies ahead is known; the names of the others.
 std::string write_all(const std::filesystem::path& out, const Report& report,
@@ -65,11 +64,6 @@ std::string write_all(const std::filesystem::path& out, const Report& report,
     io::write_atomically(out / kVehicle, "# Corrected by flappy-gap diagnose.\n" + model::vehicle_text(*corrected));
   write_tables(out, report);
   std::string names;
-  try {
-    write_figures(out, report);
-  } catch (const io::InputError& e) {
-    io::log(io::LogLevel::warning, e.what());
-  }
   for (const char* name : kFiles)
     if (name != kJson && std::filesystem::exists(out / name)) names += std::string(", ") + name;
   return names;

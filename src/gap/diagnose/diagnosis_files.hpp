@@ -11,7 +11,4 @@ namespace flappy::gap {
 /// explains.
 void write_tables(const std::filesystem::path& folder, const Report& report);
 
-/// residuals.svg and probabilities.svg by gnuplot. InputError where it is missing or fails.
-void write_figures(const std::filesystem::path& folder, const Report& report);
-
 }  // namespace flappy::gap
