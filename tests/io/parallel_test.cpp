@@ -141,7 +141,7 @@ TEST(Parallel, SleepsWhileThereIsNothingToDo) {
   const double before = spent_s();
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   EXPECT_LT(spent_s() - before, 2e-3);  // OpenMP that waits as it likes spends 5e-3 or more
-#ifndef __clang__  // whose threads look on as long as a region has tasks
+#ifndef __clang__                       // whose threads look on as long as a region has tasks
   together(2, [&] {
     ASSERT_TRUE(two_meet());
     const double inside = spent_s();
