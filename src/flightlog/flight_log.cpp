@@ -67,6 +67,12 @@ const std::vector<Field<WingsStream>> kWingsFields = {{"t_s", &WingsStream::t_s,
                                                       {"right_stroke_rad", &WingsStream::right_stroke_rad, 1e3},
                                                       {"right_rotation_rad", &WingsStream::right_rotation_rad, 1e3}};
 
+template <class Stream>
+std::optional<double> limit_in(const std::vector<Field<Stream>>& fields, const std::string& column) {
+  const auto found = std::ranges::find(fields, column, &Field<Stream>::name);
+  return found == fields.end() ? std::nullopt : std::optional(found->limit);
+}
+
 [[noreturn]] void refuse(const std::string& place, const std::string& what, std::string_view accepted) {
   throw io::InputError(place + ": " + what + (accepted.empty() ? "" : "; accepted: " + std::string(accepted)));
 }
@@ -275,14 +281,19 @@ class StreamReader {
     for (const auto& field : fields) part.*field.column = take(field.name, field.limit);
   }
 
-  void require_increasing(const Column& t_s) const {
+  void require_times(const Column& t_s) const {
     for (std::size_t i = 1; i < t_s.size(); ++i) {
+      const std::string after = " of the line before", now = "t_s: " + shortest_digits(t_s[i]);
       if (!(t_s[i] > t_s[i - 1]))
-        refuse(place(i),
-               "t_s: " + shortest_digits(t_s[i]) + " does not come after " + shortest_digits(t_s[i - 1]) +
-                   " of the line before",
-               "times that increase");
+        refuse(place(i), now + " does not come after " + shortest_digits(t_s[i - 1]) + after, "times that increase");
+      if (t_s[i] - t_s[i - 1] > kLongestGap_s)
+        refuse(place(i), now + " comes " + shortest_digits(t_s[i] - t_s[i - 1]) + " s after that" + after,
+               "gaps of at most " + shortest_digits(kLongestGap_s) + " s within a flight");
     }
+    const double span_s = t_s.back() - t_s.front();
+    if (static_cast<double>(t_s.size()) < kSlowest_Hz * span_s)
+      refuse(table_.name, std::to_string(t_s.size()) + " samples over " + shortest_digits(span_s) + " s",
+             "at least one in " + shortest_digits(1 / kSlowest_Hz) + " s on the whole");
   }
 
  private:
@@ -301,7 +312,7 @@ Stream parse_stream(const std::string& text, const fs::path& path, const std::ve
   const StreamReader reader(text, path, names_of(fields));
   Stream stream;
   reader.fill(stream, fields);
-  reader.require_increasing(stream.t_s);
+  reader.require_times(stream.t_s);
   return stream;
 }
 
@@ -311,7 +322,7 @@ CommandStream parse_declared(const std::string& text, const fs::path& path, cons
   const StreamReader reader(text, path, names);
   CommandStream command;
   command.t_s = reader.take("t_s", kLatest);
-  reader.require_increasing(command.t_s);
+  reader.require_times(command.t_s);
   for (const std::string& name : inputs) command.declared.push_back(reader.take(name, kInputLimit));
   return command;
 }
@@ -322,7 +333,7 @@ CommandStream parse_command(const std::string& text, const fs::path& path) {
   const StreamReader reader(text, path, names_of(kCommandFields), optional);
   CommandStream command;
   reader.fill(command, kCommandFields);
-  reader.require_increasing(command.t_s);
+  reader.require_times(command.t_s);
   std::string missing;
   for (const auto& field : kInputFields) {
     if (reader.has(field.name)) command.inputs.emplace();
@@ -433,6 +444,16 @@ std::optional<Stream> parse_optional(const LogFiles& files, const std::string& n
 }
 
 }  // namespace
+
+double column_limit(const std::string& column) {
+  if (column == kPhase) return kPhaseLimit;
+  for (const std::optional<double> limit :
+       {limit_in(kCommandFields, column), limit_in(kInputFields, column), limit_in(kMocapFields, column),
+        limit_in(kImuFields, column), limit_in(kPowerFields, column), limit_in(kAttitudeFields, column),
+        limit_in(kWingsFields, column)})
+    if (limit) return *limit;
+  return kInputLimit;
+}
 
 LogAmbient read_ambient(const io::Table& ambient) {
   LogAmbient a;

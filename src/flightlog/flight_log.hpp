@@ -33,6 +33,12 @@ class Table;
 
 namespace flappy::flightlog {
 
+/// What programs do grows with the duration of a flight, so it has no gap that is longer in any stream, and no stream that is slower on the whole.
+inline constexpr double kLongestGap_s = 600, kSlowest_Hz = 0.1;
+
+/// The largest magnitude that a log may have in a column, of any stream or of declared inputs.
+double column_limit(const std::string& column);
+
 /// A vertical wall through (x, y); its normal points into the free space and has length 1.
 struct LogWall {
   double x_m = 0, y_m = 0, normal_x = 1, normal_y = 0;

@@ -4,7 +4,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <stdexcept>
 
@@ -63,14 +62,10 @@ std::vector<std::string> column_names(const Line& line, const std::vector<Cell>&
   return names;
 }
 
-double to_number(const Line& line, const Cell& cell, const std::string& name, Missing missing) {
+double to_number(const Line& line, const Cell& cell, const std::string& name) {
   const auto refuse = [&](const std::string& what) {
     line.refuse(cell.column, name + ": " + what + "; accepted: a number");
   };
-  const auto is = [&](std::string_view word) {
-    return std::ranges::equal(cell.text, word, {}, [](char c) { return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c; });
-  };
-  if (missing == Missing::nan && (is("") || is("nan"))) return std::numeric_limits<double>::quiet_NaN();
   if (cell.text.empty()) refuse("is empty");
   double value = 0;
   const char* const end = cell.text.data() + cell.text.size();
@@ -82,7 +77,7 @@ double to_number(const Line& line, const Cell& cell, const std::string& name, Mi
   return value;
 }
 
-void add_row(const Line& line, const std::vector<Cell>& cells, Missing missing, CsvTable& table) {
+void add_row(const Line& line, const std::vector<Cell>& cells, CsvTable& table) {
   const std::size_t width = table.names.size();
   if (line.text.empty()) line.refuse(1, "is an empty line; accepted: " + std::to_string(width) + " cells");
   if (cells.size() != width) {
@@ -91,7 +86,7 @@ void add_row(const Line& line, const std::vector<Cell>& cells, Missing missing, 
                             ", as in the header");
   }
   for (std::size_t i = 0; i < width; ++i) {
-    table.columns[i].push_back(to_number(line, cells[i], table.names[i], missing));
+    table.columns[i].push_back(to_number(line, cells[i], table.names[i]));
   }
 }
 
@@ -118,7 +113,7 @@ const std::vector<double>& CsvTable::column(std::string_view column_name) const 
 
 CsvTable read_csv(const std::filesystem::path& path) { return parse_csv(read_text(path), path.string()); }
 
-CsvTable parse_csv(std::string_view text, const std::string& name, Missing missing) {
+CsvTable parse_csv(std::string_view text, const std::string& name) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   if (text.empty()) throw InputError(name + ": is empty; accepted: a line of column names, then rows of numbers");
@@ -132,7 +127,7 @@ CsvTable parse_csv(std::string_view text, const std::string& name, Missing missi
       table.names = column_names(line, cells);
       table.columns.resize(cells.size());
     } else {
-      add_row(line, cells, missing, table);
+      add_row(line, cells, table);
     }
   }
   return table;

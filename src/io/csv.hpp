@@ -14,21 +14,18 @@ namespace flappy::io {
 struct CsvTable {
   std::string name;  ///< the file, for messages
   std::vector<std::string> names;
-  std::vector<std::vector<double>> columns;  ///< one for each name, all of one length, finite unless read otherwise
+  std::vector<std::vector<double>> columns;  ///< one for each name, all of one length, finite
 
   /// InputError when there is no such column.
   const std::vector<double>& column(std::string_view column_name) const;
 };
-
-/// Whether a cell that is empty or "nan" is a fault, or a number that is missing: then the column has NaN there.
-enum class Missing { fault, nan };
 
 /// Reads a file of finite numbers. Spaces around a cell, CRLF and a missing last newline are accepted;
 /// anything else that is not a plain table is an InputError with file, line and character column.
 CsvTable read_csv(const std::filesystem::path& path);
 
 /// The same from text; `name` stands for the file in messages.
-CsvTable parse_csv(std::string_view text, const std::string& name, Missing missing = Missing::fault);
+CsvTable parse_csv(std::string_view text, const std::string& name);
 
 /// The text that reads back to the same table. std::invalid_argument unless all columns have one length.
 std::string csv_text(const std::vector<std::string>& names, const std::vector<std::vector<double>>& columns);

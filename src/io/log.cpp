@@ -10,6 +10,7 @@
 
 #include "io/files.hpp"
 #include "io/progress.hpp"
+#include "io/text.hpp"
 
 namespace flappy::io {
 namespace {
@@ -61,7 +62,7 @@ void log(LogLevel level, std::string_view text) {
   Log& log = the_log();
   const auto at = kLevels[static_cast<int>(level)];
   if (log.screen->should_log(at)) clear_progress();
-  log.logger.log(at, text);
+  log.logger.log(at, printable(text));
 }
 
 void log_error(std::string_view text) {

@@ -25,14 +25,6 @@ TEST(Csv, ReadsColumns) {
   EXPECT_EQ(table.column("x_m"), (std::vector<double>{1.5, -2e-3}));
 }
 
-TEST(Csv, TakesCellsForMissingWhereItIsToldTo) {
-  const CsvTable table = parse_csv("t_s,x_m\n0,\n , NaN\n2,3\n", "log.csv", Missing::nan);
-  EXPECT_TRUE(table.column("t_s")[0] == 0 && std::isnan(table.column("t_s")[1]));
-  EXPECT_TRUE(std::isnan(table.column("x_m")[0]) && std::isnan(table.column("x_m")[1]) && table.column("x_m")[2] == 3);
-  EXPECT_THROW(parse_csv("t_s\ninf\n", "log.csv", Missing::nan), InputError);
-  EXPECT_THROW(parse_csv("t_s\nnano\n", "log.csv", Missing::nan), InputError);
-}
-
 TEST(Csv, AcceptsWhatOtherProgramsWrite) {
   const CsvTable table = parse_csv("\xEF\xBB\xBFt_s, x_m\r\n 0 ,\t1\r\n2, 3", "log.csv");
   EXPECT_EQ(table.column("t_s"), (std::vector<double>{0, 2}));

@@ -46,6 +46,45 @@ expect_equal("stderr" "${err}" "")
 file(READ ${WORK}/of_tables/mocap.csv mocap)
 expect_equal("mocap.csv" "${mocap}" "t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,1,0.002,0.003,1,0,0,0\n0.01,0.001,0.002,0.003,1,0,0,0\n")
 
+# ---- one sample from before its clock was there: the flight is the others, and every program ends
+
+file(WRITE ${WORK}/zero/mapping.toml "schema = 1
+vehicle = \"flapper_nimble.toml\"
+gravity_m_s2 = 9.81
+ambient = { air_density_kg_m3 = 1.2, ground_z_m = -1000.0, ceiling_z_m = 1000.0, walls = [] }
+[command]
+channel = \"*\"
+time = \"field\"
+time_field = \"t\"
+inputs = [\"u\"]
+columns = { u = \"u\" }
+[mocap]
+channel = \"*\"
+time = \"field\"
+time_field = \"t\"
+latency_s = 0.0
+position_noise_m = 1e-4
+attitude_noise_rad = 5e-3
+columns = { x_m = \"x\", y_m = \"y\", z_m = \"z\", qw = \"qw\", qx = \"qx\", qy = \"qy\", qz = \"qz\" }
+")
+set(rows "t,u,x,y,z,qw,qx,qy,qz\n0,9,0.1,0.2,1,1,0,0,0\n")
+foreach(i RANGE 100 499)
+  string(APPEND rows "1700000000.${i},9.${i},0.${i},0.2,1,1,0,0,0\n")
+endforeach()
+file(WRITE ${WORK}/zero/log.csv "${rows}")
+run(import ${WORK}/zero/log.csv --mapping ${WORK}/zero/mapping.toml --out ${WORK}/of_zero)
+expect_equal("stderr" "${err}" "warning: ${WORK}/zero/mapping.toml: command: 1 samples are unusable: 1 apart from the rest of the recording
+warning: ${WORK}/zero/mapping.toml: mocap: 1 samples are unusable: 1 apart from the rest of the recording\n")
+expect_match("stdout" "${out}" "\n  command +400 +1000.00 +0 +0 +0 +0 +1 ")
+file(READ ${WORK}/of_zero/command.csv imported LIMIT 20)
+expect_match("command.csv" "${imported}" "t_s,u\n0,9.1\n")
+# such a sample in a flight log itself
+file(READ ${WORK}/of_zero/command.csv imported)
+string(REPLACE "t_s,u\n" "t_s,u\n-1700000000,9\n" imported "${imported}")
+file(WRITE ${WORK}/of_zero/command.csv "${imported}")
+expect_refused("${WORK}/of_zero/command.csv:3: t_s: 0 comes 1.7e+09 s after that of the line before; accepted: gaps of at most 600 s within a flight"
+  check ${WORK}/of_zero)
+
 # ---- what is refused
 
 set(import import ${WORK}/f.mcap --mapping ${mapping} --out ${WORK}/refused)

@@ -78,32 +78,12 @@ std::size_t line_at(const Column& t_s, double after_s) {
   return static_cast<std::size_t>(std::min(at, t_s.end() - 1) - t_s.begin()) + 2;
 }
 
-StreamStatistics stream_statistics(const std::string& name, const Column& t_s, std::optional<double> declared_hz) {
-  StreamStatistics s;
-  s.name = name;
-  s.samples = t_s.size();
-  s.duration_s = t_s.back() - t_s.front();
-  s.declared_hz = declared_hz;
-  std::vector<double> intervals, pairs;
-  for (std::size_t i = 1; i < t_s.size(); ++i) intervals.push_back(t_s[i] - t_s[i - 1]);
-  for (std::size_t i = 2; i < t_s.size(); ++i) pairs.push_back((t_s[i] - t_s[i - 2]) / 2);
-  const double usual = io::upper_median(pairs.empty() ? intervals : pairs);
-  double sum = 0, squares = 0, count = 0;
-  for (std::size_t i = 0; i < intervals.size(); ++i) {
-    const double dt = intervals[i];
-    s.longest_gap_s = std::max(s.longest_gap_s, dt);
-    // With either neighbour: a late sample makes a long interval and a short one.
-    const double before = i > 0 ? intervals[i - 1] : usual, after = i + 1 < intervals.size() ? intervals[i + 1] : usual;
-    const long missing = dt > 1.5 * usual ? std::lround((dt + std::min(before, after)) / usual) - 2 : 0;
-    if (missing > 0) {
-      if (declared_hz) s.missing += static_cast<std::size_t>(missing);
-    } else {
-      sum += dt, squares += dt * dt, ++count;
-    }
-  }
-  s.jitter_s = std::sqrt(std::max(squares / count - (sum / count) * (sum / count), 0.0));
-  s.rate_hz = static_cast<double>(s.samples + s.missing - 1) / s.duration_s;
-  return s;
+double next_window(const Column& t_s, double middle_s, double span_s) {
+  const double next_s = middle_s + span_s;
+  const auto after = std::ranges::upper_bound(t_s, next_s);
+  constexpr double kMany = 1000;
+  const double empty = after == t_s.end() ? 0 : std::floor((*after - next_s) / span_s) - 1;
+  return empty > kMany ? next_s + empty * span_s : next_s;
 }
 
 std::optional<double> beat_frequency(const Column& t_s, const Column& values) {

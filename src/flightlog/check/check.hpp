@@ -2,24 +2,16 @@
 // of the vehicle, no diagnosis.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "flightlog/flight_log.hpp"
+#include "flightlog/stream_statistics.hpp"
 
 namespace flappy::flightlog {
 
 enum class Verdict { ok, warning, not_tested };
-
-struct StreamStatistics {
-  std::string name;
-  std::size_t samples = 0, missing = 0;  ///< missing only where a rate is declared
-  double duration_s = 0, rate_hz = 0, longest_gap_s = 0;
-  double jitter_s = 0;  ///< standard deviation of the intervals that miss no sample
-  std::optional<double> declared_hz;
-};
 
 /// Where a fault of the data first shows: a file of the log and its line.
 struct LogPlace {

@@ -111,15 +111,15 @@ Shoves shoves_of(const Context& c) {
   const double span_s = h.flapping_Hz > 0 ? std::max(std::round(0.2 * h.flapping_Hz), 1.0) / h.flapping_Hz : 0.2;
   const std::vector<double>& t = c.motion.imu_t_s();
   Shoves s;
-  // Fewer poses than shoves tell of none, and of times that are no seconds there would be no end.
-  if (c.motion.mocap_t_s().back() / span_s > static_cast<double>(c.motion.mocap_t_s().size())) return s;
   std::vector<char> known;
   for (const double t_s : t) {
     const auto q = c.motion.attitude_at(t_s, Order::wxyz);
     known.push_back(q ? 1 : 0);
     s.attitude.push_back(q.value_or(Quaterniond::Identity()));
   }
-  for (double middle = span_s; middle + span_s < c.motion.mocap_t_s().back(); middle += span_s) {
+  const std::vector<double>& poses_s = c.motion.mocap_t_s();
+  for (double middle = next_window(poses_s, 0, span_s); middle + span_s < poses_s.back();
+       middle = next_window(poses_s, middle, span_s)) {
     const auto before = c.motion.position_at(middle - span_s), here = c.motion.position_at(middle),
                after = c.motion.position_at(middle + span_s);
     if (!before || !here || !after || !c.motion.mean_rate(middle - span_s, middle + span_s)) continue;

@@ -23,8 +23,6 @@ std::size_t index_before(const std::vector<double>& times, double t);
 /// The line of a stream's file at a time since its first sample.
 std::size_t line_at(const Column& t_s, double after_s);
 
-StreamStatistics stream_statistics(const std::string& name, const Column& t_s, std::optional<double> declared_hz);
-
 /// Rate of rises through the mean, from the median of the time between them; nothing with fewer than five.
 std::optional<double> beat_frequency(const Column& t_s, const Column& values);
 
@@ -42,6 +40,9 @@ void check_inputs_apart(const FlightLog& log, Findings& findings);
 void compare_inputs(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings);
 /// How they go along with one another, of three flights or more.
 void compare_correlations(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings);
+/// The middle of the window after the one at `middle_s`, of windows side by side, `span_s` each. A gap in `t_s` of more than a thousand windows is passed over
+/// at once: no work grows with its length.
+double next_window(const Column& t_s, double middle_s, double span_s);
 void check_power(const FlightLog& log, Findings& findings);
 void check_wings(const FlightLog& log, Findings& findings);
 

@@ -113,7 +113,9 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
     return *p + *q * arm;
   };
   std::vector<Vector3d> moved, felt;
-  for (double middle = span_s; middle + span_s < c.motion.mocap_t_s().back(); middle += span_s) {
+  const std::vector<double>& poses_s = c.motion.mocap_t_s();
+  for (double middle = next_window(poses_s, 0, span_s); middle + span_s < poses_s.back();
+       middle = next_window(poses_s, middle, span_s)) {
     const double shift = c.lag.at(middle);
     const auto before = at_imu(middle - span_s), here = at_imu(middle), after = at_imu(middle + span_s);
     if (!before || !here || !after || !c.motion.mean_rate(middle - span_s + shift, middle + span_s + shift)) continue;

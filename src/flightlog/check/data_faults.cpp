@@ -22,13 +22,8 @@ struct DeclaredStream {
   std::size_t last_line() const { return t_s->size() + 1; }
 };
 
-/// The rate at which commands come where none are missing: of the shorter intervals.
-double command_rate_hz(const Column& t_s) {
-  Column intervals;
-  for (std::size_t i = 1; i < t_s.size(); ++i) intervals.push_back(t_s[i] - t_s[i - 1]);
-  const std::size_t tenth = intervals.size() / 10;
-  return 1 / io::order_statistic(std::move(intervals), tenth);
-}
+/// The rate at which commands come where none are missing: nothing declares it.
+double command_rate_hz(const Column& t_s) { return stream_statistics(kCommand, t_s, 1).rate_hz; }
 
 /// Commands, motion capture and, of a flight with voltages, IMU, which every diagnosis needs, then the others.
 std::vector<DeclaredStream> streams_of(const FlightLog& log) {

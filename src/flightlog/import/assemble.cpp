@@ -9,8 +9,10 @@
 
 #include "flightlog/import/clock.hpp"
 #include "flightlog/import/sources.hpp"
+#include "flightlog/stream_statistics.hpp"
 #include "io/log.hpp"
 #include "io/statistics.hpp"
+#include "io/text.hpp"
 
 namespace flappy::flightlog {
 namespace {
@@ -20,43 +22,104 @@ constexpr double kQuaternionTolerance = 1e-3;
 constexpr double kOddOffset_s = 0.5;
 using Columns = std::map<std::string, Column>;
 
+/// "4 lacks x_m, 1 no time".
+std::string reasons(const StreamReport& report) {
+  std::vector<std::string> parts;
+  for (const auto& [why, count] : report.why_unusable) parts.push_back(std::to_string(count) + " " + why);
+  return io::joined(parts);
+}
+
 /// Names that a fault lists, which may be thousands.
 std::string listed(const std::vector<std::string>& names) {
   constexpr std::size_t kMost = 30;
-  if (names.size() <= kMost) return names.empty() ? "nothing" : io::joined(names);
-  return io::joined({names.begin(), names.begin() + kMost}) + " and " + std::to_string(names.size() - kMost) + " more";
+  if (names.size() <= kMost) return names.empty() ? "nothing" : io::shortened(io::joined(names), 2000);
+  return io::shortened(io::joined({names.begin(), names.begin() + kMost}), 2000) + " and " +
+         std::to_string(names.size() - kMost) + " more";
 }
 
 const Channel& channel_of(const Channels& channels, const StreamMapping& s, const std::string& name,
                           const std::string& key) {
-  if (const Channel* found = channels.find(name)) return *found;
-  const std::vector<std::string> names = channels.names();
-  s.table.fail(key, "\"" + name + "\" is not recorded", listed(names) + io::did_you_mean(name, names));
+  const Channel* found = channels.find(name);
+  if (found && !found->received_ns().empty()) return *found;
+  std::vector<std::string> names = channels.names();
+  if (!found) s.table.fail(key, "\"" + name + "\" is not recorded", listed(names) + io::did_you_mean(name, names));
+  std::erase_if(names, [&](const std::string& other) { return channels.find(other)->received_ns().empty(); });
+  s.table.fail(key, "\"" + name + "\" has no samples", "a channel that has some: " + listed(names));
 }
 
-/// Whether a stream that a log need not have is not recorded.
+bool is_optional(const StreamMapping& s) { return s.name == "power" || s.name == "wings" || s.name == "attitude"; }
+
+/// Whether a stream that a log need not have is not there.
 bool left_out(const Channels& channels, const StreamMapping& s) {
-  return (s.name == "power" || s.name == "wings" || s.name == "attitude") && !channels.find(s.channel);
+  const Channel* found = channels.find(s.channel);
+  return is_optional(s) && (!found || found->received_ns().empty());
 }
 
 const std::vector<double>& field_of(const Channel& channel, const io::Table& table, const std::string& key,
                                     const std::string& field) {
   if (const auto* found = channel.column(field)) return *found;
   const std::vector<std::string> names = channel.fields();
-  if (names.empty()) table.fail(key, "\"" + field + "\" is of a channel without samples", "a channel with samples");
   table.fail(key, "\"" + field + "\" is no field of the channel", listed(names) + io::did_you_mean(field, names));
+}
+
+/// The unit, of "s", "ms", "us" and "ns", in which a value lies in a range of seconds; empty where none does.
+std::string unit_for(double value, double least_s, double most_s) {
+  for (const auto& [unit, seconds] :
+       {std::pair("s", 1.0), std::pair("ms", 1e-3), std::pair("us", 1e-6), std::pair("ns", 1e-9)})
+    if (value * seconds >= least_s && value * seconds <= most_s) return unit;
+  return "";
+}
+
+[[noreturn]] void refuse_unit(const StreamMapping& s, const std::string& what, const std::string& unit) {
+  const std::string key = s.table.has("time_unit") ? "time_unit" : "time_field";
+  s.table.fail(key, what, unit.empty() ? "times of a flight" : "time_unit = \"" + unit + "\"");
+}
+
+/// Refuses times that are no flight's by their unit: later than any clock shows, or farther apart or nearer than the samples of any robot, as microseconds are that are taken
+/// for seconds.
+void require_unit(const Channel& channel, const StreamMapping& s) {
+  constexpr double kLatest_s = 4.1e9;                    // the year 2100
+  constexpr double kLongest_s = 10, kShortest_s = 1e-6;  // between two samples, on the whole
+  constexpr double kTail = 0.05;                         // what may be wild at either end
+  std::vector<double> times = field_of(channel, s.table, "time_field", s.time_field);
+  std::erase_if(times, [](double t) { return !std::isfinite(t); });
+  if (times.size() < 2) return;
+  const double low = io::quantile(times, kTail), middle = std::abs(io::median(times)),
+               high = io::quantile(times, 1 - kTail);
+  const double step = (high - low) / ((1 - 2 * kTail) * static_cast<double>(times.size() - 1)),
+               unit_s = 1e-9 * s.time_unit_ns;
+  if (middle * unit_s > kLatest_s)
+    refuse_unit(s, "times of \"" + s.time_field + "\" reach " + io::format("%.3g", middle * unit_s) + " s",
+                unit_for(middle, 0, kLatest_s));
+  if (step > 0 && ((step * unit_s > kLongest_s && !is_optional(s)) || step * unit_s < kShortest_s))
+    refuse_unit(s, "samples are " + io::format("%.2g", step * unit_s) + " s apart by \"" + s.time_field + "\"",
+                unit_for(step, 2e-5, 1));
+}
+
+std::vector<std::int64_t> field_times(const Channel& channel, const StreamMapping& s) {
+  std::vector<std::int64_t> times;
+  for (const double t : field_of(channel, s.table, "time_field", s.time_field)) {
+    const double t_ns = t * s.time_unit_ns;
+    times.push_back(std::abs(t_ns) < kLatest_ns ? std::llround(t_ns) : kNoTime);
+  }
+  return times;
 }
 
 /// The times of a channel's rows as a stream takes them: stamps are still by their own clock.
 std::vector<std::int64_t> raw_times(const Channel& channel, const StreamMapping& s) {
   if (s.time == TimeOf::received) return channel.received_ns();
   if (s.time == TimeOf::stamp) return channel.stamp_ns();
-  std::vector<std::int64_t> times;
-  for (const double t : field_of(channel, s.table, "time_field", s.time_field)) {
-    const double t_ns = t * s.time_unit_ns;
-    times.push_back(std::abs(t_ns) < 4e18 ? std::llround(t_ns) : kNoTime);
-  }
-  return times;
+  return field_times(channel, s);
+}
+
+/// Of the rows that have both times.
+std::vector<StampedReceipt> stamped_receipts(const Channel& channel, const StreamMapping& s) {
+  std::vector<StampedReceipt> pairs;
+  const std::vector<std::int64_t> stamps = raw_times(channel, s);
+  for (std::size_t i = 0; i < stamps.size(); ++i)
+    if (stamps[i] != kNoTime && channel.received_ns()[i] != kNoTime)
+      pairs.emplace_back(stamps[i], channel.received_ns()[i]);
+  return pairs;
 }
 
 bool all_missing(const std::vector<std::int64_t>& times) {
@@ -71,13 +134,12 @@ class Clocks {
       if (left_out(channels, s)) continue;
       const Channel& channel = channel_of(channels, s, s.channel, "channel");
       if (s.time == TimeOf::received) continue;
+      if (s.time == TimeOf::field) require_unit(channel, s);
       auto& pairs = pairs_[s.clock];
-      const std::vector<std::int64_t> stamps = raw_times(channel, s);
-      for (std::size_t i = 0; i < stamps.size(); ++i)
-        if (stamps[i] != kNoTime && channel.received_ns()[i] != kNoTime)
-          pairs.emplace_back(stamps[i], channel.received_ns()[i]);
+      const std::vector<StampedReceipt> own = stamped_receipts(channel, s);
+      pairs.insert(pairs.end(), own.begin(), own.end());
     }
-    for (const auto& [name, pairs] : pairs_) add(name, pairs);
+    for (const auto& [name, pairs] : pairs_) add(name, without_outliers(pairs));
   }
 
   /// Where the stamps of a stream are on the receiver's clock.
@@ -87,7 +149,7 @@ class Clocks {
   const std::vector<ClockReport>& reports() const { return reports_; }
 
  private:
-  void add(const std::string& name, const std::vector<std::pair<std::int64_t, std::int64_t>>& pairs) {
+  void add(const std::string& name, const std::vector<StampedReceipt>& pairs) {
     const auto given = mapping_.offsets_s.find(name);
     if (pairs.empty() && name != kReceiver && given == mapping_.offsets_s.end()) {
       const auto stream = std::ranges::find(mapping_.streams, name, &StreamMapping::clock);
@@ -115,7 +177,7 @@ class Clocks {
   }
 
   const Mapping& mapping_;
-  std::map<std::string, std::vector<std::pair<std::int64_t, std::int64_t>>> pairs_;
+  std::map<std::string, std::vector<StampedReceipt>> pairs_;
   std::map<std::string, ClockLine> lines_, quickest_;
   std::vector<ClockReport> reports_;
 };
@@ -191,7 +253,7 @@ struct Stream {
 double farthest(const Column& values) {
   double most = 0;
   for (const double v : values)
-    if (std::abs(v) > std::abs(most)) most = v;
+    if (std::isfinite(v) && std::abs(v) > std::abs(most)) most = v;
   return most;
 }
 
@@ -217,35 +279,81 @@ void turn_angles(Stream& s) {
   }
 }
 
-bool is_rotation(const Stream& s, std::size_t i) {
-  if (!s.columns.contains("qw")) return true;
+/// Of the quaternion; 1 where there is none.
+double length_of_rotation(const Stream& s, std::size_t i) {
+  if (!s.columns.contains("qw")) return 1;
   double square = 0;
   for (const char* name : {"qw", "qx", "qy", "qz"}) square += std::pow(s.columns.at(name)[i], 2);
-  return std::abs(std::sqrt(square) - 1) <= kQuaternionTolerance;
+  return std::sqrt(square);
 }
 
-/// The time that a log is to have, by the receiver's clock.
+/// By the receiver's clock: where most samples of all streams lie, and what of that the log is to have.
 struct Span {
-  std::int64_t from_ns = std::numeric_limits<std::int64_t>::min(), to_ns = std::numeric_limits<std::int64_t>::max();
+  TimeRange recorded, flown;
 };
 
-/// Drops what is unusable, counts what is out of order and puts it in order, drops what came twice.
-void tidy(Stream& s, const std::vector<double>* sequence, const Span& span) {
+Column seconds(const std::vector<std::int64_t>& t_ns, std::int64_t start_ns) {
+  Column t_s;
+  for (const std::int64_t t : t_ns) t_s.push_back(static_cast<double>(t - start_ns) / 1e9);
+  return t_s;
+}
+
+bool has_none(const Stream& s, std::size_t i) {
+  return std::ranges::all_of(s.columns, [&](const auto& column) { return std::isnan(column.second[i]); });
+}
+
+const std::string kBeyond = " is out of range";
+
+/// InputError where a column is out of range too often for a few bits that were flipped: it is in another unit.
+void require_range(const Stream& s) {
+  constexpr double kFew = 0.01;
+  for (const auto& [name, column] : s.columns)
+    if (const auto beyond = s.report.why_unusable.find(name + kBeyond);
+        beyond != s.report.why_unusable.end() &&
+        static_cast<double>(beyond->second) > kFew * static_cast<double>(s.t_ns.size())) {
+      const std::string limit = io::shortest_digits(column_limit(name));
+      s.mapping.table.table("columns").fail(name,
+                                            "reaches " + io::shortest_digits(farthest(column)) + ": in another unit?",
+                                            "numbers from -" + limit + " to " + limit);
+    }
+}
+
+/// Why a sample cannot be used; empty where it can.
+std::string fault_of(const Stream& s, std::size_t i, const Span& span) {
+  if (s.t_ns[i] == kNoTime) return "no time";
+  if (!span.recorded.contains(s.t_ns[i])) return "apart from the rest of the recording";
+  for (const auto& [name, column] : s.columns) {
+    if (std::isnan(column[i])) return "lacks " + name;
+    if (!std::isfinite(column[i])) return name + " is no finite number";
+    if (std::abs(column[i]) > column_limit(name)) return name + kBeyond;
+  }
+  const double length = length_of_rotation(s, i);
+  return std::abs(length - 1) <= kQuaternionTolerance ? "" : "quaternion of another length than 1";
+}
+
+/// `shared`: whether other streams have the same channel. Drops what is unusable, counts what is out of order and puts it in order, drops what came twice.
+void tidy(Stream& s, const std::vector<double>* sequence, const Span& span, bool shared) {
+  // A row without any of the stream's numbers belongs to another stream of the channel if there are many such rows. If there are few, it is a sample that lacks them.
+  constexpr double kOthersShare = 0.1;
+  std::size_t none = 0;
+  for (std::size_t i = 0; i < s.t_ns.size(); ++i) none += has_none(s, i);
+  const bool has_others = shared && static_cast<double>(none) > kOthersShare * static_cast<double>(s.t_ns.size());
   std::vector<std::size_t> rows;
   std::int64_t latest = kNoTime;
   for (std::size_t i = 0; i < s.t_ns.size(); ++i) {
-    std::size_t finite = 0;
-    for (const auto& [name, column] : s.columns) finite += std::isfinite(column[i]);
-    if (finite == 0) continue;  // another's row on the same channel
-    if (s.t_ns[i] != kNoTime && (s.t_ns[i] < span.from_ns || s.t_ns[i] > span.to_ns)) continue;
-    if (finite < s.columns.size() || s.t_ns[i] == kNoTime || !is_rotation(s, i)) {
+    if (has_others && has_none(s, i)) continue;
+    const bool recorded = s.t_ns[i] != kNoTime && span.recorded.contains(s.t_ns[i]);
+    if (recorded && !span.flown.contains(s.t_ns[i])) continue;
+    if (const std::string fault = fault_of(s, i, span); !fault.empty()) {
       ++s.report.unusable;
+      ++s.report.why_unusable[fault];
       continue;
     }
     if (s.t_ns[i] < latest) ++s.report.reordered;
     latest = std::max(latest, s.t_ns[i]);
     rows.push_back(i);
   }
+  require_range(s);
   std::ranges::stable_sort(rows, {}, [&](std::size_t i) { return s.t_ns[i]; });
   const auto again =
       std::unique(rows.begin(), rows.end(), [&](std::size_t i, std::size_t k) { return s.t_ns[i] == s.t_ns[k]; });
@@ -260,28 +368,20 @@ void tidy(Stream& s, const std::vector<double>* sequence, const Span& span) {
   for (auto& [name, column] : s.columns) column = kept(column);
   s.report.samples = rows.size();
   if (rows.size() < 2) return;
-  std::vector<double> steps_s;
+  const StreamStatistics seen = stream_statistics(s.mapping.name, seconds(s.t_ns, s.t_ns.front()), 1);
+  s.report.rate_hz = seen.rate_hz;
+  s.report.lost = seen.missing;
+  if (!sequence) return;
+  s.report.lost = 0;
+  const std::vector<double> counts = kept(*sequence);
   for (std::size_t i = 1; i < rows.size(); ++i)
-    steps_s.push_back(1e-9 * static_cast<double>(s.t_ns[i] - s.t_ns[i - 1]));
-  const double step_s = io::median(steps_s);
-  double all_steps = 0;
-  const std::vector<double> counts = sequence ? kept(*sequence) : std::vector<double>();
-  for (std::size_t i = 1; i < rows.size(); ++i) {
-    const double by_time = std::round(steps_s[i - 1] / step_s);
-    const double steps = sequence ? counts[i] - counts[i - 1] : by_time;
-    if (steps > 1 && steps < 1e6) s.report.lost += static_cast<std::size_t>(steps) - 1;  // else it began anew
-    all_steps += std::max(by_time, 1.0);
-  }
-  s.report.rate_hz = all_steps / (1e-9 * static_cast<double>(s.t_ns.back() - s.t_ns.front()));
+    if (const double steps = counts[i] - counts[i - 1]; steps > 1 && steps < 1e6)  // else it began anew
+      s.report.lost += static_cast<std::size_t>(steps) - 1;
 }
 
 /// Delays are beyond the quickest message of the clock, lateness beyond the quickest of the stream: some sensors just take longer.
 void count_delays(Stream& s, const Channel& channel, const ClockLine& quickest) {
-  std::vector<std::pair<std::int64_t, std::int64_t>> pairs;
-  const std::vector<std::int64_t> stamps = raw_times(channel, s.mapping);
-  for (std::size_t i = 0; i < stamps.size(); ++i)
-    if (stamps[i] != kNoTime && channel.received_ns()[i] != kNoTime)
-      pairs.emplace_back(stamps[i], channel.received_ns()[i]);
+  const std::vector<StampedReceipt> pairs = without_outliers(stamped_receipts(channel, s.mapping));
   if (pairs.empty()) return;
   const ClockLine own = ClockLine::below(pairs);
   std::vector<double> delays_s;
@@ -293,24 +393,52 @@ void count_delays(Stream& s, const Channel& channel, const ClockLine& quickest) 
   s.report.delay_median_s = io::median(delays_s);
 }
 
-/// While the robot flew.
-Span flown(const Channels& channels, const StreamMapping& command, const Clocks& clocks) {
-  if (command.flown_field.empty()) return {};
+/// Where most samples of all streams lie, and when in that the robot flew. InputError where a stream has none there.
+Span span_of(const Channels& channels, const Mapping& mapping, const Clocks& clocks) {
+  std::vector<std::int64_t> all;
+  std::vector<std::pair<const StreamMapping*, TimeRange>> own;
+  for (const StreamMapping& s : mapping.streams) {
+    if (left_out(channels, s)) continue;
+    std::vector<std::int64_t> times = timed(channel_of(channels, s, s.channel, "channel"), s, clocks).t_ns;
+    std::erase(times, kNoTime);
+    all.insert(all.end(), times.begin(), times.end());
+    if (!times.empty()) own.emplace_back(&s, main_range(std::move(times)));
+  }
+  Span span{main_range(std::move(all)), {}};
+  for (const auto& [s, range] : own)
+    if (range.to_ns < span.recorded.from_ns || range.from_ns > span.recorded.to_ns)
+      s->table.fail(s->table.has("clock") ? "clock" : "channel",
+                    "\"" + s->channel + "\" was recorded " +
+                        io::format("%.4g", 1e-9 * std::abs(static_cast<double>(range.from_ns) -
+                                                           static_cast<double>(span.recorded.from_ns))) +
+                        " s from the others",
+                    "streams of one recording; another clock is named by clock, its offset by clocks.NAME.offset_s");
+  const StreamMapping& command = mapping.streams.front();
+  if (command.flown_field.empty()) return span;
   const Channel& channel = channel_of(channels, command, command.channel, "channel");
   const std::vector<double>& says = field_of(channel, command.table.table("flown"), "field", command.flown_field);
-  const Timed own = timed(channel, command, clocks);
-  Span span;
-  std::swap(span.from_ns, span.to_ns);
+  const Timed times = timed(channel, command, clocks);
+  std::swap(span.flown.from_ns, span.flown.to_ns);
   for (std::size_t i = 0; i < says.size(); ++i)
-    if (says[i] > command.flown_above && own.t_ns[i] != kNoTime)
-      span = {std::min(span.from_ns, own.t_ns[i]), std::max(span.to_ns, own.t_ns[i])};
-  if (span.from_ns >= span.to_ns)
+    if (std::isfinite(says[i]) && says[i] > command.flown_above && times.t_ns[i] != kNoTime &&
+        span.recorded.contains(times.t_ns[i]))
+      span.flown = {std::min(span.flown.from_ns, times.t_ns[i]), std::max(span.flown.to_ns, times.t_ns[i])};
+  if (span.flown.from_ns >= span.flown.to_ns)
     command.table.table("flown").fail("above", "\"" + command.flown_field + "\" is never above it",
                                       "what it exceeds while the robot flies");
   return span;
 }
 
-Stream read_stream(const Channels& channels, const StreamMapping& mapping, const Clocks& clocks, const Span& span) {
+/// "3 usable samples, 5 that are not (4 lacks x_m, 1 no time), and 2 at the time of another".
+std::string usable(const StreamReport& report) {
+  std::string text =
+      std::to_string(report.samples) + " usable samples, " + std::to_string(report.unusable) + " that are not";
+  if (report.unusable > 0) text += " (" + reasons(report) + ")";
+  return text + ", and " + std::to_string(report.twice) + " at the time of another";
+}
+
+Stream read_stream(const Channels& channels, const StreamMapping& mapping, const Clocks& clocks, const Span& span,
+                   bool shared) {
   const Channel& channel = channel_of(channels, mapping, mapping.channel, "channel");
   if (all_missing(raw_times(channel, mapping)) && !channel.received_ns().empty())
     mapping.table.fail("time",
@@ -339,21 +467,11 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
   if (mapping.time != TimeOf::received) count_delays(s, channel, clocks.quickest(mapping));
   turn_angles(s);
   const std::string& counted = mapping.sequence;
-  tidy(s, counted.empty() ? nullptr : &field_of(channel, mapping.table, "sequence", counted), span);
-  if (s.t_ns.size() < 2)
-    mapping.table.fail("channel",
-                       "\"" + mapping.channel + "\" has " + std::to_string(s.t_ns.size()) + " usable samples, " +
-                           std::to_string(s.report.unusable) + " that are not, and " + std::to_string(s.report.twice) +
-                           " at the time of another",
-                       "at least 2 usable ones");
+  tidy(s, counted.empty() ? nullptr : &field_of(channel, mapping.table, "sequence", counted), span, shared);
+  if (s.t_ns.size() < 2 && !is_optional(mapping))
+    mapping.table.fail("channel", "\"" + mapping.channel + "\" has " + usable(s.report), "at least 2 usable ones");
   s.turn();
   return s;
-}
-
-Column seconds(const std::vector<std::int64_t>& t_ns, std::int64_t start_ns) {
-  Column t_s;
-  for (const std::int64_t t : t_ns) t_s.push_back(static_cast<double>(t - start_ns) / 1e9);
-  return t_s;
 }
 
 void put(FlightLog& log, Stream& s, std::int64_t start_ns) {
@@ -401,13 +519,24 @@ Imported assemble(const Channels& channels, const Mapping& mapping) {
   std::vector<Stream> streams;
   Imported out;
   out.log.header = mapping.header;
-  const Span span = flown(channels, mapping.streams.front(), clocks);
+  const Span span = span_of(channels, mapping, clocks);
   for (const StreamMapping& s : mapping.streams) {
+    std::string why;
     if (!left_out(channels, s)) {
-      streams.push_back(read_stream(channels, s, clocks, span));
-      continue;
+      const bool shared = std::ranges::count(mapping.streams, s.channel, &StreamMapping::channel) > 1;
+      Stream stream = read_stream(channels, s, clocks, span, shared);
+      if (stream.t_ns.size() >= 2) {
+        if (stream.report.unusable > 0)
+          out.report.warnings.push_back(s.name + ": " + std::to_string(stream.report.unusable) +
+                                        " samples are unusable: " + reasons(stream.report));
+        streams.push_back(std::move(stream));
+        continue;
+      }
+      why = " has " + usable(stream.report);
+    } else {
+      why = channels.find(s.channel) ? " has no samples" : " is not recorded";
     }
-    out.report.warnings.push_back(s.name + ": " + s.channel + " is not recorded: done without");
+    out.report.warnings.push_back(s.name + ": " + s.channel + why + ": done without");
     if (s.name == "power") out.log.header.power.reset();
     else if (s.name == "wings") out.log.header.wings.reset();
     else out.log.header.attitude.reset();
@@ -455,11 +584,21 @@ Imported import_recording(const std::vector<std::filesystem::path>& files, const
                           const std::filesystem::path& out) {
   Channels channels(mapping.wanted());
   std::vector<std::string> warnings;
-  for (const std::filesystem::path& file : files) read_source(file, channels, warnings);
-  Imported imported = assemble(channels, mapping);
+  const auto log_warnings = [&] {
+    for (const std::string& warning : warnings) io::log(io::LogLevel::warning, warning);
+  };
+  Imported imported;
+  try {
+    for (const std::filesystem::path& file : files) read_source(file, channels, warnings);
+    imported = assemble(channels, mapping);
+  } catch (const io::InputError&) {
+    log_warnings();  // they say why something is not there
+    throw;
+  }
   for (const std::string& warning : imported.report.warnings)
     warnings.push_back(mapping.file.string() + ": " + warning);
-  for (const std::string& warning : warnings) io::log(io::LogLevel::warning, warning);
+  for (std::string& warning : warnings) warning = io::printable(warning);  // of whatever bytes, fit for JSON
+  log_warnings();
   imported.report.warnings = std::move(warnings);
   write_flight_log(out, imported.log);
   return imported;
@@ -478,6 +617,7 @@ nlohmann::ordered_json json_of(const ImportReport& report) {
                        {"late", s.late},
                        {"out_of_order", s.reordered},
                        {"unusable", s.unusable},
+                       {"why_unusable", s.why_unusable},
                        {"delay_median_s", s.delay_median_s},
                        {"delay_most_s", s.delay_most_s}});
   for (const ClockReport& c : report.clocks)

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -15,12 +16,13 @@ namespace flappy::flightlog {
 
 struct StreamReport {
   std::string stream, channel;
-  std::size_t samples = 0;              ///< in the log
-  std::size_t twice = 0;                ///< came again at the time of another: dropped
-  std::size_t unusable = 0;             ///< lack a number or a time, or have a quaternion that is none: dropped
-  std::size_t late = 0, reordered = 0;  ///< in the log all the same
-  std::size_t lost = 0;                 ///< never came, by the sequence or the rate
-  double rate_hz = 0;                   ///< measured
+  std::size_t samples = 0;                          ///< in the log
+  std::size_t twice = 0;                            ///< came again at the time of another: dropped
+  std::size_t unusable = 0;                         ///< dropped
+  std::map<std::string, std::size_t> why_unusable;  ///< counts by reason, as "lacks x_m"
+  std::size_t late = 0, reordered = 0;              ///< in the log all the same
+  std::size_t lost = 0;                             ///< never came, by the sequence or the rate
+  double rate_hz = 0;                               ///< measured
   /// Beyond the quickest of its clock; 0 where it has no times of receipt.
   double delay_median_s = 0, delay_most_s = 0;
 };

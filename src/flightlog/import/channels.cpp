@@ -1,5 +1,6 @@
 #include "flightlog/import/channels.hpp"
 
+#include <cmath>
 #include <utility>
 
 namespace flappy::flightlog {
@@ -9,10 +10,7 @@ namespace {
 const std::string kFirst = "[0]";
 
 /// Differences of two times fit, too.
-std::int64_t checked(std::int64_t t_ns) {
-  constexpr std::int64_t kLatest_ns = 4'000'000'000'000'000'000;
-  return t_ns >= -kLatest_ns && t_ns <= kLatest_ns ? t_ns : kNoTime;
-}
+std::int64_t checked(std::int64_t t_ns) { return std::abs(static_cast<double>(t_ns)) <= kLatest_ns ? t_ns : kNoTime; }
 
 }  // namespace
 
@@ -50,18 +48,27 @@ std::vector<std::string> Channel::fields() const {
   return list;
 }
 
-bool Channels::wants(const std::string& channel) const {
-  return wanted_.empty() || wanted_.contains(channel) || wanted_.contains(kOnlyChannel) ||
-         (channel.ends_with(kFirst) && wanted_.contains(channel.substr(0, channel.size() - kFirst.size())));
-}
-
-void Channels::add(const std::string& channel) {
-  if (channels_.contains(channel)) return;
+const std::set<std::string>* Channels::wanted_fields(const std::string& channel) const {
   auto wanted = wanted_.find(channel);
   if (wanted == wanted_.end() && channel.ends_with(kFirst))
     wanted = wanted_.find(channel.substr(0, channel.size() - kFirst.size()));
   if (wanted == wanted_.end()) wanted = wanted_.find(kOnlyChannel);
-  channels_.emplace(channel, Channel(wanted == wanted_.end() ? std::set<std::string>() : wanted->second));
+  return wanted == wanted_.end() ? nullptr : &wanted->second;
+}
+
+bool Channels::wants(const std::string& channel, const std::string& field) const {
+  const auto* fields = wanted_fields(channel);
+  return wanted_.empty() || (fields && (fields->empty() || fields->contains(field)));
+}
+
+void Channels::add(const std::string& channel, const std::vector<std::string>& fields) {
+  auto found = channels_.find(channel);
+  if (found == channels_.end()) {
+    const auto* wanted = wanted_fields(channel);
+    found = channels_.emplace(channel, Channel(wanted ? *wanted : std::set<std::string>())).first;
+  }
+  for (const std::string& field : fields)
+    if (!field.empty()) found->second.add(field);
 }
 
 void Channels::add(const std::string& channel, std::int64_t received_ns, std::int64_t stamp_ns, const Row& row) {

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "flightlog/flight_log.hpp"
+#include "flightlog/import/channels.hpp"
+
 namespace flappy::flightlog {
 namespace {
 
@@ -26,7 +29,34 @@ std::vector<Point> lower_hull(const std::vector<Point>& points) {
 
 }  // namespace
 
-ClockLine ClockLine::below(std::vector<std::pair<std::int64_t, std::int64_t>> pairs) {
+TimeRange main_range(std::vector<std::int64_t> times_ns) {
+  constexpr auto kApart_ns = static_cast<std::uint64_t>(1e9 * kLongestGap_s);
+  // of any two numbers, in order
+  const auto apart = [](std::int64_t a, std::int64_t b) {
+    return static_cast<std::uint64_t>(b) - static_cast<std::uint64_t>(a);
+  };
+  if (times_ns.empty()) return {};
+  std::ranges::sort(times_ns);
+  TimeRange most;
+  std::size_t count = 0;
+  for (std::size_t begin = 0, end = 1; begin < times_ns.size(); begin = end++) {
+    while (end < times_ns.size() && apart(times_ns[end - 1], times_ns[end]) <= kApart_ns) ++end;
+    if (end - begin <= count) continue;
+    count = end - begin;
+    most = {times_ns[begin], times_ns[end - 1]};
+  }
+  return most;
+}
+
+std::vector<StampedReceipt> without_outliers(std::vector<StampedReceipt> pairs) {
+  std::vector<std::int64_t> differences;
+  for (const auto& [stamp, received] : pairs) differences.push_back(received - stamp);
+  const TimeRange usual = main_range(std::move(differences));
+  std::erase_if(pairs, [&](const StampedReceipt& pair) { return !usual.contains(pair.second - pair.first); });
+  return pairs;
+}
+
+ClockLine ClockLine::below(std::vector<StampedReceipt> pairs) {
   std::ranges::sort(pairs);
   ClockLine line;
   line.origin_ns_ = pairs.front().first;
@@ -55,7 +85,10 @@ ClockLine ClockLine::below(std::vector<std::pair<std::int64_t, std::int64_t>> pa
 
 std::int64_t ClockLine::received_ns(std::int64_t stamp_ns) const {
   const double above_ns = above_ns_ + slope_ * static_cast<double>(stamp_ns - origin_ns_);
-  return stamp_ns + base_ns_ + std::llround(above_ns);
+  std::int64_t sum = 0;
+  const bool too_far =
+      __builtin_add_overflow(stamp_ns, base_ns_, &sum) || __builtin_add_overflow(sum, std::llround(above_ns), &sum);
+  return too_far ? kNoTime : sum;
 }
 
 double ClockLine::offset_s() const { return 1e-9 * (static_cast<double>(base_ns_) + above_ns_); }

@@ -1,15 +1,20 @@
 #include "flightlog/import/sources.hpp"
 
 #include <algorithm>
+#include <initializer_list>
 #include <map>
 #include <optional>
+#include <set>
+#include <string_view>
 
 #include "flightlog/import/gzip.hpp"
 #include "flightlog/import/message_rows.hpp"
+#include "flightlog/import/table.hpp"
 #include "flightlog/import/ulog.hpp"
 #include "flightlog/ros/bag.hpp"
-#include "io/csv.hpp"
+#include "io/files.hpp"
 #include "io/mapped_file.hpp"
+#include "io/text.hpp"
 
 namespace flappy::flightlog {
 namespace {
@@ -23,24 +28,28 @@ void read_bag(const fs::path& file, Channels& channels, std::vector<std::string>
     std::string first_fault;
   };
   const auto bag = ros::Bag::open(file);
-  std::map<std::string, Reader> readers;
+  std::set<std::string> faulty;                    // told once, though each part of a bag has topics of its own
+  std::map<const ros::BagTopic*, Reader> readers;  // a topic may have had one type, and then another
+  const auto warn = [&](const ros::BagTopic& topic, const std::string& what) {
+    warnings.push_back(file.string() + ": " + io::shortened(topic.name) + ": " + what);
+  };
   while (const auto message = bag->next()) {
-    const std::string& topic = message->topic->name;
-    auto found = readers.find(topic);
+    const ros::BagTopic& topic = *message->topic;
+    auto found = readers.find(&topic);
     if (found == readers.end()) {
-      found = readers.try_emplace(topic).first;
-      channels.add(topic);
-      if (channels.wants(topic)) try {
-          found->second.rows.emplace(ros::layout_of(*message->topic));
+      found = readers.try_emplace(&topic).first;
+      channels.add(topic.name);
+      if (channels.wants(topic.name)) try {
+          found->second.rows.emplace(ros::layout_of(topic));
         } catch (const ros::MessageError& error) {
-          warnings.push_back(file.string() + ": " + topic + ": " + error.what() + ": left out");
+          if (faulty.insert(topic.name).second) warn(topic, std::string(error.what()) + ": left out");
         }
     }
     Reader& reader = found->second;
     if (!reader.rows) continue;
     try {
       const Row& row = reader.rows->read(message->bytes);
-      channels.add(topic, message->received_ns, reader.rows->stamp_ns(), row);
+      if (!row.empty()) channels.add(topic.name, message->received_ns, reader.rows->stamp_ns(), row);
     } catch (const ros::MessageError& error) {
       if (reader.bad++ == 0) reader.first_fault = error.what();
     }
@@ -48,34 +57,77 @@ void read_bag(const fs::path& file, Channels& channels, std::vector<std::string>
   for (const std::string& warning : bag->warnings()) warnings.push_back(warning);
   for (const auto& [topic, reader] : readers)
     if (reader.bad > 0)
-      warnings.push_back(file.string() + ": " + topic + ": " + std::to_string(reader.bad) +
-                         " messages left out, the first because " + reader.first_fault);
+      warn(*topic, std::to_string(reader.bad) + " messages left out, the first because " + reader.first_fault);
 }
 
-/// Without a last line that its writer did not finish.
-std::string_view whole_lines(std::string_view text) {
-  const auto cells = [](std::string_view line) { return std::ranges::count(line, ','); };
-  const std::size_t last = text.rfind('\n');
-  if (last == std::string_view::npos || last + 1 == text.size()) return text;
-  return cells(text.substr(last)) < cells(text.substr(0, text.find('\n'))) ? text.substr(0, last + 1) : text;
+/// Files that people name here and that are none of ours.
+struct OtherKind {
+  std::string_view begins;
+  std::size_t at;  ///< where that stands
+  std::initializer_list<std::string_view> endings;
+  std::string_view what, remedy;
+};
+
+using namespace std::string_view_literals;
+const OtherKind kOtherKinds[] = {
+    {"\x89MCAP0\r\n"sv,
+     0,
+     {".mcap"},
+     "a bag compressed by gzip",
+     "gunzip FILE"},  // what is not compressed was read before
+    {"SQLite format 3\0"sv, 0, {".db3"}, "a bag compressed by gzip", "gunzip FILE"},
+    {"#ROSBAG V"sv, 0, {".bag"}, "a bag of ROS 1", "rosbags-convert --src FILE --dst FOLDER"},
+    {"\x28\xB5\x2F\xFD"sv, 0, {".zst", ".zstd"}, "compressed by zstd", "zstd -d FILE"},
+    {"\x04\x22\x4D\x18"sv, 0, {".lz4"}, "compressed by lz4", "lz4 -d FILE"},
+    {"\xFD"
+     "7zXZ\0"sv,
+     0,
+     {".xz"},
+     "compressed by xz",
+     "unxz FILE"},
+    {"1AY&SY"sv, 4, {".bz2"}, "compressed by bzip2", "bunzip2 FILE"},
+    {"PK\x03\x04"sv,
+     0,
+     {".zip", ".npz", ".xlsx", ".ods"},
+     "a zip archive, as .npz and .xlsx files are",
+     "unzip FILE, or export it as CSV"},
+    {"7z\xBC\xAF\x27\x1C"sv, 0, {".7z"}, "a 7z archive", "7z x FILE"},
+    {"ustar"sv, 257, {".tar", ".tgz"}, "a tar archive", "tar xf FILE"},
+    {"\x89HDF\r\n"sv, 0, {".h5", ".hdf5"}, "an HDF5 file", "export it as CSV"},
+    {"MATLAB 5.0 MAT-file"sv, 0, {".mat"}, "a MATLAB file", "writetable, and the CSV"},
+    {"PAR1"sv, 0, {".parquet"}, "a Parquet file", "pandas.read_parquet(FILE).to_csv(...)"},
+    {"\x93NUMPY"sv, 0, {".npy"}, "a NumPy array", "numpy.savetxt with header= and delimiter=\",\""},
+    {"\xA3\x95"sv, 0, {}, "a log of ArduPilot", "mavlogdump.py --format csv FILE"},
+    {"\xD0\xCF\x11\xE0"sv, 0, {".xls"}, "an Excel file", "export it as CSV"},
+    {"\xFF\xFE"sv, 0, {}, "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE"},
+    {"\xFE\xFF"sv, 0, {}, "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE"},
+};
+
+/// Refuses what is no text: by its first bytes or, where these say nothing, by how its name ends.
+void require_text(const fs::path& file, const std::string& ending, std::string_view bytes) {
+  constexpr std::string_view kAccepted = "a bag, a ULog or a CSV";
+  for (const OtherKind& kind : kOtherKinds)
+    if (bytes.substr(std::min(kind.at, bytes.size())).starts_with(kind.begins))
+      throw io::InputError(file.string() + ": is " + std::string(kind.what) + "; accepted: " + std::string(kAccepted) +
+                           ", as made by: " + std::string(kind.remedy));
+  std::vector<std::string_view> named = {".ulg"};
+  for (const OtherKind& kind : kOtherKinds) named.insert(named.end(), kind.endings);
+  if (std::ranges::find(named, ending) != named.end())
+    throw io::InputError(file.string() + ": does not begin as a " + ending +
+                         " file; accepted: " + std::string(kAccepted));
+  constexpr std::size_t kLooked = 4096;
+  if (bytes.substr(0, kLooked).find('\0') != std::string_view::npos)
+    throw io::InputError(file.string() + ": holds bytes that are no text; accepted: " + std::string(kAccepted));
 }
 
-void read_table(const fs::path& file, std::string_view bytes, Channels& channels, std::vector<std::string>& warnings) {
-  const bool packed = is_gzip(bytes);
-  // "camera" of "camera.csv" and of "camera.csv.gz"
-  const std::string channel = (packed && file.extension() == ".gz" ? file.stem() : file).stem().string();
-  channels.add(channel);
-  if (!channels.wants(channel)) return;
-  const std::string unpacked = packed ? gunzipped(bytes, file.string(), warnings) : "";
-  const std::string_view text = packed ? unpacked : bytes, whole = whole_lines(text);
-  if (whole.size() < text.size()) warnings.push_back(file.string() + ": its last line was cut off: left out");
-  const io::CsvTable table = io::parse_csv(whole, file.string(), io::Missing::nan);
-  Row row;
-  for (const std::string& name : table.names) row.push_back({name, 0});
-  for (std::size_t i = 0; i < table.columns.front().size(); ++i) {
-    for (std::size_t k = 0; k < row.size(); ++k) row[k].value = table.columns[k][i];
-    channels.add(channel, kNoTime, kNoTime, row);
-  }
+/// What stands in a file that is no bag; `plain` is its name without ".gz".
+void read_bytes(const fs::path& file, const fs::path& plain, std::string_view bytes, Channels& channels,
+                std::vector<std::string>& warnings) {
+  if (is_ulog(bytes)) return read_ulog(bytes, file.string(), channels, warnings);
+  require_text(file, plain.extension().string(), bytes);
+  const std::string channel = plain.stem().string();
+  if (channels.wants(channel)) read_table(bytes, file.string(), channel, channels, warnings);
+  else channels.add(channel);
 }
 
 }  // namespace
@@ -84,12 +136,9 @@ void read_source(const fs::path& file, Channels& channels, std::vector<std::stri
   std::error_code ignored;
   if (fs::is_directory(file, ignored) || ros::Bag::is_bag(file)) return read_bag(file, channels, warnings);
   const io::MappedFile mapped(file);
-  if (is_ulog(mapped.bytes())) return read_ulog(mapped.bytes(), file.string(), channels, warnings);
-  for (const char* ending : {".mcap", ".db3", ".ulg"})
-    if (file.extension() == ending)
-      throw io::InputError(file.string() + ": does not begin as a " + ending +
-                           " file; accepted: a bag, a ULog or a CSV");
-  read_table(file, mapped.bytes(), channels, warnings);
+  if (!is_gzip(mapped.bytes())) return read_bytes(file, file, mapped.bytes(), channels, warnings);
+  const std::string unpacked = gunzipped(mapped.bytes(), file.string(), warnings);
+  read_bytes(file, file.extension() == ".gz" ? file.stem() : file, unpacked, channels, warnings);
 }
 
 }  // namespace flappy::flightlog

@@ -9,8 +9,9 @@
 
 namespace flappy::flightlog {
 
-/// Reads a file, or a bag's folder, whatever of these it is; any other is a CSV, plain or made smaller by gzip, whose channel is the
-/// stem of its name and whose rows have no time but what their fields say: cells that are empty or "nan" are missing. `warnings`: what was left out. InputError where it cannot be read.
+/// Reads a bag, which may be a folder, a ULog or, of any other text, a table (table.hpp), whose channel is the stem of its name. Tables and ULogs may be
+/// compressed by gzip. `warnings` get what was left out. InputError where the file cannot be read; of a kind that others
+/// know, it says which, and what makes it readable.
 void read_source(const std::filesystem::path& file, Channels& channels, std::vector<std::string>& warnings);
 
 }  // namespace flappy::flightlog

@@ -2,19 +2,26 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cstring>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "io/files.hpp"
+#include "io/text.hpp"
 
 namespace flappy::flightlog {
 namespace {
 
 constexpr std::string_view kMagic("ULog\x01\x12\x35", 7);
 constexpr std::size_t kHeader = 16, kMessageHeader = 3;
-constexpr std::size_t kDeepest = 8, kMostValues = 4096;
+constexpr std::size_t kDeepest = 8, kMostValues = 4096, kMaxSize = 65535;
+constexpr std::size_t kFlags = 16, kOffsets = 3;  // of the message of flags: their bytes, and where data were appended
+constexpr std::string_view kTypes = "BFAIMPQDRLCOS";
+constexpr std::size_t kLongestName = 256;
+constexpr std::string_view kSync("\x2F\x73\x13\x20\x25\x0C\xBB\x12", 8);
 constexpr std::int64_t kMicrosecond_ns = 1000;
 
 struct Basic {
@@ -56,7 +63,28 @@ struct Place {
   const Basic* basic;
 };
 
-using Layout = std::vector<Place>;
+struct Layout {
+  std::vector<Place> places;
+  std::size_t size = 0;
+  /// Padding at the end is not written.
+  std::size_t least_size() const {
+    const auto last =
+        std::ranges::find_if(places.rbegin(), places.rend(), [](const Place& p) { return !p.name.empty(); });
+    return last == places.rend() ? 0 : last->offset + last->basic->size;
+  }
+};
+
+/// Whether all of it are characters of ASCII.
+bool is_text(std::string_view bytes) {
+  return std::ranges::all_of(bytes, [](char c) { return c >= 0x20 && c < 0x7f; });
+}
+
+/// Whether it can be the name of a topic.
+bool is_name(std::string_view bytes) {
+  return !bytes.empty() && std::ranges::all_of(bytes, [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '/' || c == '-';
+  });
+}
 
 class UlogReader {
  public:
@@ -66,31 +94,152 @@ class UlogReader {
   void read() {
     std::size_t at = kHeader;
     while (at < bytes_.size()) {
-      // a logger that died may end amid a message; what was appended later stands where the flags say
-      const auto appended = std::ranges::find_if(appended_, [&](std::uint64_t offset) { return offset > at; });
-      const std::size_t end =
-          appended == appended_.end() ? bytes_.size() : std::min(bytes_.size(), std::size_t{*appended});
-      if (end - at < kMessageHeader || end - at - kMessageHeader < number<std::uint16_t>(bytes_.substr(at))) {
-        if (end == bytes_.size())
-          warnings_.push_back(name_ + ": ends within a message, at byte " + std::to_string(at) +
-                              ": read as far as it goes");
-        at = end;
-        continue;
+      const auto found = message_at(at);
+      if (found && believed(*found)) {
+        take(*found);
+        at = found->next;
+      } else {
+        at = skip(at);
       }
-      const auto size = number<std::uint16_t>(bytes_.substr(at));
-      message(bytes_[at + 2], bytes_.substr(at + kMessageHeader, size));
-      at += kMessageHeader + size;
     }
-    if (bad_ > 0) warnings_.push_back(name_ + ": " + std::to_string(bad_) + " damaged messages: left out");
-    if (lost_ms_ > 0) warnings_.push_back(name_ + ": the logger itself dropped " + std::to_string(lost_ms_) + " ms");
+    warn();
   }
 
  private:
   struct Topic {
     std::string channel;
-    const Layout* layout;
+    const Layout* layout;  ///< null where the format cannot be read
     bool wanted;
   };
+
+  struct Message {
+    char type;
+    std::string_view content;
+    std::size_t at, next;  ///< where it stands, and what follows it
+  };
+
+  // ---- where messages stand, in a file that may be damaged
+
+  /// Where the part of the file that holds `at` ends: a logger that died may end amid a message, and what was appended later stands where the
+  /// flags say.
+  std::size_t end_of_part(std::size_t at) const {
+    std::size_t end = bytes_.size();
+    for (const std::uint64_t offset : appended_)
+      if (offset > at) end = std::min(end, std::size_t{offset});
+    return end;
+  }
+
+  /// Nothing where the part ends before it.
+  std::optional<Message> message_at(std::size_t at) const {
+    const std::size_t end = end_of_part(at);
+    if (at >= end || end - at < kMessageHeader) return std::nullopt;
+    const std::size_t size = number<std::uint16_t>(bytes_.substr(at));
+    if (end - at - kMessageHeader < size) return std::nullopt;
+    return Message{bytes_[at + 2], bytes_.substr(at + kMessageHeader, size), at, at + kMessageHeader + size};
+  }
+
+  /// Whether this can be what its type says.
+  bool sound(const Message& m) const {
+    const std::string_view c = m.content;
+    const auto key_at = [&](std::size_t i) {  // a length, and so many characters
+      return c.size() > i && c[i] > 0 && c.size() > i + static_cast<unsigned char>(c[i]) &&
+             is_text(c.substr(i + 1, static_cast<unsigned char>(c[i])));
+    };
+    switch (m.type) {
+      case 'B':
+        return m.at == kHeader && c.size() >= kFlags + kOffsets * 8;
+      case 'F': {
+        const std::size_t colon = c.substr(0, kLongestName).find(':');
+        return colon != std::string_view::npos && is_name(c.substr(0, colon)) && is_text(c);
+      }
+      case 'A':
+        return c.size() > 3 && c.size() <= 3 + kLongestName && is_name(c.substr(3));
+      case 'D': {
+        if (c.size() < 2) return false;
+        const auto known = sizes_.find(number<std::uint16_t>(c));
+        return known != sizes_.end() && c.size() >= known->second.first && c.size() <= known->second.second;
+      }
+      case 'I':
+      case 'P':
+        return key_at(0);
+      case 'M':
+      case 'Q':
+        return key_at(1);
+      case 'L':
+      case 'C':  // begins with a level
+        return c.size() >= 9 && c[0] >= '0' && c[0] <= '7';
+      case 'R':
+      case 'O':
+        return c.size() == 2;
+      case 'S':
+        return c == kSync;
+      default:
+        return false;
+    }
+  }
+
+  /// Whether messages go on at a place: a sound one, or one of some other kind before a sound one, or the end.
+  bool goes_on(std::size_t at, int others) const {
+    if (at == end_of_part(at - 1)) return true;
+    const auto m = message_at(at);
+    if (!m) return cut_off(at);
+    return sound(*m) || (others > 0 && goes_on(m->next, others - 1));
+  }
+
+  /// Whether the part ends within a message that begins here.
+  bool cut_off(std::size_t at) const {
+    const std::string_view rest = bytes_.substr(at, end_of_part(at) - at);
+    if (rest.size() < kMessageHeader) return true;
+    const std::size_t left = rest.size() - kMessageHeader, size = number<std::uint16_t>(rest);
+    if (left >= size || kTypes.find(rest[2]) == std::string_view::npos) return false;
+    if (rest[2] != 'D' || rest.size() < kMessageHeader + 2) return true;
+    const auto known = sizes_.find(number<std::uint16_t>(rest.substr(kMessageHeader)));
+    return known != sizes_.end() && size <= known->second.second;
+  }
+
+  /// Whether to take a message for what it says. A definition is taken in any case, for without it a whole topic is lost. Data are taken where another message
+  /// follows: one that lost a byte puts what follows out of step. The size of any other message may be what is damaged: it is not taken where data stand within it.
+  bool believed(const Message& m) const {
+    const bool is_sound = sound(m);
+    if (is_sound && (m.type == 'F' || m.type == 'A')) return true;
+    if (!goes_on(m.next, is_sound ? 2 : 1)) return false;
+    return (is_sound && m.type == 'D') || next_sound(m.at + 1, m.next, "DS") == m.next;
+  }
+
+  /// The next place before `end` where a sound message of these types stands, before another one; or `end`.
+  std::size_t next_sound(std::size_t from, std::size_t end, std::string_view types) const {
+    for (std::size_t at = from; at < end; ++at)
+      if (const auto m = message_at(at);
+          m && types.find(m->type) != std::string_view::npos && sound(*m) && goes_on(m->next, 1))
+        return at;
+    return end;
+  }
+
+  /// Notes that bytes are skipped up to the next message, and returns where that stands.
+  std::size_t skip(std::size_t at) {
+    const std::size_t end = end_of_part(at), to = next_sound(at + 1, end, "DSFA");
+    if (to == end && end == bytes_.size() && cut_off(at)) {
+      cut_at_ = at;
+    } else {
+      if (skips_++ == 0) first_skip_ = at;
+      skipped_ += to - at;
+    }
+    return to;
+  }
+
+  void warn() {
+    const auto say = [&](const std::string& what) { warnings_.push_back(name_ + ": " + what); };
+    if (skips_ > 0)
+      say("is damaged: " + std::to_string(skipped_) + " bytes skipped in " + std::to_string(skips_) +
+          (skips_ > 1 ? " places, the first" : " place,") + " at byte " + std::to_string(first_skip_));
+    if (cut_at_) say("ends within a message, at byte " + std::to_string(*cut_at_) + ": read as far as it goes");
+    if (bad_ > 0) say(std::to_string(bad_) + " damaged messages left out");
+    if (unknown_ > 0) say(std::to_string(unknown_) + " messages of kinds that are not known left out");
+    if (orphans_ > 0) say(std::to_string(orphans_) + " messages of topics that are not announced left out");
+    if (lost_ms_ > 0) say("the logger itself dropped " + std::to_string(lost_ms_) + " ms");
+  }
+
+  // ---- what messages say
 
   template <class T>
   static T number(std::string_view bytes) {
@@ -99,8 +248,11 @@ class UlogReader {
     return value;
   }
 
-  void message(char type, std::string_view content) {
-    switch (type) {
+  void take(const Message& message) {
+    const std::string_view content = message.content;
+    if (!sound(message) && message.type != 'D')
+      return void(++(kTypes.find(message.type) == std::string_view::npos ? unknown_ : bad_));
+    switch (message.type) {
       case 'B':
         return flags(content);
       case 'F':
@@ -110,7 +262,7 @@ class UlogReader {
       case 'D':
         return data(content);
       case 'O':
-        if (content.size() >= 2) lost_ms_ += number<std::uint16_t>(content);
+        lost_ms_ += number<std::uint16_t>(content);
         return;
       default:
         return;
@@ -118,8 +270,6 @@ class UlogReader {
   }
 
   void flags(std::string_view content) {
-    constexpr std::size_t kFlags = 16, kOffsets = 3;
-    if (content.size() < kFlags + kOffsets * 8) return void(++bad_);
     if ((content[8] & ~1) != 0 || std::ranges::any_of(content.substr(9, 7), [](char c) { return c != 0; }))
       throw io::InputError(name_ +
                            ": is a ULog of a kind that is newer than this reader; accepted: appended data alone");
@@ -131,7 +281,6 @@ class UlogReader {
   /// "name:type name;type name;".
   void format(std::string_view content) {
     const std::size_t colon = content.find(':');
-    if (colon == std::string_view::npos) return void(++bad_);
     std::vector<Member>& members = formats_[std::string(content.substr(0, colon))];
     members.clear();
     std::string_view rest = content.substr(colon + 1);
@@ -166,8 +315,8 @@ class UlogReader {
           if (!lay(member.type, element, depth + 1, offset, layout)) return false;
           continue;
         }
-        if (layout.size() >= kMostValues) return false;
-        layout.push_back({pads ? "" : element, offset, basic});
+        if (layout.places.size() >= kMostValues) return false;
+        layout.places.push_back({pads ? "" : element, offset, basic});
         offset += basic->size;
       }
     }
@@ -175,33 +324,39 @@ class UlogReader {
   }
 
   void subscribe(std::string_view content) {
-    if (content.size() < 4) return void(++bad_);
     const auto instance = static_cast<unsigned>(static_cast<unsigned char>(content[0]));
     const auto id = number<std::uint16_t>(content.substr(1));
     const std::string type(content.substr(3));
+    unannounced_.erase(id);
     auto layout = layouts_.find(type);
     if (layout == layouts_.end()) {
       Layout made;
-      std::size_t size = 0;
-      if (!lay(type, "", 0, size, made)) {
-        warnings_.push_back(name_ + ": topic " + type + " has no format that can be read: left out");
+      if (!lay(type, "", 0, made.size, made)) {
+        warnings_.push_back(name_ + ": topic " + io::shortened(type) + " has no format that can be read: left out");
+        sizes_[id] = {0, kMaxSize};
+        topics_.erase(id);
         return;
       }
       layout = layouts_.emplace(type, std::move(made)).first;
     }
     const std::string channel = type + "[" + std::to_string(instance) + "]";
     topics_[id] = {channel, &layout->second, channels_.wants(channel)};
+    sizes_[id] = {2 + layout->second.least_size(), 2 + layout->second.size};
     channels_.add(channel);
   }
 
   void data(std::string_view content) {
     if (content.size() < 2) return void(++bad_);
-    const auto topic = topics_.find(number<std::uint16_t>(content));
+    const auto id = number<std::uint16_t>(content);
+    // the message that announced it may be lost: what else has its number and size is of the same topic
+    if (sizes_.try_emplace(id, content.size(), content.size()).second) unannounced_.insert(id);
+    if (unannounced_.contains(id)) return void(++orphans_);
+    const auto topic = topics_.find(id);
     if (topic == topics_.end() || !topic->second.wanted) return;
     content.remove_prefix(2);
     row_.clear();
     std::int64_t timestamp_ns = kNoTime, sample_ns = kNoTime;
-    for (const Place& place : *topic->second.layout) {
+    for (const Place& place : topic->second.layout->places) {
       if (place.name.empty()) continue;  // padding at the end is not written
       if (place.offset + place.basic->size > content.size()) return void(++bad_);
       const char* const at = content.data() + place.offset;
@@ -224,7 +379,11 @@ class UlogReader {
   std::map<std::uint16_t, Topic> topics_;
   std::vector<std::uint64_t> appended_;
   Row row_;
-  std::size_t bad_ = 0, lost_ms_ = 0;
+  /// Least and largest size of the data messages of each topic, its number included.
+  std::map<std::uint16_t, std::pair<std::size_t, std::size_t>> sizes_;
+  std::set<std::uint16_t> unannounced_;
+  std::size_t bad_ = 0, unknown_ = 0, orphans_ = 0, lost_ms_ = 0, skips_ = 0, skipped_ = 0, first_skip_ = 0;
+  std::optional<std::size_t> cut_at_;
 };
 
 }  // namespace

@@ -14,6 +14,8 @@
 #include "flightlog/ros/messages.hpp"
 #include "io/files.hpp"
 #include "io/mapped_file.hpp"
+#include "io/temporary_folder.hpp"
+#include "io/text.hpp"
 
 namespace flappy::flightlog::ros {
 namespace {
@@ -30,9 +32,9 @@ class McapBag : public Bag {
   std::optional<BagMessage> next() override {
     while (const auto message = reader_.next()) {
       const McapTopic& t = *message->topic;
-      if (t.encoding != "cdr") continue;
       BagTopic& topic = topics_[&t];
-      if (topic.name.empty()) topic = {t.name, t.type, t.definition_encoding == "ros2msg" ? t.definition : ""};
+      if (topic.name.empty())
+        topic = {t.name, t.type, t.definition_encoding == "ros2msg" ? t.definition : "", t.encoding};
       return BagMessage{&topic, message->logged_ns, message->bytes};
     }
     return {};
@@ -50,11 +52,14 @@ class SqliteBag : public Bag {
   explicit SqliteBag(const fs::path& path) : name_(path.string()) {
     io::MappedFile readable(path);  // says why not, in our words
     sqlite3* database = nullptr;
-    const int code = sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READONLY, nullptr);
+    const std::string uri = uri_of(unfinished(path) ? copy_of(path) : path);
+    const int code = sqlite3_open_v2(uri.c_str(), &database,
+                                     (copy_ ? SQLITE_OPEN_READWRITE : SQLITE_OPEN_READONLY) | SQLITE_OPEN_URI, nullptr);
     database_.reset(database);
     if (code != SQLITE_OK) refuse();
     read_topics();
-    messages_ = prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id");
+    // in the order of the file, so that one that was cut off is read up to there
+    messages_ = prepare("SELECT topic_id, timestamp, data FROM messages");
     if (!messages_) refuse();
   }
 
@@ -84,6 +89,36 @@ class SqliteBag : public Bag {
   };
   using Statement = std::unique_ptr<sqlite3_stmt, Close>;
 
+  /// Whether a writer left changes beside the file.
+  static bool unfinished(const fs::path& path) {
+    return std::ranges::any_of(kBeside, [&](const char* ending) {
+      std::error_code missing;
+      return fs::file_size(path.string() + ending, missing) > 0 && !missing;
+    });
+  }
+
+  /// SQLite brings such changes into the file before it reads it: not into the user's.
+  fs::path copy_of(const fs::path& path) {
+    copy_.emplace();
+    for (const char* ending : {"", kBeside[0], kBeside[1]}) {
+      const fs::path from = path.string() + ending, to = copy_->path() / ("bag" + std::string(ending));
+      std::error_code error;
+      if (*ending != 0 && !fs::exists(from, error)) continue;
+      if (!fs::copy_file(from, to, error))
+        throw io::InputError(from.string() + ": cannot be copied to " + to.string() + ": " + error.message());
+      fs::permissions(to, fs::perms::owner_all, fs::perm_options::add);  // the file may be read-only
+    }
+    return copy_->path() / "bag";
+  }
+
+  /// "immutable": neither locks nor files beside it are made.
+  std::string uri_of(const fs::path& path) const {
+    std::string uri = "file:";
+    for (const char c : path.string())
+      uri += c == '%' ? "%25" : c == '?' ? "%3f" : c == '#' ? "%23" : std::string(1, c);
+    return uri + (copy_ ? "" : "?immutable=1");
+  }
+
   [[noreturn]] void refuse() const {
     throw io::InputError(name_ + ": cannot be read as a bag: " + sqlite3_errmsg(database_.get()) +
                          "; accepted: " + std::string(kAccepted));
@@ -110,13 +145,15 @@ class SqliteBag : public Bag {
     const Statement topics = prepare("SELECT id, name, type, serialization_format FROM topics");
     if (!topics) refuse();
     while (sqlite3_step(topics.get()) == SQLITE_ROW) {
-      if (text(topics, 3) != "cdr") continue;
       const std::string type = text(topics, 2);
-      topics_[sqlite3_column_int64(topics.get(), 0)] = {text(topics, 1), type, definitions[type]};
+      topics_[sqlite3_column_int64(topics.get(), 0)] = {text(topics, 1), type, definitions[type], text(topics, 3)};
     }
   }
 
+  static constexpr std::array kBeside = {"-wal", "-journal"};
+
   std::string name_;
+  std::optional<io::TemporaryFolder> copy_;  ///< outlives the database
   std::unique_ptr<sqlite3, Close> database_;
   Statement messages_;
   std::map<std::int64_t, BagTopic> topics_;
@@ -196,6 +233,9 @@ std::unique_ptr<Bag> Bag::open(const fs::path& path) {
 }
 
 std::shared_ptr<const Layout> layout_of(const BagTopic& topic) {
+  if (topic.encoding != "cdr")
+    throw MessageError("messages are in \"" + io::shortened(topic.encoding) + "\", read are those in \"cdr\"" +
+                       (topic.encoding == "ros1" ? ", which rosbags-convert makes of a bag of ROS 1" : ""));
   if (!topic.definition.empty()) {
     Definitions definitions;
     definitions.add(topic.type, topic.definition);

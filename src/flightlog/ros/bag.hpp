@@ -16,6 +16,7 @@ struct BagTopic {
   std::string name, type;  ///< "/imu", "sensor_msgs/msg/Imu"
   /// Concatenated, as the bag has it; where it has none, empty.
   std::string definition;
+  std::string encoding = "cdr";  ///< of its messages
 };
 
 struct BagMessage {
@@ -24,7 +25,7 @@ struct BagMessage {
   std::string_view bytes;  ///< until the next is read
 };
 
-/// Messages of one file or folder, those of one topic in the order in which they were received.
+/// Messages of one file or folder, in the order in which they were written.
 class Bag {
  public:
   virtual ~Bag() = default;
@@ -40,7 +41,7 @@ class Bag {
 };
 
 /// The layout of a topic's messages, by the bag's own definition or by that of standard_messages(). MessageError where neither is
-/// there or can be read.
+/// there or can be read, and where messages are not in CDR.
 std::shared_ptr<const Layout> layout_of(const BagTopic& topic);
 
 }  // namespace flappy::flightlog::ros

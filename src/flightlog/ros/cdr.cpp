@@ -58,7 +58,7 @@ class Reader {
     constexpr std::size_t kHead = 4;
     // the second byte is the representation: 0 and 1 are plain CDR, big and little endian
     if (bytes.size() < kHead || bytes[0] != 0 || (bytes[1] != 0 && bytes[1] != 1))
-      throw MessageError("begins with no header of plain CDR");
+      throw MessageError("begins with no header of plain CDR, as where messages are compressed one by one");
     swap_ = bytes[1] == 0;
     bytes_ = bytes.substr(kHead);
   }

@@ -393,6 +393,161 @@ TEST(Import, LeavesOutPosesThatAreNone) {
   EXPECT_EQ(out.log.mocap.t_s.size(), 200u);
 }
 
+// ---- times that no clock of the flight showed
+
+std::map<std::string, std::size_t> why(const Imported& out, std::size_t stream) {
+  return out.report.streams[stream].why_unusable;
+}
+
+TEST(Import, LeavesOutTimesApartFromTheRecording) {
+  for (const std::int64_t wild_ns : {std::int64_t{0}, std::int64_t{-5}, std::int64_t{3'000'000'000'000'000'000}}) {
+    Robot robot{1'700'000'000'000 * kMs, Channels()};
+    robot.command(0);
+    robot.channels.add("/imu", wild_ns, wild_ns,
+                       {{"angular_velocity.x", 1},
+                        {"angular_velocity.y", 2},
+                        {"angular_velocity.z", 3},
+                        {"linear_acceleration.x", 4},
+                        {"linear_acceleration.y", 5},
+                        {"linear_acceleration.z", 6}});
+    robot.fill();
+    for (const char* time : {"stamp", "received"}) {
+      if (std::string(time) == "stamp" && wild_ns < kMs) continue;  // the robot's own clock began just before
+      const bool received = std::string(time) == "received";
+      const Imported out =
+          assemble(robot.channels, mapping_of("ros2.toml", {"imu.time=" + std::string(time),
+                                                            received ? "imu.clock=receiver" : "imu.clock=robot"}));
+      EXPECT_EQ(why(out, 2), (std::map<std::string, std::size_t>{{"apart from the rest of the recording", 1}}))
+          << time << wild_ns;
+      EXPECT_EQ(out.log.imu.t_s.size(), 200u);
+      EXPECT_NEAR(out.log.imu.t_s.back(), 1.99, 2e-3);
+      EXPECT_EQ(out.report.warnings.at(0), "imu: 1 samples are unusable: 1 apart from the rest of the recording");
+    }
+  }
+}
+
+TEST(Import, MeasuresAClockInSpiteOfAWildTimeOfReceipt) {
+  Robot robot{5'000 * kMs, Channels()};
+  robot.fill();
+  robot.add("/imu", 1995 * kMs, -7'000'000'000 * kMs,
+            {{"angular_velocity.x", 1},
+             {"angular_velocity.y", 2},
+             {"angular_velocity.z", 3},
+             {"linear_acceleration.x", 4},
+             {"linear_acceleration.y", 5},
+             {"linear_acceleration.z", 6}});
+  const Imported out = assemble(robot.channels, mapping_of("ros2.toml"));
+  EXPECT_NEAR(out.report.clocks[0].offset_s, 5.001, 1e-6);
+  EXPECT_EQ(out.log.imu.t_s.size(), 201u);  // its stamp is right
+  EXPECT_NEAR(out.report.streams[2].delay_most_s, 0, 1e-9);
+}
+
+TEST(Import, RefusesAStreamOfAnotherTime) {
+  Robot robot;
+  for (int i = 0; i < 200; ++i) {
+    robot.command(i), robot.pose(i);
+    robot.channels.add("/imu", 0, 1'700'000'000'000 * kMs + i * 10 * kMs,
+                       {{"angular_velocity.x", 1},
+                        {"angular_velocity.y", 2},
+                        {"angular_velocity.z", 3},
+                        {"linear_acceleration.x", 4},
+                        {"linear_acceleration.y", 5},
+                        {"linear_acceleration.z", 6}});
+  }
+  const std::string line =
+      test::refusal([&] { assemble(robot.channels, mapping_of("ros2.toml", {"clocks.robot.offset_s=0"})); });
+  EXPECT_NE(line.find("imu.clock: \"/imu\" was recorded 1.7e+09 s from the others; accepted: "), std::string::npos)
+      << line;
+}
+
+// ---- tables: rows of one channel, by a field
+
+Imported of_table(const Lines& rows, const Lines& overrides = {}) {
+  const io::TemporaryFolder folder;
+  std::ofstream file(folder / "log.csv");
+  file << "t,u,x,y,z,qw,qx,qy,qz\n";
+  for (const std::string& row : rows) file << row << "\n";
+  file.close();
+  std::ofstream(folder / "mapping.toml") << R"(schema = 1
+vehicle = "crazyflie.toml"
+gravity_m_s2 = 9.81
+ambient = { air_density_kg_m3 = 1.2, ground_z_m = -1000.0, ceiling_z_m = 1000.0, walls = [] }
+[command]
+channel = "*"
+time = "field"
+time_field = "t"
+inputs = ["u"]
+columns = { u = "u" }
+[mocap]
+channel = "*"
+time = "field"
+time_field = "t"
+latency_s = 0.0
+position_noise_m = 1e-4
+attitude_noise_rad = 5e-3
+columns = { x_m = "x", y_m = "y", z_m = "z", qw = "qw", qx = "qx", qy = "qy", qz = "qz" }
+)";
+  const Mapping mapping = read_mapping(folder / "mapping.toml", overrides);
+  Channels channels(mapping.wanted());
+  Lines warnings;
+  read_source(folder / "log.csv", channels, warnings);
+  return assemble(channels, mapping);
+}
+
+/// Twenty rows, 10 ms apart in seconds.
+Lines some_rows(double from_s = 0) {
+  Lines rows;
+  for (int i = 0; i < 20; ++i) rows.push_back(io::shortest_digits(from_s + 0.01 * i) + ",9,0.1,0.2,1,1,0,0,0");
+  return rows;
+}
+
+TEST(Import, SaysWhySamplesAreUnusable) {
+  Lines rows = some_rows();
+  rows[3] = "0.03,inf,0.1,0.2,1,1,0,0,0";
+  rows[4] = "0.04,NA,0.1,0.2,1,1,0,0,0";
+  rows[5] = "0.05,9,,0.2,1,1,0,0,0";
+  rows[6] = "none,9,0.1,0.2,1,1,0,0,0";
+  rows[7] = "0.07,9,0.1,0.2,1,0.5,0,0,0";
+  const Imported out = of_table(rows);
+  using Why = std::map<std::string, std::size_t>;
+  EXPECT_EQ(why(out, 0), (Why{{"u is no finite number", 1}, {"lacks u", 1}, {"no time", 1}}));
+  EXPECT_EQ(why(out, 1), (Why{{"lacks x_m", 1}, {"no time", 1}, {"quaternion of another length than 1", 1}}));
+  EXPECT_EQ(out.report.warnings[0], "command: 3 samples are unusable: 1 lacks u, 1 no time, 1 u is no finite number");
+}
+
+TEST(Import, TakesRowsThatHaveNothingOfAStreamForOthers) {
+  Lines rows = some_rows();
+  for (std::size_t i = 0; i < rows.size(); i += 2) rows[i] = rows[i].substr(0, rows[i].find(',')) + ",9,,,,,,,";
+  const Imported out = of_table(rows);
+  EXPECT_EQ(out.report.streams[0].samples, 20u);
+  EXPECT_EQ(out.report.streams[1].samples, 10u);
+  EXPECT_EQ(out.report.streams[1].unusable, 0u);
+}
+
+TEST(Import, NamesTheUnitOfTimesThatAreNoSeconds) {
+  const auto refused = [](const Lines& rows, const Lines& overrides = {}) {
+    const std::string line = test::refusal([&] { of_table(rows, overrides); });
+    return line.substr(std::min(line.size(), line.find("command.")));
+  };
+  Lines rows;
+  for (int i = 0; i < 20; ++i)
+    rows.push_back(std::to_string(1'700'000'000'000'000 + 10'000 * i) + ",9,0.1,0.2,1,1,0,0,0");
+  EXPECT_EQ(refused(rows), "command.time_unit: times of \"t\" reach 1.7e+15 s; accepted: time_unit = \"us\"");
+  for (int i = 0; i < 20; ++i) rows[i] = std::to_string(10'000 * i) + ",9,0.1,0.2,1,1,0,0,0";
+  EXPECT_EQ(refused(rows), "command.time_unit: samples are 1e+04 s apart by \"t\"; accepted: time_unit = \"us\"");
+  EXPECT_EQ(refused(some_rows(), {"command.time_unit=ns"}),
+            "command.time_unit=ns: command.time_unit: samples are 1e-11 s apart by \"t\"; accepted: time_unit = \"s\"");
+}
+
+TEST(Import, DoesWithoutPowerThatWasAnnouncedAndNeverCame) {
+  Robot robot;
+  robot.fill();
+  robot.channels.add("/battery");
+  const Imported out = assemble(robot.channels, mapping_of("ros2.toml"));
+  EXPECT_FALSE(out.log.power || out.log.header.power);
+  EXPECT_EQ(out.report.warnings[0], "power: /battery has no samples: done without");
+}
+
 TEST(Import, RefusesWhatIsNotThere) {
   Robot robot;
   robot.fill();
@@ -411,8 +566,8 @@ TEST(Import, RefusesWhatIsNotThere) {
             "linear_acceleration.y, linear_acceleration.z; did you mean \"angular_velocity.x\"?");
   robot.channels.add("/none");
   EXPECT_EQ(refused({"mocap.channel=/none"}),
-            ":34:7: mocap.columns.x_m: \"pose.position.x\" is of a channel without samples; accepted: a channel with "
-            "samples");
+            "--set mocap.channel=/none: mocap.channel: \"/none\" has no samples; accepted: a channel that has some: "
+            "/imu, /pose, /wing_input");
 }
 
 TEST(Import, RefusesAChannelWithoutSamplesToUse) {
@@ -420,9 +575,10 @@ TEST(Import, RefusesAChannelWithoutSamplesToUse) {
   for (int i = 0; i < 200; ++i) robot.command(i), robot.pose(0), robot.imu(i);
   robot.pose(7, std::nan(""));
   const std::string line = test::refusal([&] { assemble(robot.channels, mapping_of("ros2.toml")); });
-  EXPECT_TRUE(line.ends_with(
-      "ros2.toml:28:11: mocap.channel: \"/pose\" has 1 usable samples, 1 that are not, and 199 at the time of "
-      "another; accepted: at least 2 usable ones"))
+  EXPECT_TRUE(
+      line.ends_with("ros2.toml:28:11: mocap.channel: \"/pose\" has 1 usable samples, 1 that are not (1 lacks x_m), "
+                     "and 199 at the time of "
+                     "another; accepted: at least 2 usable ones"))
       << line;
 }
 

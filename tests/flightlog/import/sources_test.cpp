@@ -52,9 +52,10 @@ TEST(Sources, ReadABag) {
   EXPECT_EQ(imu.stamp_ns(), (std::vector<std::int64_t>{0, 1, 2}));
   EXPECT_EQ(channels.names(), (Lines{"/imu", "/other", "/own"}));  // all are known, for whoever misspells one
   const std::string file = (folder / "f.mcap").string();
-  EXPECT_EQ(warnings,
-            (Lines{file + ": /own: q/msg/Unknown has no definition: left out",
-                   file + ": /imu: 2 messages left out, the first because begins with no header of plain CDR"}));
+  EXPECT_EQ(warnings, (Lines{file + ": /own: q/msg/Unknown has no definition: left out",
+                             file + ": /imu: 2 messages left out, the first because begins with no header of plain "
+                                    "CDR, as where messages are compressed one by "
+                                    "one"}));
 }
 
 TEST(Sources, ReadATable) {
@@ -63,24 +64,6 @@ TEST(Sources, ReadATable) {
   const Channels channels = read(folder / "camera.csv");
   EXPECT_EQ(*channels.find("camera")->column("x"), (std::vector<double>{1, 2}));
   EXPECT_EQ(channels.find("camera")->stamp_ns(), (std::vector<std::int64_t>{kNoTime, kNoTime}));
-}
-
-TEST(Sources, ReadATableWithGapsThatWasCutOff) {
-  const io::TemporaryFolder folder;
-  std::ofstream(folder / "camera.csv") << "t,  x,  y\n0.5,  1,  nan\n0.6, , 3\n0.7, 4, 5\n0.8, 6";
-  Lines warnings;
-  const Channels channels = read(folder / "camera.csv", &warnings, {{"*", {"t", "x", "y"}}});
-  const std::vector<double>&x = *channels.find("*")->column("x"), &y = *channels.find("camera")->column("y");
-  ASSERT_EQ(x.size(), 3u);
-  EXPECT_TRUE(x[0] == 1 && std::isnan(x[1]) && x[2] == 4);
-  EXPECT_TRUE(std::isnan(y[0]) && y[1] == 3 && y[2] == 5);
-  EXPECT_EQ(warnings, (Lines{(folder / "camera.csv").string() + ": its last line was cut off: left out"}));
-  // The last line may want its end, but not its cells.
-  std::ofstream(folder / "whole.csv") << "t,x\n0.5,1\n0.6,2";
-  EXPECT_EQ(read(folder / "whole.csv").find("whole")->column("x")->size(), 2u);
-  std::ofstream(folder / "torn.csv") << "t,x\n0.5\n0.6,2\n";
-  EXPECT_EQ(test::refusal([&] { read(folder / "torn.csv"); }),
-            (folder / "torn.csv").string() + ":2:4: row has 1 cells; accepted: 2, as in the header");
 }
 
 std::string gzipped(const std::string& text) {
@@ -137,14 +120,67 @@ TEST(Sources, RefuseWhatTheyCannotRead) {
   std::ofstream(folder / "f.mcap") << "t,x\n";
   EXPECT_EQ(test::refusal([&] { read(folder / "f.mcap"); }),
             at + "/f.mcap: does not begin as a .mcap file; accepted: a bag, a ULog or a CSV");
-  std::ofstream(folder / "f.csv") << "t,x\n1,a\n";
+  std::ofstream(folder / "f.csv") << "t,x\n1,2,3\n";
   EXPECT_EQ(test::refusal([&] { read(folder / "f.csv"); }),
-            at + "/f.csv:2:3: x: \"a\" is not a number; accepted: a number");
+            at + "/f.csv:2:1: 3 cells for 2 names, and no row is otherwise; accepted: rows of as many cells");
   EXPECT_EQ(test::refusal([&] { read(folder / "none.csv"); }),
             at + "/none.csv: cannot be read: No such file or directory");
   fs::create_directory(folder / "empty");
   EXPECT_EQ(test::refusal([&] { read(folder / "empty"); }),
             at + "/empty: holds no bag; accepted: rosbag2's .mcap or .db3 files, or a folder of them");
+}
+
+TEST(Sources, SayWhatOtherFilesAre) {
+  const io::TemporaryFolder folder;
+  const auto refusal = [&](const std::string& name, const std::string& bytes) {
+    std::ofstream(folder / name) << bytes;
+    const std::string line = test::refusal([&] { read(folder / name); });
+    return line.substr(std::min(line.size(), (folder / name).string().size()));
+  };
+  const std::string accepted = "; accepted: a bag, a ULog or a CSV";
+  EXPECT_EQ(refusal("log.bag", "#ROSBAG V2.0\n..."),
+            ": is a bag of ROS 1" + accepted + ", as made by: rosbags-convert --src FILE --dst FOLDER");
+  EXPECT_EQ(refusal("named.csv", "#ROSBAG V2.0\n..."),
+            ": is a bag of ROS 1" + accepted + ", as made by: rosbags-convert --src FILE --dst FOLDER");
+  EXPECT_EQ(refusal("bag_0.mcap.zstd", "\x28\xB5\x2F\xFD..."),
+            ": is compressed by zstd" + accepted + ", as made by: zstd -d FILE");
+  EXPECT_EQ(refusal("log.zip", "PK\x03\x04..."), ": is a zip archive, as .npz and .xlsx files are" + accepted +
+                                                     ", as made by: unzip FILE, or export it as CSV");
+  EXPECT_EQ(refusal("any.zip", "any bytes"), ": does not begin as a .zip file" + accepted);
+  EXPECT_EQ(refusal("bytes.csv", std::string("t,x\n\0\1", 6)), ": holds bytes that are no text" + accepted);
+  EXPECT_EQ(refusal("bag.mcap.gz", gzipped("\x89MCAP0\r\n...")),
+            ": is a bag compressed by gzip" + accepted + ", as made by: gunzip FILE");
+  EXPECT_EQ(refusal("wide.csv", "\xFF\xFEt"),
+            ": is text in UTF-16" + accepted + ", as made by: iconv -f UTF-16 -t UTF-8 FILE");
+}
+
+TEST(Sources, ReadAUlogCompressedByGzip) {
+  const io::TemporaryFolder folder;
+  test::UlogText log;
+  log.format("t:uint64_t timestamp;float a;")
+      .topic(0, 1, "t")
+      .data(1, std::string(8, '\0') + test::UlogText::bytes(2.0f));
+  std::ofstream(folder / "log.ulg.gz") << gzipped(log.text);
+  EXPECT_EQ(*read(folder / "log.ulg.gz").find("t")->column("a"), (std::vector<double>{2}));
+}
+
+TEST(Sources, ReadATopicWhoseTypeChanged) {
+  const io::TemporaryFolder folder;
+  {
+    ros::McapWriter writer(folder / "f.mcap");
+    ros::Definitions own;
+    own.add("q/msg/Number", "float64 data\n");
+    own.add("q/msg/Text", "string data\n");
+    const auto number = writer.add_topic("/x", "q/msg/Number", own.concatenated("q/msg/Number"), "");
+    const auto text = writer.add_topic("/x", "q/msg/Text", own.concatenated("q/msg/Text"), "");
+    writer.write(text, 1, 0, encode(*own.layout("q/msg/Text"), {{"data", std::string("hello")}}));
+    for (int i = 0; i < 2; ++i)
+      writer.write(number, 2 + i, 0, encode(*own.layout("q/msg/Number"), {{"data", 1.5 + i}}));
+  }
+  Lines warnings;
+  const Channels channels = read(folder / "f.mcap", &warnings);
+  EXPECT_EQ(*channels.find("/x")->column("data"), (std::vector<double>{1.5, 2.5}));
+  EXPECT_EQ(warnings, Lines());
 }
 
 }  // namespace

@@ -83,10 +83,99 @@ TEST(Ulog, LeavesOutWhatIsDamagedAndSaysSo) {
   log.data(7, sensor(1000, 1, 2));
   Lines warnings;
   EXPECT_EQ(read(log.text, &warnings).find("sensor")->received_ns().size(), 1u);
-  EXPECT_EQ(warnings, (Lines{"f.ulg: topic unknown has no format that can be read: left out",
-                             "f.ulg: topic loop has no format that can be read: left out",
-                             "f.ulg: topic empty has no format that can be read: left out",
-                             "f.ulg: 2 damaged messages: left out", "f.ulg: the logger itself dropped 40 ms"}));
+  EXPECT_EQ(
+      warnings,
+      (Lines{"f.ulg: topic unknown has no format that can be read: left out",
+             "f.ulg: topic loop has no format that can be read: left out",
+             "f.ulg: topic empty has no format that can be read: left out", "f.ulg: 2 damaged messages left out",
+             "f.ulg: 1 messages of topics that are not announced left out", "f.ulg: the logger itself dropped 40 ms"}));
+}
+
+/// 400 samples of two topics in turn.
+UlogText flown() {
+  UlogText log = sensors();
+  for (std::uint64_t i = 0; i < 200; ++i) log.data(7, sensor(1000 + i, 1, 2)).data(8, sensor(1000 + i, 5, 6));
+  return log;
+}
+
+std::size_t samples(const Channels& channels) {
+  std::size_t count = 0;
+  for (const char* name : {"sensor[0]", "sensor[1]"})
+    if (const Channel* found = channels.find(name)) count += found->received_ns().size();
+  return count;
+}
+
+TEST(Ulog, GoesOnBehindDamage) {
+  const std::string whole = flown().text;
+  const std::size_t begin = whole.size() - 400 * 31;  // of the data: 3 of a header, 2 of a number, 26 of a sample
+  for (std::size_t at = begin; at + 600 < whole.size(); at += 101) {
+    std::string lost = whole, zeroed = whole, inserted = whole;
+    lost.erase(at, 1);
+    zeroed.replace(at, 512, 512, '\0');
+    inserted.insert(at, "#");
+    for (const auto& [text, fewer] : {std::pair(lost, 2u), std::pair(inserted, 2u), std::pair(zeroed, 20u)}) {
+      Lines warnings;
+      EXPECT_GE(samples(read(text, &warnings)), 400 - fewer) << at;
+      ASSERT_EQ(warnings.size(), 1u) << at;
+      EXPECT_TRUE(warnings[0].starts_with("f.ulg: is damaged: ")) << warnings[0];
+    }
+  }
+  std::string lost = whole;
+  lost.erase(begin + 31 + 10, 1);
+  Lines warnings;
+  EXPECT_EQ(samples(read(lost, &warnings)), 399u);
+  EXPECT_EQ(warnings, (Lines{"f.ulg: is damaged: 30 bytes skipped in 1 place, at byte " + std::to_string(begin + 31)}));
+}
+
+TEST(Ulog, GoesOnWhereATopicIsNoLongerAnnounced) {
+  std::string text = flown().text;
+  const std::size_t second = text.rfind(std::string("A\x01\x08", 3) + '\0');
+  ASSERT_NE(second, std::string::npos);
+  text[second] = '?';
+  Lines warnings;
+  EXPECT_EQ(samples(read(text, &warnings)), 200u);
+  EXPECT_EQ(warnings, (Lines{"f.ulg: 1 messages of kinds that are not known left out",
+                             "f.ulg: 200 messages of topics that are not announced left out"}));
+}
+
+TEST(Ulog, TakesTextForTextWhateverItLooksLike) {
+  UlogText log = sensors();
+  std::string text = std::string("\x01\x08perf_top", 10);
+  for (int i = 0; i < 200; ++i)
+    text += "  PID COMMAND          CPU(ms)  F: I: A: P:  \n";  // "  P" is a size and a type
+  for (std::uint64_t i = 0; i < 400; ++i) log.data(7, sensor(1000 + i, 1, 2));
+  log.message('M', text).data(7, sensor(2000, 1, 2)).message('Z', text);
+  for (std::uint64_t i = 0; i < 400; ++i) log.data(7, sensor(3000 + i, 1, 2));
+  Lines warnings;
+  EXPECT_EQ(samples(read(log.text, &warnings)), 801u);
+  EXPECT_EQ(warnings, (Lines{"f.ulg: 1 messages of kinds that are not known left out"}));
+}
+
+TEST(Ulog, SaysHowMuchOfItsEndIsEmpty) {
+  UlogText log = sensors();
+  log.data(7, sensor(1000, 1, 2)).data(7, sensor(2000, 1, 2));
+  Lines warnings;
+  read(log.text + std::string(100'000, '\0'), &warnings);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find(" bytes skipped in 1 place, at byte "), std::string::npos) << warnings[0];
+}
+
+TEST(Ulog, TakesFlagsAtItsHeadAlone) {
+  UlogText log = sensors();
+  std::string flags(40, '\0');
+  flags[8] = 2;  // of a kind that is newer
+  log.data(7, sensor(1000, 1, 2)).message('B', flags).data(7, sensor(2000, 1, 2));
+  Lines warnings;
+  EXPECT_EQ(samples(read(log.text, &warnings)), 2u);
+  EXPECT_EQ(warnings, (Lines{"f.ulg: 1 damaged messages left out"}));
+}
+
+TEST(Ulog, ShowsNamesEscapedAndCut) {
+  UlogText log;
+  log.topic(0, 7, std::string(70, 'n')).format("a:uint64_t timestamp;");
+  Lines warnings;
+  read(log.text, &warnings);
+  EXPECT_EQ(warnings, (Lines{"f.ulg: topic " + std::string(60, 'n') + "... has no format that can be read: left out"}));
 }
 
 TEST(Ulog, GoesOnWhereDataWereAppended) {

@@ -47,11 +47,11 @@ std::vector<std::string> read(const fs::path& path) {
 
 using Lines = std::vector<std::string>;
 
-TEST(Bag, ReadsADatabaseInTheOrderOfReceipt) {
+TEST(Bag, ReadsADatabaseInItsOwnOrder) {
   const io::TemporaryFolder folder;
   write_database(folder / "x.db3", kTables);
   EXPECT_TRUE(Bag::is_bag(folder / "x.db3"));
-  EXPECT_EQ(read(folder / "x.db3"), (Lines{"/b q/msg/Own 10 2", "/a std_msgs/msg/Header 20 1"}));
+  EXPECT_EQ(read(folder / "x.db3"), (Lines{"/a std_msgs/msg/Header 20 1", "/b q/msg/Own 10 2", "/c q/msg/Own 12 1"}));
 }
 
 TEST(Bag, TakesDefinitionsOfADatabaseThatHasThem) {
@@ -62,7 +62,8 @@ TEST(Bag, TakesDefinitionsOfADatabaseThatHasThem) {
           "CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT NULL, "
           "encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);"
           "INSERT INTO message_definitions VALUES(1, 'q/msg/Own', 'ros2msg', 'int16 x', '');");
-  EXPECT_EQ(read(folder / "x.db3"), (Lines{"/b q/msg/Own int16 x10 2", "/a std_msgs/msg/Header 20 1"}));
+  EXPECT_EQ(read(folder / "x.db3"),
+            (Lines{"/a std_msgs/msg/Header 20 1", "/b q/msg/Own int16 x10 2", "/c q/msg/Own int16 x12 1"}));
 }
 
 TEST(Bag, ReadsAFolderInTheOrderOfItsParts) {

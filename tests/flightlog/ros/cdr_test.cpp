@@ -162,14 +162,16 @@ TEST(Cdr, RefusesEveryTruncation) {
 TEST(Cdr, RefusesBytesThatContradictTheLayout) {
   std::string bytes = bytes_of(kJointState);
   bytes[1] = 3;  // a parameter list
-  EXPECT_EQ(fault("sensor_msgs/JointState", bytes), "begins with no header of plain CDR");
+  EXPECT_EQ(fault("sensor_msgs/JointState", bytes),
+            "begins with no header of plain CDR, as where messages are compressed one by one");
   bytes = bytes_of(kJointState);
   bytes[21] = 'x';  // the zero of "torso"
   EXPECT_EQ(fault("sensor_msgs/JointState", bytes), "header.frame_id: is a string without an end");
   bytes = bytes_of(kJointState);
   std::fill_n(bytes.begin() + 24, 4, '\xff');  // how many names
   EXPECT_EQ(fault("sensor_msgs/JointState", bytes), "name: the message ends before it");
-  EXPECT_EQ(fault("flappy_msgs/CommandResult", "abc"), "begins with no header of plain CDR");
+  EXPECT_EQ(fault("flappy_msgs/CommandResult", "abc"),
+            "begins with no header of plain CDR, as where messages are compressed one by one");
 }
 
 TEST(Cdr, RefusesMembersThatDoNotFit) {
