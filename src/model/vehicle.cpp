@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "io/text.hpp"
 #include "model/effects/registry.hpp"
 #include "model/jointed.hpp"
 #include "model/math.hpp"
@@ -139,12 +140,18 @@ class Lister {
   std::vector<Parameter>& list_;
 };
 
-/// A rigid body is possible when its principal moments are positive and none exceeds the sum of the others.
-bool possible(const InertiaTensor& i) {
+/// The largest principal moment may exceed the sum of the other two, which it equals for a flat plate, by this share of it: files round.
+constexpr double kRounding = 1e-4;
+
+/// Why no rigid body has this inertia; empty where one has. The principal moments of a body are positive, and none exceeds the sum of the other two.
+std::string impossible(const InertiaTensor& i) {
   Eigen::Matrix3d m;
   m << i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz;
   const Eigen::Vector3d e = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
-  return e[0] > 0 && e[0] + e[1] >= e[2];
+  if (!(e[0] > 0)) return io::format("its smallest principal moment is %.4g", e[0]);
+  const double excess = (e[2] - e[0] - e[1]) / e[2];
+  if (excess <= kRounding) return "";
+  return io::format("its largest principal moment exceeds the sum of the other two by %.3g %% of it", 100 * excess);
 }
 
 /// A body that a file leaves out.
@@ -211,9 +218,11 @@ std::optional<PhysicalFault> physical_fault(const Vehicle& v) {
                                                              {"right.leading_edge", &v.right.leading_edge},
                                                              {"right.wing", &v.right.wing}};
   for (const auto& [path, body] : bodies)
-    if ((body == &v.torso || !v.beat_averaged) && !(v.jointed && absent(*body)) && !possible(body->inertia_kg_m2))
-      return PhysicalFault{std::string(path) + ".inertia_kg_m2", "no rigid body has this inertia",
-                           "positive principal moments, none above the sum of the other two"};
+    if ((body == &v.torso || !v.beat_averaged) && !(v.jointed && absent(*body)))
+      if (const std::string why = impossible(body->inertia_kg_m2); !why.empty())
+        return PhysicalFault{
+            std::string(path) + ".inertia_kg_m2", "no rigid body has this inertia: " + why,
+            "positive principal moments, none above the sum of the other two, but for 0.01 % of rounding"};
   return std::nullopt;
 }
 

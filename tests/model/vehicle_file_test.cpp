@@ -395,14 +395,17 @@ TEST_F(VehicleFile, RefusesFiguresOutOfRange) {
 }
 
 TEST_F(VehicleFile, RefusesAnInertiaOfNoBody) {
-  const std::string why =
-      "no rigid body has this inertia; accepted: positive principal moments, none above the sum of the other "
-      "two";
-  // a flat plate is at the limit: 2.2204 + 19.2209 and a little from its small product of inertia
-  EXPECT_EQ(edited("[left.wing]", "{ xx = 21.4402e-9", "^{ xx = 21.4414e-9"), "^: left.wing.inertia_kg_m2: " + why);
-  EXPECT_EQ(edited("[left.wing]", "{ xx = 21.4402e-9", "{ xx = 21.4412e-9"), "accepted");
+  const auto refused = [](const std::string& body, const std::string& why) {
+    return "^: " + body + ".inertia_kg_m2: no rigid body has this inertia: its " + why +
+           "; accepted: positive principal moments, none above the sum of the other two, but for 0.01 % of rounding";
+  };
+  // a flat plate is at the limit: 2.2204 + 19.2209 and a little from its small product of inertia, and 1e-4 of it for rounding
+  EXPECT_EQ(edited("[left.wing]", "{ xx = 21.4402e-9", "^{ xx = 21.4440e-9"),
+            refused("left.wing", "largest principal moment exceeds the sum of the other two by 0.0126 % of it"));
+  EXPECT_EQ(edited("[left.wing]", "{ xx = 21.4402e-9", "{ xx = 21.4430e-9"), "accepted");
   // a negative principal moment
-  EXPECT_EQ(edited("[torso]", "{ xx = 4238.1285e-9", "^{ xx = 1e-15"), "^: torso.inertia_kg_m2: " + why);
+  EXPECT_EQ(edited("[torso]", "{ xx = 4238.1285e-9", "^{ xx = 1e-15"),
+            refused("torso", "smallest principal moment is -1.601e-09"));
 }
 
 TEST_F(VehicleFile, RefusesWhatIsNoVehicle) {

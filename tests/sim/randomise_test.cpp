@@ -402,9 +402,9 @@ TEST(RandomisationTable, FollowsAParameterThroughAllItsDraws) {
 
 TEST(RandomisationTable, RefusesDrawsThatMakeAnInertiaOfNoBody) {
   EXPECT_EQ(message(table("\"left.wing.inertia_kg_m2.xx\"", "law = \"scale_normal\"\nsd = 0.1")),
-            "r.toml:2:14: randomise[0].parameters: left.wing.inertia_kg_m2: no rigid body has this inertia; "
-            "accepted: "
-            "positive principal moments, none above the sum of the other two");
+            "r.toml:2:14: randomise[0].parameters: left.wing.inertia_kg_m2: no rigid body has this inertia: its "
+            "largest principal moment exceeds the sum of the other two by 10.4 % of it; accepted: positive principal "
+            "moments, none above the sum of the other two, but for 0.01 % of rounding");
   EXPECT_EQ(message(table("\"left.wing.inertia_kg_m2\"", "law = \"scale_normal\"\nsd = 0.1")), "accepted");
 }
 
