@@ -2,6 +2,8 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
+#include <cctype>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -28,6 +30,19 @@ int flappy_loaded_selftest(void) { return flappy_policy_selftest(); }
 
 [[noreturn]] void refuse_header(const fs::path& header, const std::string& what, const std::string& accepted) {
   throw io::InputError(header.string() + ": " + what + "; accepted: " + accepted);
+}
+
+bool is_of_name(char c) { return c == '_' || std::isalnum(static_cast<unsigned char>(c)) != 0; }
+
+/// What stands before "_POLICY_OBS" where a header defines it, in small letters.
+std::string prefix_of(const std::string& header) {
+  const std::size_t end = header.find("_POLICY_OBS ");
+  std::size_t begin = end == std::string::npos ? 0 : end;
+  while (begin > 0 && is_of_name(header[begin - 1])) --begin;
+  if (end == std::string::npos || begin == end) return std::string(kPrefix);
+  std::string prefix = header.substr(begin, end - begin);
+  std::ranges::transform(prefix, prefix.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return prefix;
 }
 
 /// Compiles; the compiler's complaints, or nothing.
@@ -75,11 +90,11 @@ class Header : public Policy {
 };
 
 std::unique_ptr<const Policy> load_header(const fs::path& path, int observations, int actions) {
-  io::read_text(path);  // or a complaint that names it
+  const std::string prefix = prefix_of(io::read_text(path));
   const fs::path header = fs::absolute(path);
   const io::TemporaryFolder folder;
   const fs::path source = folder / "wrapper.c", library = folder / "policy.so";
-  io::write_atomically(source, kWrapper);
+  io::write_atomically(source, with_prefix(kWrapper, prefix));
   const std::string complaints = compile(header, source, library);
   if (!complaints.empty())
     throw io::InputError(first_error(header, complaints) + "; accepted: a C header that cc compiles");
@@ -90,15 +105,16 @@ std::unique_ptr<const Policy> load_header(const fs::path& path, int observations
     if (why.starts_with(library.string() + ": ")) why.erase(0, library.string().size() + 2);
     refuse_header(header, "cannot be loaded: " + why, "a header that defines all it calls");
   }
-  const auto number = [&](const char* name) { return *static_cast<const int*>(dlsym(loaded, name)); };
-  auto policy = std::make_unique<Header>(loaded, number("flappy_loaded_observations"), number("flappy_loaded_actions"),
-                                         reinterpret_cast<Header::Step>(dlsym(loaded, "flappy_loaded_step")));
+  const auto symbol = [&](const char* name) { return dlsym(loaded, (prefix + name).c_str()); };
+  const auto number = [&](const char* name) { return *static_cast<const int*>(symbol(name)); };
+  auto policy = std::make_unique<Header>(loaded, number("_loaded_observations"), number("_loaded_actions"),
+                                         reinterpret_cast<Header::Step>(symbol("_loaded_step")));
   if (policy->observations() != observations || policy->actions() != actions)
     refuse_header(header,
                   "has " + std::to_string(policy->observations()) + " inputs and " + std::to_string(policy->actions()) +
                       " outputs",
                   std::to_string(observations) + " and " + std::to_string(actions) + ", as the task has");
-  const int failed = reinterpret_cast<int (*)()>(dlsym(loaded, "flappy_loaded_selftest"))();
+  const int failed = reinterpret_cast<int (*)()>(symbol("_loaded_selftest"))();
   if (failed != 0)
     refuse_header(header, "fails its self-test: " + std::to_string(failed), "flappy_policy_selftest() of 0");
   return policy;
@@ -113,6 +129,22 @@ const TorchFunctions& torch() {
 }
 
 }  // namespace
+
+std::string with_prefix(std::string_view text, std::string_view prefix) {
+  std::string capital(prefix), changed;
+  std::ranges::transform(capital, capital.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  for (std::size_t at = 0; at < text.size();) {
+    const bool begins = at == 0 || (!is_of_name(text[at - 1]) && text[at - 1] != '/');
+    const std::string_view rest = text.substr(at);
+    if (begins && (rest.starts_with("flappy_") || rest.starts_with("FLAPPY_"))) {
+      changed += rest[0] == 'f' ? prefix : std::string_view(capital);
+      at += kPrefix.size();
+    } else {
+      changed += text[at++];
+    }
+  }
+  return changed;
+}
 
 std::unique_ptr<const Policy> load_policy(const fs::path& path, int observations, int actions) {
   if (path.extension() == ".pt") return load_torch_script(path, observations, actions);

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <string_view>
 
 namespace flappy::policy {
 
@@ -29,8 +31,15 @@ class Policy {
 ///   FLAPPY_POLICY_OBS, FLAPPY_POLICY_ACT
 ///   void flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT])
 ///   int flappy_policy_selftest(void)    0: passed; it runs first
+/// or the same with another prefix.
 /// io::InputError, one line, where it is neither, has other sizes, does not compile or fails its test.
 std::unique_ptr<const Policy> load_policy(const std::filesystem::path& path, int observations, int actions);
+
+/// The prefix of names that flappy-export writes unless it is given another.
+inline constexpr std::string_view kPrefix = "flappy";
+
+/// C text in which names that begin with "flappy_" and "FLAPPY_" begin with `prefix` instead, in small and in capital letters; paths stay as they are.
+std::string with_prefix(std::string_view text, std::string_view prefix);
 
 /// Whether this build or installation reads and writes TorchScript.
 bool reads_torch_script();

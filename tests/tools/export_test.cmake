@@ -55,6 +55,35 @@ flown(of_run ${WORK}/run)
 flown(of_header ${WORK}/out/flappy_policy.h --config ${WORK}/run/config/fly.toml)
 expect_equal("flights of the header" "${of_header}" "${of_run}")
 
+# ---- two policies in one program: each with a prefix of its own
+
+run(${WORK}/run --out ${WORK}/one --name one)
+expect_equal("stderr" "${err}" "")
+expect_match("stdout" "${out}" "${WORK}/one/one_policy.h: [0-9]+ bytes\n")
+flown(of_named ${WORK}/one/one_policy.h --config ${WORK}/run/config/fly.toml)
+expect_equal("flights of the named header" "${of_named}" "${of_run}")
+function(compiled result first second)
+  file(WRITE ${WORK}/two.c "#include \"${first}\"\n#include \"${second}\"\nint main(void) { return ${ARGN}; }\n")
+  execute_process(COMMAND cc -std=c99 -O1 -Wall -Wextra -Wfloat-equal -Wconversion -Werror ${WORK}/two.c -o ${WORK}/two ERROR_VARIABLE err RESULT_VARIABLE code)
+  if(code EQUAL 0)
+    execute_process(COMMAND ${WORK}/two RESULT_VARIABLE err)
+  endif()
+  set(${result} "${err}" PARENT_SCOPE)
+endfunction()
+compiled(two ${WORK}/out/flappy_policy.h ${WORK}/one/one_policy.h "flappy_policy_selftest() + one_policy_selftest()")
+expect_equal("two policies" "${two}" 0)
+compiled(one ${WORK}/one/one_policy.h ${WORK}/one/one_controller.h "one_policy_selftest() + one_controller_selftest()")
+expect_equal("policy and controller of one prefix" "${one}" 0)
+compiled(twice ${WORK}/out/flappy_policy.h ${WORK}/out/flappy_policy_int8.h "flappy_policy_selftest()")
+expect_match("two policies of one prefix" "${twice}" "#error \"another header of this prefix was included before: flappy-export --name gives one of its own\"")
+foreach(flag IN ITEMS -ffast-math -freciprocal-math -fassociative-math -funsafe-math-optimizations)
+  file(WRITE ${WORK}/fast.c "#include \"${WORK}/one/one_policy.h\"\n")
+  execute_process(COMMAND cc ${flag} -fno-signed-zeros -fno-trapping-math -c ${WORK}/fast.c -o ${WORK}/fast.o ERROR_VARIABLE err)
+  expect_match("complaint of ${flag}" "${err}" "#error \"${flag}[, ]")
+endforeach()
+expect_refused("--name: \"1st\" begins no name; accepted: small letters, digits and _, a letter first, at most 40"
+  ${WORK}/run --out ${WORK}/refused --name 1st)
+
 # ---- any network that LibTorch trains: layer norm, another activation, a history, more layers
 
 if(TORCH)

@@ -26,7 +26,7 @@ constexpr std::size_t kProofFlights = 64, kFitFlights = 512;
 constexpr std::size_t kTestVectors = 24, kProofVectors = 1000, kFitVectors = 10000;
 
 struct Request {
-  std::string run, out;
+  std::string run, out, name{policy::kPrefix};
   bool int8 = false, prove = false;
 };
 
@@ -78,19 +78,26 @@ void print(const char* what, const OutputError& e, const std::vector<flight::Sig
 Json json_of(const OutputError& e) { return {{"largest", e.largest}, {"rms", e.rms}}; }
 
 /// All or nothing, but for a power failure between two renames; nothing of an earlier export stays beside it.
-void write_all(const fs::path& folder, const std::map<std::string, std::string>& files) {
+void write_all(const fs::path& folder, const std::string& prefix, const std::map<std::string, std::string>& files) {
   std::vector<std::unique_ptr<io::AtomicFile>> written;
   for (const auto& [name, text] : files) {
     written.push_back(std::make_unique<io::AtomicFile>(folder / name));
     written.back()->write(text);
   }
   for (const auto& file : written) file->commit();
-  for (const char* name : {"flappy_policy.h", "flappy_policy_int8.h", "flappy_controller.h", "policy.pt"})
+  for (const std::string& name :
+       {prefix + "_policy.h", prefix + "_policy_int8.h", prefix + "_controller.h", std::string("policy.pt")})
     if (!files.contains(name)) fs::remove(folder / name);
   io::sync_folder(folder);
 }
 
 void run(const Request& request, const io::Program& program) {
+  const bool is_name = !request.name.empty() && request.name.size() <= 40 && request.name[0] >= 'a' &&
+                       request.name[0] <= 'z' &&
+                       request.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == std::string::npos;
+  if (!is_name)
+    throw io::InputError("--name: \"" + request.name +
+                         "\" begins no name; accepted: small letters, digits and _, a letter first, at most 40");
   const learn::FinishedRun run = learn::read_finished_run(request.run);
   const policy::PolicyNetwork network = deploy::network_of(run.fly);
   if (request.int8 && (network.layer_norm || network.linear || network.hidden > policy::Activation::tanh))
@@ -160,8 +167,12 @@ void run(const Request& request, const io::Program& program) {
     measure(name, folder, "flappy_policy.h");
   }
   if (with_controller) measure("flappy_controller.h", work / "flappy_policy", "flappy_controller.h");
-  write_all(request.out, e.files);
+  std::map<std::string, std::string> files;
   for (const auto& [name, text] : e.files)
+    if (name.ends_with(".h")) files[policy::with_prefix(name, request.name)] = policy::with_prefix(text, request.name);
+    else files[name] = text;
+  write_all(request.out, request.name, files);
+  for (const auto& [name, text] : files)
     std::printf("%s: %zu bytes\n", (fs::path(request.out) / name).c_str(), text.size());
   program.write_json(json);
 }
@@ -177,6 +188,9 @@ int main(int argc, char** argv) {
   program.app().option("run", r.run, "run folder that flappy-train left").required();
   program.app().option("--out", r.out, "folder for what is exported").required();
   program.app().flag("--int8", r.int8, "the policy in whole numbers of 8 bits too: flappy_policy_int8.h");
+  program.app()
+      .option("--name", r.name, "what names in C, and of headers, begin with: two policies in one program need two")
+      .shows_default();
   program.app().flag("--prove", r.prove,
                      "prove it on every compiler at hand and on a Cortex-M4F, and measure what microcontrollers need");
   return program.run(argc, argv, [&] { exports::run(r, program); });

@@ -26,6 +26,12 @@ __attribute__((noinline, unused)) static float flappy_fma(float a, float b, floa
 }
 #endif
 
+static inline int flappy_is_nan(float x) {
+  flappy_float f;
+  f.number = x;
+  return (f.bits & 0x7fffffffU) > 0x7f800000U;
+}
+
 static inline float flappy_min(float a, float b) { return a < b ? a : b; }
 static inline float flappy_max(float a, float b) { return a > b ? a : b; }
 static inline float flappy_clamp(float x, float low, float high) { return flappy_min(flappy_max(x, low), high); }

@@ -28,7 +28,7 @@ static inline flappy_sin_cos flappy_sin_cos_wide(float x) {
                              flappy_fma(-q, (float)0.0004837512969970703, flappy_fma(-q, 1.5703125F, x)));
   const flappy_sin_cos near = flappy_sin_cos_of(r);
   const float turn = flappy_fma(-4.0F, (q * 0.25F + to_whole) - to_whole, q); /* quarters, from -2 to 2 */
-  const int swap = turn * turn == 1.0F;
+  const int swap = turn * turn <= 1.0F && turn * turn >= 1.0F;
   const float s = swap ? near.cos : near.sin, c = swap ? near.sin : near.cos;
   flappy_sin_cos wide;
   wide.sin = turn < 0.0F || turn > 1.0F ? -s : s;
@@ -54,7 +54,7 @@ static inline float flappy_atan2(float y, float x) {
   const float a = flappy_abs(x), b = flappy_abs(y), low = flappy_min(b, a), high = flappy_max(a, b);
   const int upper = low > high * (float)0.41421356237309505; /* then by tan(angle - pi / 4), halved */
   const float over = upper ? 0.5F * (low - high) : low, under = upper ? flappy_fma(0.5F, low, 0.5F * high) : high;
-  const float t = over / (under == 0.0F ? 1.0F : under), u = t * t;
+  const float t = over / (!(under <= 0.0F) ? under : 1.0F), u = t * t;
   float series = (float)-0.06078217923641205, octant, quadrant;
   series = flappy_fma(series, u, (float)0.10593843460083008);
   series = flappy_fma(series, u, (float)-0.14243541657924652);

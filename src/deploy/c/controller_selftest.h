@@ -59,7 +59,7 @@ static inline void flappy_controller_test_begin(flappy_controller *c, uint32_t z
 
 static inline float flappy_controller_largest(float error, float is, float should_be) {
   const float difference = flappy_abs(is - should_be) / (flappy_abs(should_be) + 0.1F);
-  if (is == should_be) return error;
+  if (is <= should_be && is >= should_be) return error; /* infinities, too */
   return difference <= error ? error : difference <= 1e30F ? difference : 1e30F; /* of NaN: 1e30 */
 }
 

@@ -42,7 +42,7 @@ static inline int flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float a
   int refused = 0;
   for (i = 0; i < FLAPPY_POLICY_OBS; ++i) {
     const float x = (obs[i] - flappy_policy_mean[i]) * flappy_policy_scale[i];
-    refused |= x != x;
+    refused |= flappy_is_nan(x);
     values[i] = flappy_policy_rounded(x);
   }
   for (layer = 0; layer < FLAPPY_POLICY_LAYERS; ++layer) {

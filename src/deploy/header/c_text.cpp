@@ -47,6 +47,12 @@ std::string c_comment(const std::string& text) {
   return comment + " */\n";
 }
 
+std::string end_of_header(const std::string& name, std::uint32_t crc) {
+  return "#elif FLAPPY_" + name + "_CRC32 != " + std::to_string(crc) +
+         "U\n#error \"another header of this prefix was included before: flappy-export --name gives one of its "
+         "own\"\n#endif\n";
+}
+
 std::string c_string(const std::string& text) {
   std::string literal = "\"";
   for (const char c : text) {

@@ -26,6 +26,9 @@ extern template std::string c_row(std::span<const std::int32_t>);
 /// The lines of a text in one comment.
 std::string c_comment(const std::string& text);
 
+/// The end of what "#ifndef FLAPPY_NAME_H" begins: another header of the same prefix, with other numbers, is no silent copy of the first but an error.
+std::string end_of_header(const std::string& name, std::uint32_t crc);
+
 /// A string literal.
 std::string c_string(const std::string& text);
 

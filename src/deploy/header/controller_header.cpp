@@ -312,7 +312,8 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
           "estimate. */\n"
        << test_numbers << "\n"
        << kEmbedded.at("controller_selftest.h") << "\n"
-       << kEmbedded.at("end.h") << "\n#endif\n";
+       << kEmbedded.at("end.h") << "\n"
+       << end_of_header("CONTROLLER", constants.crc());
   return text.str();
 }
 

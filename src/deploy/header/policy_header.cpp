@@ -158,7 +158,10 @@ std::string header(const rollout::FlyConfig& config, const policy::RunInfo& run,
   };
   table("obs", "FLAPPY_POLICY_OBS", vectors.observation, inputs);
   table("action", "FLAPPY_POLICY_ACT", vectors.action, outputs);
-  text << "\n" << kEmbedded.at("selftest.h") << "\n" << kEmbedded.at("end.h") << "\n#endif\n";
+  text << "\n"
+       << kEmbedded.at("selftest.h") << "\n"
+       << kEmbedded.at("end.h") << "\n"
+       << end_of_header("POLICY", kind.numbers.crc());
   return text.str();
 }
 

@@ -372,8 +372,8 @@ TEST(ControllerHeader, CompilesWithoutAWarning) {
     for (const std::string compiler : {suffix == "c" ? "gcc" : "g++", suffix == "c" ? "clang" : "clang++"})
       for (const char* level : {"-O0", "-O3"}) {
         const io::Finished f = io::run({compiler, suffix == "c" ? "-std=c99" : "-std=c++17", level, "-Wall", "-Wextra",
-                                        "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror", "-c",
-                                        source, "-o", folder / "use.o"});
+                                        "-Wpedantic", "-Wconversion", "-Wfloat-equal", "-Wdouble-promotion", "-Wshadow",
+                                        "-Werror", "-c", source, "-o", folder / "use.o"});
         EXPECT_EQ(f.exit_code, 0) << compiler << level << f.err;
       }
   }
