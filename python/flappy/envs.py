@@ -7,6 +7,7 @@ names in `env.unwrapped.observation_names`.
 """
 
 import json
+import operator
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -28,6 +29,23 @@ Bools = NDArray[np.bool_]
 CAUSES = ("time_out", "contact", "not_finite", "out_of_bounds", "heading_late", "arrival_late")
 
 
+def _whole(name: str, value: Any, accepted: str) -> int:
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: is {value!r}; accepted: {accepted}") from None
+
+
+def _seed(seed: Any) -> int | None:
+    """A seed of 64 bits. Gymnasium's own have 128: what is larger is hashed."""
+    if seed is None:
+        return None
+    whole = _whole("seed", seed, "a whole number from 0, or None")
+    if whole < 0:
+        raise ValueError(f"seed: is {seed!r}; accepted: a whole number from 0, or None")
+    return whole if whole < 2**64 else int(np.random.SeedSequence(whole).generate_state(1, np.uint64)[0])
+
+
 def _core_of(
     config: str | Path,
     overrides: Sequence[str],
@@ -37,9 +55,11 @@ def _core_of(
     first: int,
     threads: int | None,
 ) -> _core.Environments:
-    own = [f"flight.first_flapper={first}"] if first else []
+    if isinstance(overrides, str):
+        raise TypeError(f"overrides: is {overrides!r}; accepted: a sequence of such, [{overrides!r}]")
+    own = [f"flight.first_flapper={_whole('first', first, 'a whole number')}"] if first else []
     if threads is not None:
-        own.append(f"flight.threads={threads}")
+        own.append(f"flight.threads={_whole('threads', threads, 'a whole number, or None')}")
     modes = {AutoresetMode.SAME_STEP: "same_step", AutoresetMode.NEXT_STEP: "next_step", AutoresetMode.DISABLED: "disabled"}
     return _core.Environments(Path(config), [*overrides, *own], count, modes[mode], copy)
 
@@ -128,6 +148,7 @@ class FlappyEnv(_Named, gymnasium.Env[Floats, Floats]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Starts episode 0 of `seed`, or the next episode; without a seed from the first on, that of the configuration."""
+        seed = _seed(seed)
         super().reset(seed=seed)
         self._trail.clear()
         return self._core.reset(seed)[0], {}
@@ -172,6 +193,7 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Any]):
         copy: True: arrays of each step are Python's, for as long as it wants them; their memory is used again after that. False: views,
             which the step after the next overwrites.
         threads: None: one for each processor, fewer where there are few environments.
+        max_episode_steps: ends an episode after so many steps, if the task's own `end.time_s` does not end it before.
 
     Arrays are NumPy's: observation float32 (num_envs, observations), reward float32 (num_envs,), terminated and truncated bool
     (num_envs,). They speak DLPack (`torch.from_dlpack(observation)`); actions may come from any producer of it. The interpreter is free
@@ -189,31 +211,61 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Any]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         copy: bool = True,
         threads: int | None = None,
+        max_episode_steps: int | None = None,
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode: is {render_mode!r}; accepted: None, 'rgb_array'")
         mode = AutoresetMode(autoreset_mode)
+        num_envs = _whole("num_envs", num_envs, "a whole number from 1 to 1000000")
         self.num_envs = num_envs
         self.autoreset_mode = mode  # as Gymnasium's own have it: TorchRL reads it
         self.render_mode = render_mode
         self.config, self.overrides = config, [*overrides]
         self._core = _core_of(config, overrides, num_envs, mode, copy, first, threads)
+        if max_episode_steps is not None:
+            steps = _whole("max_episode_steps", max_episode_steps, "a whole number from 1, or None")
+            if steps < 1:
+                raise ValueError(f"max_episode_steps: is {max_episode_steps!r}; accepted: a whole number from 1, or None")
+            if steps * self._core.step_s < self._core.longest_s:
+                shorter = [*overrides, f"task.end.time_s={(1 - 1e-6) * steps * self._core.step_s!r}"]
+                self._core.close()
+                self._core = _core_of(config, shorter, num_envs, mode, copy, first, threads)
         self._same_step = mode == AutoresetMode.SAME_STEP
         self.metadata = {"autoreset_mode": mode, "render_modes": ["rgb_array"], "render_fps": round(1 / self._core.step_s)}
         self.single_observation_space, self.single_action_space = _spaces(self._core)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Starts episode 0 of `seed` everywhere, or everywhere the next episode; `options["reset_mask"]`: only there."""
+    def _seed_of_all(self, seed: Any) -> int | None:
+        if not isinstance(seed, Sequence | np.ndarray):
+            return _seed(seed)
+        if len(seed) != self.num_envs:
+            raise ValueError(f"seed: is a list of {len(seed)}; accepted: a whole number, or one for each of {self.num_envs} environments")
+        if any((s is None) != (seed[0] is None) for s in seed):
+            raise ValueError(f"seed: is {list(seed)!r}; accepted: a list of whole numbers, or one of None")
+        seeds = [_seed(s) for s in seed]
+        if seeds[0] is None or seeds == list(range(seeds[0], seeds[0] + self.num_envs)):
+            return seeds[0]
+        return int(np.random.SeedSequence(seeds).generate_state(1, np.uint64)[0])
+
+    def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
+        """Starts episode 0 of `seed` everywhere, or everywhere the next episode; `options["reset_mask"]`: only there, bool (num_envs,).
+
+        A list of seeds, one for each environment, as Gymnasium's own vector environments take it, makes one seed of all: the same list, the same flights.
+        The list s, s + 1, s + 2, ... is the seed s.
+        """
+        seed = self._seed_of_all(seed)
         super().reset(seed=seed)
         mask = (options or {}).get("reset_mask")
         if mask is None:
             return self._core.reset(seed), {}
         if self.metadata["autoreset_mode"] != AutoresetMode.DISABLED or seed is not None:
             raise ValueError("reset_mask: accepted with autoreset_mode DISABLED and without a seed")
-        return self._core.reset_some(mask), {}
+        marked = np.asarray(mask)
+        if marked.dtype != np.bool_ or marked.shape != (self.num_envs,):
+            raise ValueError(f"reset_mask: is {marked.dtype} of shape {marked.shape}; accepted: bool of shape ({self.num_envs},)")
+        return self._core.reset_some(marked), {}
 
     def step(self, actions: Floats) -> tuple[Floats, Floats, Bools, Bools, dict[str, Any]]:
         """One action of each, float32 (num_envs, actions) in [-1, 1]."""

@@ -256,6 +256,8 @@ void bind_environments(nb::module_& m) {
       .def("close", &PyEnvironments::close)
       .def_prop_ro("count", [](const PyEnvironments& e) { return e.all().count(); })
       .def_prop_ro("step_s", [](const PyEnvironments& e) { return e.all().step_s(); })
+      .def_prop_ro("longest_s",
+                   [](const PyEnvironments& e) { return e.all().config().fleet.task.constants.limits.time_s; })
       .def_prop_ro("seed", [](const PyEnvironments& e) { return e.all().config().fleet.seed; })
       .def_prop_ro("task", [](const PyEnvironments& e) { return e.all().config().fleet.task.name; })
       .def_prop_ro("observed", [](const PyEnvironments& e) { return signals(e.all().observed()); })

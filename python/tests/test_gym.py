@@ -152,7 +152,7 @@ def hover() -> flappy.FlappyEnv:
         (lambda: flappy.FlappyEnv("fly/hover_direct.toml", render_mode="human"), ValueError, "accepted: None, 'rgb_array'"),
         (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=-1), Exception, "num_envs"),
         (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2, autoreset_mode="Never"), ValueError, "Never"),
-        (lambda: hover().reset(seed=-1), Exception, "Seed"),
+        (lambda: hover().reset(seed=-1), ValueError, "seed: is -1; accepted: a whole number from 0, or None"),
         (lambda: gymnasium.make("flappy/Hover-v0", overrides=["task.nothing=1"]), flappy.InputError, "nothing"),
     ],
 )
@@ -160,6 +160,53 @@ def test_refuses(call, error, said):
     with pytest.raises(error) as refused:
         call()
     assert said in str(refused.value)
+
+
+def test_seeds_as_gymnasium_draws_them():
+    envs = gymnasium.make_vec("flappy/Hover-v0", num_envs=2, overrides=BRIEF)
+    by = {name: envs.reset(seed=seed)[0] for name, seed in {"7": 7, "counted": [7, 8], "own": [7, 9], "again": np.array([7, 9]), "wide": 2**127 + 7}.items()}
+    assert np.array_equal(by["7"], by["counted"]) and np.array_equal(by["own"], by["again"])
+    assert not np.array_equal(by["7"], by["own"]) and not np.array_equal(by["7"], by["wide"])
+    assert np.array_equal(envs.reset(seed=2**127 + 7)[0], by["wide"])
+    assert envs.reset(seed=[None, None])[0].shape == by["7"].shape
+    env = gymnasium.make("flappy/Hover-v0", overrides=BRIEF)
+    env.reset()
+    env.reset(seed=env.unwrapped.np_random_seed)  # of 128 bits
+
+
+def test_episodes_are_shortened():
+    envs = gymnasium.make_vec("flappy/Hover-v0", num_envs=2, max_episode_steps=5)
+    envs.reset(seed=1)
+    ends = [bool(envs.step(np.zeros((2, 4), np.float32))[3].any()) for _ in range(10)]
+    assert ends == [False, False, False, False, True] * 2
+    assert gymnasium.make_vec("flappy/Hover-v0", num_envs=1, max_episode_steps=10**6).unwrapped.step_s > 0
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "said"),
+    [
+        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=4.0), TypeError, "num_envs: is 4.0; accepted: a whole number from 1 to 1000000"),
+        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2, overrides="a.b=1"), TypeError, "overrides: is 'a.b=1'; accepted: a sequence of such"),
+        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2, max_episode_steps=0), ValueError, "max_episode_steps: is 0; accepted: a whole number from 1, or None"),
+        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2).reset(seed=-1), ValueError, "seed: is -1; accepted: a whole number from 0, or None"),
+        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2).reset(seed=1.5), TypeError, "seed: is 1.5; accepted: a whole number from 0, or None"),
+        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2).reset(seed=[1]), ValueError, "seed: is a list of 1; accepted: a whole number, or one for each of 2"),
+    ],
+)
+def test_says_what_was_given_and_what_is_accepted(call, error, said):
+    with pytest.raises(error, match=said):
+        call()
+
+
+def test_a_mask_may_be_a_list():
+    envs = gymnasium.make_vec("flappy/Hover-v0", num_envs=2, autoreset_mode="Disabled", overrides=BRIEF)
+    envs.reset(seed=1)
+    listed = envs.reset(options={"reset_mask": [True, False]})[0].copy()
+    envs.reset(seed=1)
+    assert np.array_equal(envs.reset(options={"reset_mask": np.array([True, False])})[0], listed)
+    for wrong in ([True], [1, 0], [[True, False]]):
+        with pytest.raises(ValueError, match=r"reset_mask: is .*; accepted: bool of shape \(2,\)"):
+            envs.reset(options={"reset_mask": wrong})
 
 
 def test_gymnasium_finds_it_by_its_module():
