@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <type_traits>
 
 #include "io/files.hpp"
 
@@ -51,7 +52,12 @@ bool Option::given() const { return option_->count() > 0; }
 
 template <class T>
 Option Command::option(const std::string& name, T& value, const std::string& help) const {
-  return Option(app_->add_option(name, value, help));
+  CLI::Option* const option = app_->add_option(name, value, help);
+  if constexpr (std::is_unsigned_v<T>)  // which CLI11 takes -1 for, too
+    option->check([](const std::string& text) {
+      return text.find('-') == std::string::npos ? "" : "Value " + text + " is below 0";
+    });
+  return Option(option);
 }
 template Option Command::option(const std::string&, int&, const std::string&) const;
 template Option Command::option(const std::string&, unsigned&, const std::string&) const;

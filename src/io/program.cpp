@@ -22,7 +22,8 @@ constexpr std::array<const char*, 4> kLevels = {"debug", "info", "warning", "err
 std::string explained(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App* at = &app;
   while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
-  const std::vector<std::string> unknown = app.remaining(true);
+  std::vector<std::string> unknown = app.remaining(true);
+  std::erase(unknown, "--");  // what follows is no option
   if (std::string_view(error.what()).starts_with("A subcommand is required")) {
     std::vector<std::string> names;
     for (const CLI::App* each : at->get_subcommands([](const CLI::App* each) { return !each->get_group().empty(); }))

@@ -105,7 +105,7 @@ string(REPLACE "hold_s = 1e-3" "hold_s = 2.5e-4" fast "${fast}")
 file(WRITE ${WORK}/fast.toml "${fast}")
 run(simulate-forces --vehicle ${WORK}/fast.toml --out ${WORK}/out.csv)
 expect_match("stderr" "${err}" "fast.toml:[0-9:]+ driver.hold_s: physics goes by steps of 1e-04 s here; accepted: a multiple of that")
-expect_refused("flappy-identify: --seed: Value -1 not in range 0 to 9223372036854775807; see flappy-identify --help"
+expect_refused("flappy-identify: --seed: Value -1 is below 0; see flappy-identify --help"
   simulate-forces --vehicle ${identified} --out ${WORK}/out.csv --seed -1)
 
 expect_refused("${WORK}/gone.csv: cannot be read: No such file or directory"

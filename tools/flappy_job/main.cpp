@@ -46,6 +46,7 @@ int main(int argc, char** argv) {
   server::Command asked;
   std::string out;
   std::uint64_t watched = 0;
+  constexpr std::uint64_t kLastJob = 999'999'999;
   const io::Command submit = app.command("submit", "a new job; prints its number");
   submit.option("kind", asked.kind, "train, evaluate, export or diagnose").required();
   submit
@@ -55,16 +56,16 @@ int main(int argc, char** argv) {
   submit.option("--id", asked.id, "the same one twice is one job");
   const io::Command list = app.command("list", "all jobs, newest first");
   const io::Command watch = app.command("watch", "jobs as they change; one of them until it is over");
-  watch.option("job", watched, "its number");
+  watch.option("job", watched, "its number").range(std::uint64_t{1}, kLastJob);
   std::vector<std::pair<io::Command, const char*>> verbs;
   for (const auto& [verb, help] : {std::pair{"pause", "stops a job cleanly, to go on later"},
                                    std::pair{"resume", "goes on with a job that is paused or failed"},
                                    std::pair{"cancel", "ends a job for good"}}) {
     verbs.emplace_back(app.command(verb, help), verb);
-    verbs.back().first.option("job", asked.job, "its number").required();
+    verbs.back().first.option("job", asked.job, "its number").required().range(std::uint64_t{1}, kLastJob);
   }
   const io::Command fetch = app.command("fetch", "the files that a job left");
-  fetch.option("job", asked.job, "its number").required();
+  fetch.option("job", asked.job, "its number").required().range(std::uint64_t{1}, kLastJob);
   fetch.option("--out", out, "folder for them").required();
   app.expect_commands(1, 1);
 
