@@ -57,6 +57,8 @@ class SqliteBag : public Bag {
                                      (copy_ ? SQLITE_OPEN_READWRITE : SQLITE_OPEN_READONLY) | SQLITE_OPEN_URI, nullptr);
     database_.reset(database);
     if (code != SQLITE_OK) refuse();
+    // else SQLite refuses a file that is shorter than its header says; nothing is written
+    sqlite3_db_config(database, SQLITE_DBCONFIG_WRITABLE_SCHEMA, 1, nullptr);
     read_topics();
     // in the order of the file, so that one that was cut off is read up to there
     messages_ = prepare("SELECT topic_id, timestamp, data FROM messages");

@@ -515,6 +515,18 @@ TEST(Import, SaysWhySamplesAreUnusable) {
   EXPECT_EQ(out.report.warnings[0], "command: 3 samples are unusable: 1 lacks u, 1 no time, 1 u is no finite number");
 }
 
+TEST(Import, LeavesOutANumberThatNoLogMayHave) {
+  Lines rows;
+  for (int i = 0; i < 200; ++i) rows.push_back(io::shortest_digits(0.01 * i) + ",9,0.1,0.2,1,1,0,0,0");
+  rows[7] = "0.07,9,-3e22,0.2,1,1,0,0,0";
+  EXPECT_EQ(why(of_table(rows), 1), (std::map<std::string, std::size_t>{{"x_m is out of range", 1}}));
+  rows[8] = rows[9] = "0.08,9,-3e22,0.2,1,1,0,0,0";  // too often for flipped bits
+  const std::string line = test::refusal([&] { of_table(rows); });
+  EXPECT_TRUE(
+      line.ends_with("mocap.columns.x_m: reaches -3e+22: in another unit?; accepted: numbers from -1e+06 to 1e+06"))
+      << line;
+}
+
 TEST(Import, TakesRowsThatHaveNothingOfAStreamForOthers) {
   Lines rows = some_rows();
   for (std::size_t i = 0; i < rows.size(); i += 2) rows[i] = rows[i].substr(0, rows[i].find(',')) + ",9,,,,,,,";

@@ -66,6 +66,45 @@ TEST(Bag, TakesDefinitionsOfADatabaseThatHasThem) {
             (Lines{"/a std_msgs/msg/Header 20 1", "/b q/msg/Own int16 x10 2", "/c q/msg/Own int16 x12 1"}));
 }
 
+std::vector<std::string> files_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename().string());
+  std::ranges::sort(names);
+  return names;
+}
+
+TEST(Bag, LeavesNothingBesideADatabase) {
+  const io::TemporaryFolder folder;
+  write_database(folder / "x.db3", "PRAGMA journal_mode=WAL;" + kTables);
+  const Lines written = files_in(folder.path());
+  EXPECT_EQ(read(folder / "x.db3").size(), 3u);
+  EXPECT_EQ(files_in(folder.path()), written);
+  // what its writer has not brought into the file yet
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open((folder / "x.db3").c_str(), &database), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(database, "INSERT INTO messages(topic_id, timestamp, data) VALUES(1, 30, x'06')", nullptr,
+                         nullptr, nullptr),
+            SQLITE_OK);
+  const Lines open_files = files_in(folder.path());
+  EXPECT_EQ(open_files, (Lines{"x.db3", "x.db3-shm", "x.db3-wal"}));
+  EXPECT_EQ(read(folder / "x.db3").back(), "/a std_msgs/msg/Header 30 1");
+  EXPECT_EQ(files_in(folder.path()), open_files);
+  sqlite3_close(database);
+}
+
+TEST(Bag, ReadsADatabaseThatWasCutOff) {
+  const io::TemporaryFolder folder;
+  std::string many = kTables + "BEGIN;";
+  for (int i = 0; i < 4000; ++i)
+    many += "INSERT INTO messages(topic_id, timestamp, data) VALUES(1, " + std::to_string(100 + i) +
+            ", x'0102030405060708');";
+  write_database(folder / "x.db3", many + "COMMIT;");
+  fs::resize_file(folder / "x.db3", fs::file_size(folder / "x.db3") / 2);
+  const Lines some = read(folder / "x.db3");
+  EXPECT_GT(some.size(), 1500u);
+  EXPECT_TRUE(some.back().ends_with(": database disk image is malformed: read as far as it goes")) << some.back();
+}
+
 TEST(Bag, ReadsAFolderInTheOrderOfItsParts) {
   const io::TemporaryFolder folder;
   for (const int part : {10, 2, 0}) {
