@@ -38,7 +38,6 @@ void read_bag(const fs::path& file, Channels& channels, std::vector<std::string>
     auto found = readers.find(&topic);
     if (found == readers.end()) {
       found = readers.try_emplace(&topic).first;
-      channels.add(topic.name);
       if (channels.wants(topic.name)) try {
           found->second.rows.emplace(ros::layout_of(topic));
         } catch (const ros::MessageError& error) {
@@ -54,6 +53,7 @@ void read_bag(const fs::path& file, Channels& channels, std::vector<std::string>
       if (reader.bad++ == 0) reader.first_fault = error.what();
     }
   }
+  for (const std::string& topic : bag->topics()) channels.add(topic);
   for (const std::string& warning : bag->warnings()) warnings.push_back(warning);
   for (const auto& [topic, reader] : readers)
     if (reader.bad > 0)

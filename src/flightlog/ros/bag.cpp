@@ -39,6 +39,7 @@ class McapBag : public Bag {
     }
     return {};
   }
+  std::vector<std::string> topics() const override { return reader_.topics(); }
   std::vector<std::string> warnings() const override { return reader_.warnings(); }
 
  private:
@@ -81,6 +82,11 @@ class SqliteBag : public Bag {
       return BagMessage{&topic->second, sqlite3_column_int64(messages_.get(), 1), {data, size}};
     }
     return {};
+  }
+  std::vector<std::string> topics() const override {
+    std::vector<std::string> names;
+    for (const auto& [id, topic] : topics_) names.push_back(topic.name);
+    return names;
   }
   std::vector<std::string> warnings() const override { return warnings_; }
 
@@ -172,14 +178,17 @@ class SplitBag : public Bag {
       if (auto message = parts_[part_]->next()) return message;
     return {};
   }
-  std::vector<std::string> warnings() const override {
+  std::vector<std::string> topics() const override { return of_all(&Bag::topics); }
+  std::vector<std::string> warnings() const override { return of_all(&Bag::warnings); }
+
+ private:
+  std::vector<std::string> of_all(std::vector<std::string> (Bag::*list)() const) const {
     std::vector<std::string> all;
     for (const auto& part : parts_)
-      for (const std::string& warning : part->warnings()) all.push_back(warning);
+      for (const std::string& each : (*part.*list)()) all.push_back(each);
     return all;
   }
 
- private:
   std::vector<std::unique_ptr<Bag>> parts_;
   std::size_t part_ = 0;
 };

@@ -31,6 +31,8 @@ class Bag {
   virtual ~Bag() = default;
   /// Nothing at the end, or where what follows cannot be read.
   virtual std::optional<BagMessage> next() = 0;
+  /// Names of the topics that were announced so far, whether messages of them came or not.
+  virtual std::vector<std::string> topics() const = 0;
   /// What was left out so far.
   virtual std::vector<std::string> warnings() const = 0;
 

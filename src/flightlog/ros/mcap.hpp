@@ -91,6 +91,8 @@ class McapReader {
   /// `bytes` outlive the reader; `name` stands for the file in messages. InputError where this is no MCAP file.
   McapReader(std::string_view bytes, std::string name);
   std::optional<McapMessage> next();
+  /// Names of the channels that were announced so far.
+  std::vector<std::string> topics() const;
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:

@@ -68,6 +68,12 @@ void McapReader::read_summary() {
   }
 }
 
+std::vector<std::string> McapReader::topics() const {
+  std::vector<std::string> names;
+  for (const auto& [id, topic] : topics_) names.push_back(topic.name);
+  return names;
+}
+
 void McapReader::warn(const std::string& what) {
   if (warnings_.size() < kMostWarnings) warnings_.push_back(name_ + ": " + what);
   else if (warnings_.size() == kMostWarnings) warnings_.push_back(name_ + ": is damaged in more places");

@@ -51,6 +51,7 @@ TEST(Bag, ReadsADatabaseInItsOwnOrder) {
   const io::TemporaryFolder folder;
   write_database(folder / "x.db3", kTables);
   EXPECT_TRUE(Bag::is_bag(folder / "x.db3"));
+  EXPECT_EQ(Bag::open(folder / "x.db3")->topics(), (Lines{"/a", "/b", "/c"}));  // before any message is read
   EXPECT_EQ(read(folder / "x.db3"), (Lines{"/a std_msgs/msg/Header 20 1", "/b q/msg/Own 10 2", "/c q/msg/Own 12 1"}));
 }
 
