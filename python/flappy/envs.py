@@ -244,15 +244,18 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Any]):
             raise ValueError(f"seed: is a list of {len(seed)}; accepted: a whole number, or one for each of {self.num_envs} environments")
         if any((s is None) != (seed[0] is None) for s in seed):
             raise ValueError(f"seed: is {list(seed)!r}; accepted: a list of whole numbers, or one of None")
-        seeds = [_seed(s) for s in seed]
-        if seeds[0] is None or seeds == list(range(seeds[0], seeds[0] + self.num_envs)):
+        seeds = [s for s in map(_seed, seed) if s is not None]
+        if not seeds:
+            return None
+        if seeds == list(range(seeds[0], seeds[0] + self.num_envs)):
             return seeds[0]
         return int(np.random.SeedSequence(seeds).generate_state(1, np.uint64)[0])
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Starts episode 0 of `seed` everywhere, or everywhere the next episode; `options["reset_mask"]`: only there, bool (num_envs,).
 
-        A list of seeds, one for each environment, as Gymnasium's own vector environments take it, makes one seed of all: the same list, the same flights.
+        A list of seeds, one for each environment, as Gymnasium's own vector environments take it, makes one seed of all: the same
+        list, the same flights.
         The list s, s + 1, s + 2, ... is the seed s.
         """
         seed = self._seed_of_all(seed)

@@ -164,7 +164,10 @@ def test_refuses(call, error, said):
 
 def test_seeds_as_gymnasium_draws_them():
     envs = gymnasium.make_vec("flappy/Hover-v0", num_envs=2, overrides=BRIEF)
-    by = {name: envs.reset(seed=seed)[0] for name, seed in {"7": 7, "counted": [7, 8], "own": [7, 9], "again": np.array([7, 9]), "wide": 2**127 + 7}.items()}
+    by = {
+        name: envs.reset(seed=seed)[0]
+        for name, seed in {"7": 7, "counted": [7, 8], "own": [7, 9], "again": np.array([7, 9]), "wide": 2**127 + 7}.items()
+    }
     assert np.array_equal(by["7"], by["counted"]) and np.array_equal(by["own"], by["again"])
     assert not np.array_equal(by["7"], by["own"]) and not np.array_equal(by["7"], by["wide"])
     assert np.array_equal(envs.reset(seed=2**127 + 7)[0], by["wide"])
@@ -185,12 +188,36 @@ def test_episodes_are_shortened():
 @pytest.mark.parametrize(
     ("call", "error", "said"),
     [
-        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=4.0), TypeError, "num_envs: is 4.0; accepted: a whole number from 1 to 1000000"),
-        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2, overrides="a.b=1"), TypeError, "overrides: is 'a.b=1'; accepted: a sequence of such"),
-        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2, max_episode_steps=0), ValueError, "max_episode_steps: is 0; accepted: a whole number from 1, or None"),
-        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2).reset(seed=-1), ValueError, "seed: is -1; accepted: a whole number from 0, or None"),
-        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2).reset(seed=1.5), TypeError, "seed: is 1.5; accepted: a whole number from 0, or None"),
-        (lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2).reset(seed=[1]), ValueError, "seed: is a list of 1; accepted: a whole number, or one for each of 2"),
+        (
+            lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=4.0),
+            TypeError,
+            "num_envs: is 4.0; accepted: a whole number from 1 to 1000000",
+        ),
+        (
+            lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2, overrides="a.b=1"),
+            TypeError,
+            "overrides: is 'a.b=1'; accepted: a sequence of such",
+        ),
+        (
+            lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2, max_episode_steps=0),
+            ValueError,
+            "max_episode_steps: is 0; accepted: a whole number from 1, or None",
+        ),
+        (
+            lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2).reset(seed=-1),
+            ValueError,
+            "seed: is -1; accepted: a whole number from 0, or None",
+        ),
+        (
+            lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2).reset(seed=1.5),
+            TypeError,
+            "seed: is 1.5; accepted: a whole number from 0, or None",
+        ),
+        (
+            lambda: gymnasium.make_vec("flappy/Hover-v0", num_envs=2).reset(seed=[1]),
+            ValueError,
+            "seed: is a list of 1; accepted: a whole number, or one for each of 2",
+        ),
     ],
 )
 def test_says_what_was_given_and_what_is_accepted(call, error, said):
