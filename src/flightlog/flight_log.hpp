@@ -33,7 +33,7 @@ class Table;
 
 namespace flappy::flightlog {
 
-/// What programs do grows with the duration of a flight, so it has no gap that is longer in any stream, and no stream that is slower on the whole.
+/// Longest gap within a stream of a log, and lowest mean rate of a stream: the work of programs grows with a flight's duration, and so stays bounded.
 inline constexpr double kLongestGap_s = 600, kSlowest_Hz = 0.1;
 
 /// The largest magnitude that a log may have in a column, of any stream or of declared inputs.

@@ -80,7 +80,7 @@ std::string unit_for(double value, double least_s, double most_s) {
 void require_unit(const Channel& channel, const StreamMapping& s) {
   constexpr double kLatest_s = 4.1e9;                    // the year 2100
   constexpr double kLongest_s = 10, kShortest_s = 1e-6;  // between two samples, on the whole
-  constexpr double kTail = 0.05;                         // what may be wild at either end
+  constexpr double kTail = 0.05;                         // share of the times at either end that may be wrong
   std::vector<double> times = field_of(channel, s.table, "time_field", s.time_field);
   std::erase_if(times, [](double t) { return !std::isfinite(t); });
   if (times.size() < 2) return;
@@ -112,7 +112,7 @@ std::vector<std::int64_t> raw_times(const Channel& channel, const StreamMapping&
   return field_times(channel, s);
 }
 
-/// Of the rows that have both times.
+/// Stamp and time of receipt of each row that has both.
 std::vector<StampedReceipt> stamped_receipts(const Channel& channel, const StreamMapping& s) {
   std::vector<StampedReceipt> pairs;
   const std::vector<std::int64_t> stamps = raw_times(channel, s);
@@ -279,7 +279,7 @@ void turn_angles(Stream& s) {
   }
 }
 
-/// Of the quaternion; 1 where there is none.
+/// Length of the sample's quaternion; 1 where the stream has none.
 double length_of_rotation(const Stream& s, std::size_t i) {
   if (!s.columns.contains("qw")) return 1;
   double square = 0;
@@ -597,7 +597,7 @@ Imported import_recording(const std::vector<std::filesystem::path>& files, const
   }
   for (const std::string& warning : imported.report.warnings)
     warnings.push_back(mapping.file.string() + ": " + warning);
-  for (std::string& warning : warnings) warning = io::printable(warning);  // of whatever bytes, fit for JSON
+  for (std::string& warning : warnings) warning = io::printable(warning);  // JSON holds UTF-8 alone
   log_warnings();
   imported.report.warnings = std::move(warnings);
   write_flight_log(out, imported.log);

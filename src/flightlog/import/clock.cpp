@@ -31,7 +31,7 @@ std::vector<Point> lower_hull(const std::vector<Point>& points) {
 
 TimeRange main_range(std::vector<std::int64_t> times_ns) {
   constexpr auto kApart_ns = static_cast<std::uint64_t>(1e9 * kLongestGap_s);
-  // of any two numbers, in order
+  // unsigned, for the difference of two times may exceed 63 bits
   const auto apart = [](std::int64_t a, std::int64_t b) {
     return static_cast<std::uint64_t>(b) - static_cast<std::uint64_t>(a);
   };

@@ -74,7 +74,7 @@ const OtherKind kOtherKinds[] = {
      0,
      {".mcap"},
      "a bag compressed by gzip",
-     "gunzip FILE"},  // what is not compressed was read before
+     "gunzip FILE"},  // Bag::open has taken those that are not compressed
     {"SQLite format 3\0"sv, 0, {".db3"}, "a bag compressed by gzip", "gunzip FILE"},
     {"#ROSBAG V"sv, 0, {".bag"}, "a bag of ROS 1", "rosbags-convert --src FILE --dst FOLDER"},
     {"\x28\xB5\x2F\xFD"sv, 0, {".zst", ".zstd"}, "compressed by zstd", "zstd -d FILE"},
@@ -120,7 +120,7 @@ void require_text(const fs::path& file, const std::string& ending, std::string_v
     throw io::InputError(file.string() + ": holds bytes that are no text; accepted: " + std::string(kAccepted));
 }
 
-/// What stands in a file that is no bag; `plain` is its name without ".gz".
+/// Reads the bytes of a file that is no bag, as a ULog or a table; `plain` is its name without ".gz".
 void read_bytes(const fs::path& file, const fs::path& plain, std::string_view bytes, Channels& channels,
                 std::vector<std::string>& warnings) {
   if (is_ulog(bytes)) return read_ulog(bytes, file.string(), channels, warnings);

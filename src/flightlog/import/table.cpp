@@ -102,7 +102,7 @@ std::string_view uncommented(std::string_view line) {
   return line;
 }
 
-/// What separates the cells of a line: the one of comma, semicolon and tab that it has most, or else blanks.
+/// The separator of a line's cells: whichever of comma, semicolon and tab is most frequent outside quotes, or else the blank.
 char separator_of(std::string_view line) {
   std::array<std::size_t, 3> counts = {};
   constexpr std::string_view kSeparators = ",;\t";
@@ -215,7 +215,7 @@ class TableReader {
     constexpr std::size_t kMaxLinesOfARow = 50;
     RowSplitter splitter(header_.separator);
     Lines lines(text_);
-    std::vector<Line> row;  // of one row: more than one where a cell in quotes has line ends
+    std::vector<Line> row;  // lines of the row being read: several where a quoted cell has line ends
     for (auto line = lines.next(); line; line = lines.next()) {
       if (line->number <= header_.line || is_blank(line->text)) continue;
       if (row.empty() && is_comment(line->text)) {
@@ -289,7 +289,7 @@ class TableReader {
   std::string name_, channel_;
   Channels& channels_;
   Header header_;
-  Row row_;                           ///< what is wanted
+  Row row_;                           ///< the wanted cells of one row
   std::vector<std::size_t> columns_;  ///< where each of it stands
   std::size_t named_ = 0;             ///< columns up to the last that has a name
   std::size_t rows_ = 0;

@@ -232,6 +232,11 @@ TEST(Import, GivesBackALogThatPx4Wrote) {
 
 constexpr std::int64_t kMs = 1'000'000;
 
+Row imu_row(double gyro_x = 1) {
+  return {{"angular_velocity.x", gyro_x}, {"angular_velocity.y", 2},    {"angular_velocity.z", 3},
+          {"linear_acceleration.x", 4},   {"linear_acceleration.y", 5}, {"linear_acceleration.z", 6}};
+}
+
 /// Two seconds of the three streams that a log needs, by one clock, each received a millisecond later by a clock that is `ahead_ns` of it.
 struct Robot {
   std::int64_t ahead_ns = 0;
@@ -261,15 +266,7 @@ struct Robot {
          {"pose.orientation.y", 0},
          {"pose.orientation.z", 0}});
   }
-  void imu(int i, double gyro_x = 1) {
-    add("/imu", 1000 * kMs + i * 10 * kMs, 0,
-        {{"angular_velocity.x", gyro_x},
-         {"angular_velocity.y", 2},
-         {"angular_velocity.z", 3},
-         {"linear_acceleration.x", 4},
-         {"linear_acceleration.y", 5},
-         {"linear_acceleration.z", 6}});
-  }
+  void imu(int i, double gyro_x = 1) { add("/imu", 1000 * kMs + i * 10 * kMs, 0, imu_row(gyro_x)); }
   void fill() {
     for (int i = 0; i < 200; ++i) command(i), pose(i), imu(i);
   }
@@ -403,13 +400,7 @@ TEST(Import, LeavesOutTimesApartFromTheRecording) {
   for (const std::int64_t wild_ns : {std::int64_t{0}, std::int64_t{-5}, std::int64_t{3'000'000'000'000'000'000}}) {
     Robot robot{1'700'000'000'000 * kMs, Channels()};
     robot.command(0);
-    robot.channels.add("/imu", wild_ns, wild_ns,
-                       {{"angular_velocity.x", 1},
-                        {"angular_velocity.y", 2},
-                        {"angular_velocity.z", 3},
-                        {"linear_acceleration.x", 4},
-                        {"linear_acceleration.y", 5},
-                        {"linear_acceleration.z", 6}});
+    robot.channels.add("/imu", wild_ns, wild_ns, imu_row());
     robot.fill();
     for (const char* time : {"stamp", "received"}) {
       if (std::string(time) == "stamp" && wild_ns < kMs) continue;  // the robot's own clock began just before
@@ -429,13 +420,7 @@ TEST(Import, LeavesOutTimesApartFromTheRecording) {
 TEST(Import, MeasuresAClockInSpiteOfAWildTimeOfReceipt) {
   Robot robot{5'000 * kMs, Channels()};
   robot.fill();
-  robot.add("/imu", 1995 * kMs, -7'000'000'000 * kMs,
-            {{"angular_velocity.x", 1},
-             {"angular_velocity.y", 2},
-             {"angular_velocity.z", 3},
-             {"linear_acceleration.x", 4},
-             {"linear_acceleration.y", 5},
-             {"linear_acceleration.z", 6}});
+  robot.add("/imu", 1995 * kMs, -7'000'000'000 * kMs, imu_row());
   const Imported out = assemble(robot.channels, mapping_of("ros2.toml"));
   EXPECT_NEAR(out.report.clocks[0].offset_s, 5.001, 1e-6);
   EXPECT_EQ(out.log.imu.t_s.size(), 201u);  // its stamp is right
@@ -446,13 +431,7 @@ TEST(Import, RefusesAStreamOfAnotherTime) {
   Robot robot;
   for (int i = 0; i < 200; ++i) {
     robot.command(i), robot.pose(i);
-    robot.channels.add("/imu", 0, 1'700'000'000'000 * kMs + i * 10 * kMs,
-                       {{"angular_velocity.x", 1},
-                        {"angular_velocity.y", 2},
-                        {"angular_velocity.z", 3},
-                        {"linear_acceleration.x", 4},
-                        {"linear_acceleration.y", 5},
-                        {"linear_acceleration.z", 6}});
+    robot.channels.add("/imu", 0, 1'700'000'000'000 * kMs + i * 10 * kMs, imu_row());
   }
   const std::string line =
       test::refusal([&] { assemble(robot.channels, mapping_of("ros2.toml", {"clocks.robot.offset_s=0"})); });
