@@ -43,12 +43,12 @@ nb::object diagnose(const std::filesystem::path& vehicle, const std::vector<std:
                     const std::string& out, const std::vector<std::string>& withheld, const std::string& manoeuvre,
                     int threads) {
   gap::DiagnoseCommand command;
-  command.vehicle = found(vehicle);
-  command.flights = flights;
+  command.settings.vehicle = found(vehicle);
+  command.settings.flights = flights;
   command.out = out;
-  command.withheld = withheld;
-  if (!manoeuvre.empty()) command.manoeuvre = found(manoeuvre);
-  command.threads = threads;
+  command.settings.withheld = withheld;
+  if (!manoeuvre.empty()) command.settings.manoeuvre = found(manoeuvre);
+  command.settings.threads = threads;
   command.quiet = true;
   nlohmann::ordered_json json;
   bool stopped = false;

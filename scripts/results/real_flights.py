@@ -92,7 +92,7 @@ def base_of(corrected, entry, parameters):
 
 
 def first_named(d):
-    effects = [c for c in d["candidates"] if c["effects"]]
+    effects = [c for c in d["hypotheses"] if c["effects"]]
     return effects[0]["effects"][0] if effects else ""
 
 
@@ -111,7 +111,7 @@ def withheld(flights, corrected, sets):
             d, _, _ = diagnose(name, folder / "vehicle.toml", chosen, *common)
             u, _, _ = diagnose(name + "_without", folder / "vehicle.toml", chosen, *common, "--withhold", entry, *form)
             named = d["verdict"]["effects"]
-            sizes = next((c["parameters"] for c in d["candidates"] if entry in c["effects"]), {})
+            sizes = next((c["parameters"] for c in d["hypotheses"] if entry in c["effects"]), {})
             rows.append({"what": what, "channel": channel, "entry": entry, "whole": len(subset) == len(flights),
                          "first": first_named(d), "right": first_named(d) in [entry, *also], "named": named,
                          "kind": d["verdict"]["kind"], "probability": d["verdict"]["probability"],

@@ -20,7 +20,7 @@ using gap::ScoredHypothesis;
 using gap::VerdictRule;
 
 /// An answer is never taken for less probable, so that no single case decides.
-constexpr double kLeast = 1e-3;
+constexpr double kMinProbability = 1e-3;
 
 /// What may be chosen: where it stands in the file, its range, and whether it is sought on a logarithmic scale.
 struct Constant {
@@ -32,8 +32,8 @@ struct Constant {
 
 const std::array<Constant, 7>& constants() {
   static const std::array<Constant, 7> kAll = {{
-      {"doubt", "nats", [](VerdictRule& r) -> double& { return r.doubt.nats; }, 0.1, 100, true},
-      {"doubt", "freedom", [](VerdictRule& r) -> double& { return r.doubt.freedom; }, 0.3, 30, true},
+      {"doubt", "nats", [](VerdictRule& r) -> double& { return r.tempering.nats; }, 0.1, 100, true},
+      {"doubt", "freedom", [](VerdictRule& r) -> double& { return r.tempering.freedom; }, 0.3, 30, true},
       {"gain", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.by_chance_nats; }, 0, 300, false},
       {"gain.outside", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.outside_by_chance_nats; }, 0,
        300, false},
@@ -51,16 +51,9 @@ struct Case {
   std::size_t part = 0;
 };
 
-ScoredHypothesis::Kind kind_from(const std::string& name) {
-  using Kind = ScoredHypothesis::Kind;
-  for (const Kind k : {Kind::none, Kind::parameters, Kind::effect, Kind::unknown})
-    if (name == kind_name(k)) return k;
-  throw io::InputError("prediction: no kind \"" + name + "\"; accepted: none, parameters, effect, unknown");
-}
-
-/// What was thought of a hypothesis beforehand, under another rule.
+/// Change of the log prior of a hypothesis from one rule to another.
 double moved_prior(const ScoredHypothesis& a, const VerdictRule& from, const VerdictRule& to) {
-  using Kind = ScoredHypothesis::Kind;
+  using Kind = gap::HypothesisKind;
   const auto move = [](double before, double now) { return std::log(now / before); };
   switch (a.kind) {
     case Kind::none:
@@ -71,7 +64,7 @@ double moved_prior(const ScoredHypothesis& a, const VerdictRule& from, const Ver
       return move(from.prior.unknown, to.prior.unknown);
     case Kind::effect:
       return move(from.prior.effect, to.prior.effect) +
-             (a.terms.empty() ? 0 : move(from.prior.remainder, to.prior.remainder));
+             (!a.has_remainder() ? 0 : move(from.prior.remainder, to.prior.remainder));
   }
   return 0;
 }
@@ -92,15 +85,15 @@ class Calibration {
         truths[l.planned.number] = l.truth();
       }
       for (const PublicCase& c : manifest.cases) {
-        const Prediction p = prediction_from(read_json(prediction_file(folder, c.number)));
+        const Prediction p = read_prediction(prediction_file(folder, c.number));
         Case own{.truth = truths.at(c.number)};
-        for (const Weight& w : p.weights) {
+        for (const gap::RankedHypothesis& h : p.diagnosis.hypotheses) {
           ScoredHypothesis a;
-          a.kind = kind_from(w.kind);
-          a.effects = w.effects;
-          a.log_evidence = w.log_evidence;
-          a.log_prior = w.log_prior;
-          if (w.remainder) a.terms.emplace_back();
+          a.kind = h.kind;
+          a.effects = h.effects;
+          a.log_evidence = h.log_evidence;
+          a.log_prior = h.log_prior;
+          if (h.remainder) a.unexplained.emplace_back();
           own.hypotheses.push_back(std::move(a));
         }
         if (own.hypotheses.empty()) continue;  // its data were at fault
@@ -129,8 +122,8 @@ class Calibration {
       set_probabilities(all, rule);
       double probability = 0;
       for (const ScoredHypothesis& a : all)
-        if (right(c.truth, {.kind = kind_name(a.kind), .effects = a.effects})) probability += a.probability;
-      sum += c.weight * std::log(kLeast + (1 - kLeast) * probability);
+        if (right(c.truth, {.kind = name_of(a.kind), .effects = a.effects})) probability += a.probability;
+      sum += c.weight * std::log(kMinProbability + (1 - kMinProbability) * probability);
     }
     return sum;
   }

@@ -4,17 +4,12 @@
 #include <set>
 
 #include "benchmark/families.hpp"
+#include "gap/result/diagnosis_json.hpp"
 #include "io/schema.hpp"
 #include "io/sha256.hpp"
 
 namespace flappy::benchmark {
 namespace {
-
-Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
-
-std::optional<double> optional_from(const Json& json) {
-  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
-}
 
 using Names = std::vector<std::string>;
 
@@ -160,65 +155,26 @@ Label label_from(const Json& json) {
 }
 
 Json to_json(const Prediction& p) {
-  Json sets = Json::array(), weights = Json::array(), baselines = Json::object();
-  for (const Weight& w : p.weights)
-    weights.push_back({{"kind", w.kind},
-                       {"effects", w.effects},
-                       {"remainder", w.remainder},
-                       {"log_evidence", w.log_evidence},
-                       {"log_prior", w.log_prior}});
-  for (const FittedSet& s : p.sets) {
-    Json values = Json::object();
-    for (const auto& [name, e] : s.values) values[name] = {{"value", e.value}, {"low", e.low}, {"high", e.high}};
-    sets.push_back({{"effects", s.effects},
-                    {"probability", s.probability},
-                    {"parameters", values},
-                    {"left", optional(s.left)},
-                    {"gain_sd", s.gain_sd}});
-  }
+  Json baselines = Json::object();
   for (const auto& [name, b] : p.baselines) baselines[name] = {{"named", b.named}, {"ranking", b.ranking}};
-  return {{"verdict", {{"kind", p.kind}, {"effects", p.effects}, {"probability", p.probability}}},
-          {"candidates", sets},
-          {"none", p.none},
-          {"parameters", p.parameters},
-          {"unknown", p.unknown},
-          {"weights", weights},
-          {"gap", {{"nominal", optional(p.nominal)}, {"refit", optional(p.refit)}, {"noise_floor", optional(p.floor)}}},
-          {"manoeuvre", p.manoeuvre},
-          {"where", p.where ? Json{{"channel", p.where->channel}, {"regime", p.where->regime}} : Json(nullptr)},
+  return {{"diagnosis", to_json(p.diagnosis)},
           {"baselines", baselines},
           {"features", p.features},
-          {"corrected", p.corrected}};
+          {"corrected", p.corrected},
+          {"crashed", p.crashed}};
 }
 
-Prediction prediction_from(const Json& json) {
+Prediction read_prediction(const std::filesystem::path& file) {
+  const Json json = read_json(file);
+  if (!json.contains("diagnosis"))
+    throw io::InputError(file.string() + ": has no diagnosis; accepted: what this flappy-blind score wrote");
   Prediction p;
-  const Json& verdict = json.at("verdict");
-  p.kind = verdict.at("kind");
-  p.effects = verdict.at("effects").get<Names>();
-  p.probability = verdict.at("probability");
-  for (const Json& c : json.at("candidates")) {
-    FittedSet s{c.at("effects").get<Names>(), c.at("probability"), {}, optional_from(c.at("left")), c.at("gain_sd")};
-    for (const auto& [name, e] : c.at("parameters").items())
-      s.values[name] = {e.at("value"), e.at("low"), e.at("high")};
-    p.sets.push_back(std::move(s));
-  }
-  p.none = json.at("none");
-  p.parameters = json.at("parameters");
-  p.unknown = json.at("unknown");
-  for (const Json& w : json.at("weights"))
-    p.weights.push_back(
-        {w.at("kind"), w.at("effects").get<Names>(), w.at("remainder"), w.at("log_evidence"), w.at("log_prior")});
-  const Json& gap = json.at("gap");
-  p.nominal = optional_from(gap.at("nominal"));
-  p.refit = optional_from(gap.at("refit"));
-  p.floor = optional_from(gap.at("noise_floor"));
-  p.manoeuvre = json.value("manoeuvre", "");  // those of old had none
-  if (const Json& w = json.at("where"); !w.is_null()) p.where = {w.at("channel"), w.at("regime")};
+  p.diagnosis = gap::diagnosis_from(json.at("diagnosis"), file);
   for (const auto& [name, b] : json.at("baselines").items())
     p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
   p.features = json.at("features").get<std::vector<double>>();
-  p.corrected = json.value("corrected", "");  // nor this
+  p.corrected = json.at("corrected");
+  p.crashed = json.at("crashed");
   return p;
 }
 

@@ -60,6 +60,7 @@ Json to_json(const Label& label);
 Label label_from(const Json& json);
 
 Json to_json(const Prediction& prediction);
-Prediction prediction_from(const Json& json);
+/// InputError where the file holds none.
+Prediction read_prediction(const std::filesystem::path& file);
 
 }  // namespace flappy::benchmark

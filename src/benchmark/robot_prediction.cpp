@@ -111,7 +111,7 @@ class Carrier {
 
 gap::Rows predict_perturbed(const gap::PredictedFlight& recorded, const Perturbation& perturbation,
                             std::uint64_t flight) {
-  const gap::Recording& r = recorded.recording();
+  const gap::Recording& r = *recorded.recording();
   const std::vector<double> samples = Carrier(r, perturbation, flight).fly();
   if (samples.empty()) return {};
   const gap::BeatProjection projection(r.beat, r.valid, r.beats,
@@ -128,12 +128,12 @@ gap::Rows predict_perturbed(const gap::PredictedFlight& recorded, const Perturba
   return rows;
 }
 
-std::vector<gap::Residuals> predict_perturbed_flights(const std::vector<gap::PredictedFlight>& flights,
+std::vector<gap::Residuals> predict_perturbed_flights(const gap::Flights& flights,
                                                       const std::vector<Perturbation>& perturbations, int threads) {
   std::vector<gap::Residuals> result(perturbations.size(), gap::Residuals(flights.size()));
   io::parallel_for(perturbations.size() * flights.size(), threads, [&](std::size_t job) {
     const std::size_t perturbation = job / flights.size(), flight = job % flights.size();
-    result[perturbation][flight] = predict_perturbed(flights[flight], perturbations[perturbation], flight);
+    result[perturbation][flight] = predict_perturbed(*flights[flight], perturbations[perturbation], flight);
   });
   for (gap::Residuals& s : result)
     if (std::ranges::any_of(s, [](const gap::Rows& rows) { return rows.empty(); })) s.clear();

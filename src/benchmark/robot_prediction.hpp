@@ -24,7 +24,7 @@ gap::Rows predict_perturbed(const gap::PredictedFlight& recorded, const Perturba
 
 /// All flights under all perturbations: [perturbation][flight]; empty residuals for those that come apart. The same for any number of
 /// threads; 0: one for each processor.
-std::vector<gap::Residuals> predict_perturbed_flights(const std::vector<gap::PredictedFlight>& flights,
+std::vector<gap::Residuals> predict_perturbed_flights(const gap::Flights& flights,
                                                       const std::vector<Perturbation>& perturbations, int threads);
 
 }  // namespace flappy::benchmark

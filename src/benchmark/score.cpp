@@ -30,7 +30,7 @@ bool holds(const Names& all, const Names& some) {
 
 /// Says which effects there are: these alone, or these and something more.
 bool names_set(const std::string& kind) { return kind == "effect" || kind == "remainder"; }
-bool names_effects(const Prediction& p) { return names_set(p.kind) || p.kind == "group"; }
+bool names_effects(const Answer& p) { return names_set(p.kind) || p.kind == "group"; }
 
 bool group_holds(const ScoredCase& c) {
   return c.prediction.kind == "group" && holds(c.prediction.effects, c.truth.effects);
@@ -48,7 +48,7 @@ bool right_group(const ScoredCase& c) {
 
 /// Whether the truth is one of the three most probable answers.
 bool among_three(const ScoredCase& c) {
-  const Prediction& p = c.prediction;
+  const Answer& p = c.prediction;
   if (group_holds(c) || (p.kind == "remainder" && named_alone(c))) return true;
   for (const FittedSet& s : p.sets) {
     if (!same(s.effects, c.truth.effects)) continue;
@@ -62,7 +62,7 @@ bool among_three(const ScoredCase& c) {
 
 bool false_alarm(const ScoredCase& c) { return c.prediction.kind != "none" && c.prediction.kind != "parameters"; }
 
-const FittedSet* fitted(const Prediction& p, const Names& effects) {
+const FittedSet* fitted(const Answer& p, const Names& effects) {
   for (const FittedSet& s : p.sets)
     if (same(s.effects, effects)) return &s;
   return nullptr;
@@ -82,7 +82,7 @@ void count_covered(const ScoredCase& c, std::size_t& covered, std::size_t& all) 
 }
 
 /// What a verdict says is at work; of a group, its most probable member.
-Names at_work(const Prediction& p) {
+Names at_work(const Answer& p) {
   if (names_set(p.kind)) return p.effects;
   if (p.kind != "group") return {};
   const auto most = std::ranges::find_if(p.sets, [&](const FittedSet& s) { return holds(p.effects, s.effects); });
@@ -202,7 +202,7 @@ ScoreLine first_line(const char* key, const char* what, double must, double aim,
 
 /// Each case with the one of `singles` whose robot it is, where both drew the same.
 ScoreLine redeclared_line(const Cases& cases, const Cases& singles) {
-  std::map<std::pair<std::uint64_t, std::uint64_t>, const Prediction*> by_robot;
+  std::map<std::pair<std::uint64_t, std::uint64_t>, const Answer*> by_robot;
   for (const ScoredCase* c : singles) by_robot[{c->truth.seed, c->truth.draw}] = &c->prediction;
   std::size_t unchanged = 0, count = 0;
   for (const ScoredCase* c : cases) {
@@ -222,7 +222,7 @@ bool described(const ScoredCase& c) {
 }
 
 bool next_brings_truth(const ScoredCase& c) {
-  const std::optional<Prediction>& v = c.after_next;
+  const std::optional<Answer>& v = c.after_next;
   return v && names_set(v->kind) && same(v->effects, c.truth.effects);
 }
 
@@ -261,7 +261,38 @@ std::map<std::string, std::vector<std::string>> unbeaten_lines(const std::vector
 
 }  // namespace
 
-bool right(const CaseTruth& t, const Prediction& p) {
+Answer answer_of(const Prediction& p) {
+  const gap::Diagnosis& d = p.diagnosis;
+  Answer a;
+  a.kind = p.crashed ? "crashed" : d.verdict.remainder ? "remainder" : name_of(d.verdict.kind);
+  a.effects = d.verdict.effects;
+  a.probability = d.verdict.probability;
+  a.nominal = d.nominal_loss;
+  a.refit = d.refit_loss;
+  if (d.refit_loss) a.floor = d.noise_floor;
+  if (!d.unexplained.empty()) a.where = Where{d.unexplained.front().channel, d.unexplained.front().regime};
+  if (d.next) a.manoeuvre = d.next->manoeuvre;
+  a.baselines = p.baselines;
+  a.features = p.features;
+  for (const gap::RankedHypothesis& h : d.hypotheses) {
+    if (h.kind == gap::HypothesisKind::none) a.none = h.probability;
+    if (h.kind == gap::HypothesisKind::parameters) a.parameters = h.probability;
+    if (h.kind == gap::HypothesisKind::unknown) a.unknown = h.probability;
+    if (h.kind != gap::HypothesisKind::effect) continue;
+    if (const auto same = std::ranges::find(a.sets, h.effects, &FittedSet::effects); same != a.sets.end()) {
+      same->probability += h.probability;  // with a remainder
+      continue;
+    }
+    FittedSet set{h.effects, h.probability, {}, h.loss, h.loss_gain_sd};
+    for (const gap::Estimate& e : h.parameters) set.values[e.name] = {e.value, e.low, e.high};
+    a.sets.push_back(std::move(set));
+  }
+  return a;
+}
+
+bool abstains(const Answer& a) { return a.kind == "group" || a.probability < 0.5; }
+
+bool right(const CaseTruth& t, const Answer& p) {
   if (t.part == "none" || t.part == "conventions") return p.kind == "none" || p.kind == "parameters";
   if (t.part == "parameters" || t.part == "own_figures") return p.kind == "parameters";
   if (t.part == "withheld" || t.part == "outside") return p.kind == "unknown";

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,13 +34,49 @@ inline constexpr const char* kParts[] = {"singles",  "singles_current", "redecla
                                          "none",     "parameters",      "own_figures", "conventions",
                                          "withheld", "outside",         "pairs",       "hover"};
 
+/// A parameter of an effect with its 90 % interval.
+struct ScoredParameter {
+  double value = 0, low = 0, high = 0;
+};
+
+/// A set of effects that was weighed, with or without a remainder.
+struct FittedSet {
+  std::vector<std::string> effects;
+  double probability = 0;
+  std::map<std::string, ScoredParameter> values;  ///< by "effect.parameter"
+  std::optional<double> left;                     ///< mean loss in flights held out
+  double gain_sd = 0;                             ///< standard deviation of its gain over the parameters alone
+};
+
+/// Where an unknown cause acts, in the words of blind::FamilyEffect.
+struct Where {
+  std::string channel, regime;
+};
+
+/// A prediction as it is scored.
+struct Answer {
+  /// Of the verdict; "remainder": effects and something unknown; "crashed": there was no flight to diagnose.
+  std::string kind = "data";
+  std::vector<std::string> effects;  ///< of a group the rivals
+  double probability = 0;            ///< of the verdict
+  std::vector<FittedSet> sets;       ///< the most probable first
+  double none = 0, parameters = 0, unknown = 0;
+  std::optional<double> nominal, refit, floor;  ///< losses
+  std::map<std::string, Baseline> baselines;    ///< by kBaselines
+  std::vector<double> features;
+  std::string manoeuvre;  ///< proposed by a verdict that abstains; or none
+  std::optional<Where> where;
+};
+Answer answer_of(const Prediction& prediction);
+bool abstains(const Answer& answer);
+
 struct ScoredCase {
   CaseTruth truth;
-  Prediction prediction;
+  Answer prediction;
   /// With the true effect alone in the catalogue, where `prediction` has not fitted it.
-  std::optional<Prediction> true_fit;
-  /// Of the flights, and of the one that `prediction` proposed, flown.
-  std::optional<Prediction> after_next;
+  std::optional<Answer> true_fit;
+  /// Of the flights, and of the one that `prediction` proposed.
+  std::optional<Answer> after_next;
 };
 
 /// One line of the table.
@@ -60,7 +97,7 @@ struct Scores {
 Scores score(const std::vector<ScoredCase>& cases);
 
 /// Whether the verdict is what it should be.
-bool right(const CaseTruth& truth, const Prediction& prediction);
+bool right(const CaseTruth& truth, const Answer& prediction);
 
 /// Share of the closable gap that the verdict closes: (E_refit - E_named) / (E_refit - E_true effect refitted); 0 for a
 /// verdict without effects; nothing where the true effect's own gain is below two of its sd.

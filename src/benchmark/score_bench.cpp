@@ -115,7 +115,7 @@ struct Bench {
       labels.emplace(l.planned.number, std::move(l));
     }
     for (const PublicCase& c : manifest.cases)
-      cases.push_back({labels.at(c.number).truth(), prediction_from(predictions.read(c.number)), {}});
+      cases.push_back({labels.at(c.number).truth(), answer_of(read_prediction(prediction_file(folder, c.number))), {}});
   }
 
   fs::path folder;
@@ -149,7 +149,7 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
       });
   if (!all) return false;
   for (std::size_t i = 0; i < bench.cases.size(); ++i)
-    if (needs_true_fit(bench.cases[i])) bench.cases[i].true_fit = prediction_from(read_json(file_of(i)));
+    if (needs_true_fit(bench.cases[i])) bench.cases[i].true_fit = answer_of(read_prediction(file_of(i)));
   return true;
 }
 
@@ -182,8 +182,8 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
         a.proposed = &flight;
         const blind::FamilyFlight flown = family_named(bench.manifest.family).fly(a, kProposedFlight);
         Prediction p;
-        p.kind = "crashed";
         if (flown.crashed) {
+          p.crashed = true;
           std::printf("case %zu in %s: %s\n", c.number, name.c_str(), flown.how.c_str());
         } else {
           q.flights.push_back(bench.folder / "proposed" / number_text(c.number));
@@ -193,7 +193,7 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
         io::write_atomically(file_of(open[k]), to_json(p).dump(1) + "\n");
       });
   if (!all) return false;
-  for (const std::size_t i : proposed) bench.cases[i].after_next = prediction_from(read_json(file_of(i)));
+  for (const std::size_t i : proposed) bench.cases[i].after_next = answer_of(read_prediction(file_of(i)));
   return true;
 }
 
@@ -277,7 +277,7 @@ std::string case_lines(const Bench& bench) {
   std::string text;
   for (std::size_t i = 0; i < bench.cases.size(); ++i) {
     const ScoredCase& c = bench.cases[i];
-    const Prediction& p = c.prediction;
+    const Answer& p = c.prediction;
     const Label& label = bench.labels.at(bench.manifest.cases[i].number);
     const std::size_t number = label.planned.number;
     const Json prediction = bench.predictions.read(number);

@@ -9,6 +9,7 @@
 #include "flappy/vehicle.hpp"
 #include "gap/evidence/fit.hpp"
 #include "gap/evidence/hypothesis.hpp"
+#include "gap/replay/reset_prediction.hpp"
 #include "io/parallel.hpp"
 
 namespace flappy::benchmark {
@@ -25,7 +26,7 @@ constexpr double kParameterReach = 0.5;
 /// How well a header says when a sample of the IMU was taken (gap/hypothesis.cpp), in steps of the record.
 constexpr int kLagSteps = 1;
 /// An entry that leaves more of an effect is nothing like it.
-constexpr double kMostMisfit = 0.5;
+constexpr double kMaxMisfit = 0.5;
 
 /// a - b, or empty where either is.
 Residuals difference(Residuals a, const Residuals& b) {
@@ -66,22 +67,23 @@ class Subject {
 
   blind::Case case_;
   int threads_;
-  std::vector<gap::PredictedFlight> flights_;
+  gap::Flights flights_;
   Residuals unperturbed_, left_;  ///< by the robot as it is; by the simulator, of the measurement
-  std::unique_ptr<gap::Evidence> evidence_;
+  std::unique_ptr<const gap::Evidence> evidence_;
 };
 
 Subject::Subject(blind::Case c, std::vector<blind::RobotFlight> flights, int threads)
     : case_(std::move(c)), threads_(io::thread_count(threads)) {
   for (std::size_t k = 0; k < flights.size(); ++k) {
-    flights_.emplace_back(gap::Recording("flight_" + std::to_string(k + 1), std::move(flights[k].log), case_.vehicle));
+    flights_.push_back(std::make_shared<gap::ResetPrediction>(
+        gap::Recording("flight_" + std::to_string(k + 1), std::move(flights[k].log), case_.vehicle)));
   }
-  evidence_ = std::make_unique<gap::Evidence>(flights_, gap::read_model_discrepancy(), threads_);
   unperturbed_ = predict_perturbed_flights(flights_, {{case_.vehicle, {}, case_.seed}}, threads_)[0];
   if (unperturbed_.empty()) throw std::logic_error("the robot comes apart along its own flight");
   Residuals measured;
-  for (const gap::PredictedFlight& f : flights_) measured.push_back(f.measured());
-  evidence_->learn_noise(difference(std::move(measured), unperturbed_));
+  for (const auto& f : flights_) measured.push_back(f->measured());
+  evidence_ = std::make_unique<const gap::Evidence>(gap::Evidence(flights_, gap::read_model_discrepancy(), threads_)
+                                                        .with_noise(difference(std::move(measured), unperturbed_)));
   left_ = gap::residuals(flights_, {{case_.vehicle}}, threads_)[0];
 }
 
@@ -99,8 +101,8 @@ BasisCoefficients Subject::sensed(const blind::Sizes& sizes) const {
   blind::Case c = case_;
   c.sizes = sizes;
   std::vector<blind::RobotFlight> seen = fly_all(c, threads_);
-  std::vector<gap::PredictedFlight> flights;
-  for (std::size_t k = 0; k < blind::kFlights; ++k) flights.push_back(flights_[k].with_log(std::move(seen[k].log)));
+  gap::Flights flights;
+  for (std::size_t k = 0; k < blind::kFlights; ++k) flights.push_back(flights_[k]->with_log(std::move(seen[k].log)));
   return evidence_->basis_coefficients(difference(gap::residuals(flights, {{case_.vehicle}}, threads_)[0], left_));
 }
 
@@ -116,7 +118,7 @@ model::Vehicle Subject::moved(const sim::Randomisation& uncertain, std::size_t d
 }
 
 std::vector<BasisCoefficients> Subject::parameters(const sim::Randomisation& uncertain) const {
-  std::vector<gap::Candidate> candidates;
+  std::vector<gap::VehicleHypothesis> candidates;
   for (std::size_t d = 0; d < uncertain.draws(); ++d)
     for (const double to : {kParameterReach, -kParameterReach}) candidates.push_back({moved(uncertain, d, to)});
   for (const double to : {kParameterReach, -kParameterReach})
@@ -132,9 +134,9 @@ std::vector<BasisCoefficients> Subject::parameters(const sim::Randomisation& unc
 std::vector<BasisCoefficients> Subject::catalogue(const std::string& effect,
                                                   const std::vector<Eigen::VectorXd>& coordinates) const {
   const std::vector<gap::Unknown> unknowns = gap::unknowns_of(effect);
-  std::vector<gap::Candidate> candidates;
+  std::vector<gap::VehicleHypothesis> candidates;
   for (const Eigen::VectorXd& at : coordinates) {
-    gap::Candidate c{case_.vehicle};
+    gap::VehicleHypothesis c{case_.vehicle};
     for (std::size_t i = 0; i < unknowns.size(); ++i)
       c.vehicle.effects[effect][unknowns[i].name] = unknowns[i].value(at[static_cast<Index>(i)]);
     candidates.push_back(std::move(c));
@@ -157,7 +159,7 @@ MatrixXd Subject::information(const std::vector<BasisCoefficients>& parameters,
   const gap::SufficientStatistics nothing{
       {flights_.size(), std::vector<Eigen::VectorXd>(gap::kGroups, Eigen::VectorXd::Zero(q))}};
   const MatrixXd s =
-      evidence_->reduce(nothing, all, std::vector<char>(flights_.size(), 1), evidence_->discrepancy_sd()).sums;
+      evidence_->reduce(nothing, all, std::vector<char>(flights_.size(), 1), evidence_->discrepancy_sd({})).sums;
   const MatrixXd known = s.topLeftCorner(p, p) + MatrixXd::Identity(p, p);
   const MatrixXd half = Eigen::LLT<MatrixXd>(known).matrixL().solve(s.block(0, p, p, n));
   return s.block(p, p, n, n) - half.transpose() * half;
@@ -197,7 +199,7 @@ class Likeness {
     }
     std::map<std::string, double> values;
     for (Index i = 0; i < size(); ++i)
-      if (of(i).size) values[entry_ + "." + of(i).name] = of(i).value(at[i]);
+      if (of(i).magnitude) values[entry_ + "." + of(i).name] = of(i).value(at[i]);
     const BasisCoefficients left = left_at({at})[0];
     const double misfit =
         left.size() > 0 ? std::sqrt(std::min(1.0, measure({left})(0, 0) / measure({wanted_})(0, 0))) : 1;
@@ -225,7 +227,7 @@ class Likeness {
     if (left.size() == 0) return 1e300;
     double sum = measure({left})(0, 0);
     for (Index i = 0; i < size(); ++i)
-      if (!of(i).size) sum += at[i] * at[i];
+      if (!of(i).magnitude) sum += at[i] * at[i];
     return sum;
   }
 
@@ -233,13 +235,13 @@ class Likeness {
   VectorXd start() const {
     std::vector<VectorXd> shapes = {VectorXd::Zero(size())};
     for (Index i = 0; i < size(); ++i)
-      if (!of(i).size)
+      if (!of(i).magnitude)
         for (const double to : {-kShapeStart, kShapeStart}) shapes.emplace_back(to * VectorXd::Unit(size(), i));
     std::vector<VectorXd> places;
     std::vector<std::size_t> shape_of;
     for (std::size_t k = 0; k < shapes.size(); ++k)
       for (Index i = 0; i < size(); ++i)
-        if (of(i).size) {
+        if (of(i).magnitude) {
           places.push_back(bounded(shapes[k] + kStart * VectorXd::Unit(size(), i)));
           shape_of.push_back(k);
         }
@@ -252,7 +254,7 @@ class Likeness {
     }
     VectorXd at = shapes[static_cast<std::size_t>(std::ranges::max_element(likeness) - likeness.begin())];
     for (Index i = 0; i < size(); ++i)
-      if (of(i).size && of(i).low >= 0) at[i] = kStart;
+      if (of(i).magnitude && of(i).low >= 0) at[i] = kStart;
     return bounded(at);
   }
 
@@ -280,8 +282,8 @@ class Likeness {
     for (Index k = 0; k < m; ++k) {
       const Index i = moved[static_cast<std::size_t>(k)];
       normal(k, k) *= 1 + 1e-9;
-      normal(k, k) += of(i).size ? 1e-9 : 1;
-      if (!of(i).size) right[k] -= at[i];
+      normal(k, k) += of(i).magnitude ? 1e-9 : 1;
+      if (!of(i).magnitude) right[k] -= at[i];
     }
     const VectorXd step = normal.ldlt().solve(right);
     std::vector<VectorXd> tries;
@@ -332,12 +334,12 @@ std::map<std::string, std::optional<double>> true_values(const blind::Case& c,
     if (!sizes.has(effect) || effect >= blind::Effect::outside_magnetic_torque) continue;
     const std::string& id = blind::effect_names()[e];
     for (const gap::Unknown& u : gap::unknowns_of(id))
-      if (u.size) result[id + "." + u.name] = std::nullopt;
+      if (u.magnitude) result[id + "." + u.name] = std::nullopt;
     if (!subject) continue;
     BasisCoefficients wanted = subject->added(effect, sizes[effect]);
     if (wanted.size() == 0) continue;
     const auto [found, misfit] = Likeness(*subject, parameters, id, std::move(wanted)).find();
-    if (misfit >= kMostMisfit) continue;
+    if (misfit >= kMaxMisfit) continue;
     for (const auto& [name, value] : found) result[name] = value;
   }
   return result;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <map>
 
+#include "gap/result/diagnosis_json.hpp"
 #include "io/files.hpp"
 #include "io/statistics.hpp"
 #include "io/text.hpp"
@@ -155,15 +156,17 @@ Json rivals_of(const fs::path& folder, const std::string& number) {
   const fs::path file =
       folder / "predictions" / (std::string(number.size() < 4 ? 4 - number.size() : 0, '0') + number + ".json");
   if (!fs::exists(file)) return rivals;
-  const Json p = read_results(file);
-  std::vector<std::pair<double, std::string>> list;
-  for (const Json& c : p.at("candidates")) {
+  const Json json = read_results(file);
+  if (!json.contains("diagnosis")) return rivals;  // an older benchmark
+  std::map<std::string, double> by_name;           // with a remainder or without
+  for (const gap::RankedHypothesis& h : gap::diagnosis_from(json.at("diagnosis"), file).hypotheses) {
     std::vector<std::string> words;
-    for (const Json& e : c.at("effects")) words.push_back(spoken(e.get<std::string>()));
-    list.emplace_back(c.at("probability").get<double>(), spoken_list(words));
+    for (const std::string& e : h.effects) words.push_back(spoken(e));
+    const bool effect = h.kind == gap::HypothesisKind::effect;
+    by_name[effect ? spoken_list(words) : "(" + std::string(name_of(h.kind)) + ")"] += h.probability;
   }
-  for (const char* kind : {"none", "parameters", "unknown"})
-    list.emplace_back(p.at(kind).get<double>(), "(" + std::string(kind) + ")");
+  std::vector<std::pair<double, std::string>> list;
+  for (const auto& [name, probability] : by_name) list.emplace_back(probability, name);
   std::ranges::sort(list, std::greater{});
   for (std::size_t i = 0; i < list.size() && i < kRivals; ++i) rivals.push_back({list[i].second, list[i].first});
   return rivals;

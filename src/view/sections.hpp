@@ -3,20 +3,20 @@
 
 #include <filesystem>
 
+#include "gap/result/diagnosis.hpp"
 #include "view/page.hpp"
 
 namespace flappy::view {
 
 /// Where the gap lies, which effect causes it, how far it shrinks, what to fly next; words first, then the picture. `file`:
-/// diagnosis.json; residuals.csv and candidates.csv are read where they lie beside it.
+/// diagnosis.json.
 ///
 /// The block "anatomy": {"parts": [{"channel", "name", "short", "ratio", "text"}], "wings", "note"}: how far each channel's residual is
 /// above noise, and whether the robot is drawn with wings.
 Section diagnosis_section(const std::filesystem::path& file);
 
-/// What a laboratory asks of an effect before it believes it, added to a section: flights held out, controls, and each flight alone. `diagnosis`: of a
-/// robot that is known by the beat, with its "validation".
-void tell_validation(Section& section, const Json& diagnosis);
+/// Adds the validation of a diagnosis, which has one: flights held out, controls, and each flight alone.
+void add_validation(Section& section, const gap::Diagnosis& diagnosis);
 
 /// Of flappy-eval, with or without --effects.
 Section evaluation_section(const std::filesystem::path& file);

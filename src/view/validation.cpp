@@ -22,44 +22,43 @@ constexpr double kOneNumber = 0.01;
 
 const char* unit_of(const std::string& channel) { return channel.starts_with("torque") ? "rad/s²" : "m/s²"; }
 
-class Belief {
+class ValidationPart {
  public:
-  Belief(Section& section, const Json& diagnosis)
-      : section_(section), json_(diagnosis.at("validation")), flights_(diagnosis.at("flights").size()) {
-    for (const Json& flight : diagnosis.at("flights"))
-      names_.push_back(std::filesystem::path(flight.get<std::string>()).filename().string());
-    for (std::size_t i = 0; i < json_.at("ladder").size(); ++i) {
-      const std::string added = json_.at("ladder")[i].at("added");
+  ValidationPart(Section& section, const gap::Diagnosis& diagnosis)
+      : section_(section), validation_(*diagnosis.validation), flights_(diagnosis.flights.size()) {
+    for (const std::string& flight : diagnosis.flights)
+      names_.push_back(std::filesystem::path(flight).filename().string());
+    for (std::size_t i = 0; i < validation_.ladder.size(); ++i) {
+      const std::string& added = validation_.ladder[i].added;
       if (i > 1) effects_.push_back(added);
       rungs_.push_back(i == 0 ? "vehicle's file" : i == 1 ? "parameters refitted" : "+ " + spoken(added));
     }
-    for (const auto& [channel, error] : json_.at("ladder").at(0).at("held_out").items()) channels_.push_back(channel);
-    for (const Json& c : diagnosis.at("candidates"))
-      if (sizes_.is_null() && !effects_.empty() && c.at("effects") == Json(effects_)) sizes_ = c.at("parameters");
+    for (const gap::HeldOutError& e : validation_.ladder.front().errors) channels_.push_back(e.channel);
+    for (const gap::RankedHypothesis& h : diagnosis.hypotheses)
+      if (estimates_.empty() && !effects_.empty() && h.effects == effects_) estimates_ = h.parameters;
   }
 
-  void tell() {
+  void add() {
     section_.add(Json{{"kind", "heading"}, {"text", "Would a laboratory believe it?"}});
-    tell_ladder();
-    if (!json_.at("controls").empty()) tell_controls();
-    if (flights_ > 1 && !json_.at("agreements").empty()) tell_agreements();
+    add_ladder();
+    if (!validation_.controls.empty()) add_controls();
+    if (flights_ > 1 && !validation_.agreements.empty()) add_agreements();
   }
 
  private:
-  const Json& error(std::size_t rung, const std::string& channel) const {
-    return json_.at("ladder").at(rung).at("held_out").at(channel);
+  const gap::HeldOutError& error(std::size_t rung, const std::string& channel) const {
+    return *std::ranges::find(validation_.ladder[rung].errors, channel, &gap::HeldOutError::channel);
   }
 
-  void tell_ladder() {
+  void add_ladder() {
     const std::size_t last = rungs_.size() - 1;
     std::vector<std::string> falls;
     for (const std::string& c : channels_) {
-      const Json& e = error(last, c);
+      const gap::HeldOutError& e = error(last, c);
       falls.push_back(
           format("%s from %.3g to %.3g %s (90 %%: %.3g to %.3g; %.3g where all flights of a kind are held "
                  "out)",
-                 channel_words(c).c_str(), error(0, c).at("rms").get<double>(), e.at("rms").get<double>(), unit_of(c),
-                 e.at("low").get<double>(), e.at("high").get<double>(), e.at("by_type").get<double>()));
+                 channel_words(c).c_str(), error(0, c).rms, e.rms, unit_of(c), e.low, e.high, e.by_type));
     }
     section_.say(std::string(flights_ > 1 ? "What is left in flights that the fit did not see goes, from the vehicle's "
                                             "file on to the last rung: "
@@ -78,10 +77,12 @@ class Belief {
     }
     for (std::size_t i = 0; i < rungs_.size(); ++i) {
       Json row = {rungs_[i]};
-      for (const std::string& c : channels_)
-        for (const char* key : {"rms", "low", "high", "by_type"})
-          row.push_back(
-              cell(error(i, c).at(key), "/validation/ladder/" + std::to_string(i) + "/held_out/" + c + "/" + key));
+      for (const std::string& c : channels_) {
+        const gap::HeldOutError& e = error(i, c);
+        const std::string at = "/validation/ladder/" + std::to_string(i) + "/held_out/" + c;
+        row.insert(row.end(), {cell(e.rms, at + "/rms"), cell(e.low, at + "/low"), cell(e.high, at + "/high"),
+                               cell(e.by_type, at + "/by_type")});
+      }
       rows.push_back(std::move(row));
     }
     section_.add(table("What is left, rung by rung (rms)", head, std::move(rows)));
@@ -116,10 +117,10 @@ class Belief {
       Series of_kinds = s;
       of_kinds.draw = Draw::points;
       for (std::size_t i = 0; i < rungs_.size(); ++i) {
-        const Json& e = error(i, channels[k]);
+        const gap::HeldOutError& e = error(i, channels[k]);
         const double y = near_category(i, k, channels.size());
-        s.x.push_back(e.at("rms")), s.y.push_back(y), s.low.push_back(e.at("low")), s.high.push_back(e.at("high"));
-        of_kinds.x.push_back(e.at("by_type")), of_kinds.y.push_back(y);
+        s.x.push_back(e.rms), s.y.push_back(y), s.low.push_back(e.low), s.high.push_back(e.high);
+        of_kinds.x.push_back(e.by_type), of_kinds.y.push_back(y);
         most = std::max({most, s.high.back(), of_kinds.x.back()});
       }
       each.series.push_back(std::move(s));
@@ -130,8 +131,8 @@ class Belief {
     section_.add(kinds);
   }
 
-  void tell_controls() {
-    const Json& controls = json_.at("controls");
+  void add_controls() {
+    const std::vector<gap::Validation::Control>& controls = validation_.controls;
     Figure f{.id = "controls",
              .title = "What each effect takes away, and copies of it at other times",
              .note =
@@ -149,10 +150,9 @@ class Belief {
     std::vector<std::string> beaten;
     double least = INFINITY, most = 0;
     for (std::size_t i = 0; i < controls.size(); ++i) {
-      const Json& c = controls[i];
-      const double gain = c.at("gain"), shifted = c.at("best_of_shifted");
-      const std::string name = spoken(c.at("effect"));
-      f.categories.push_back(name + ", " + channel_words(c.at("channel")));
+      const double gain = controls[i].gain, shifted = controls[i].best_of_shifted;
+      const std::string name = spoken(controls[i].effect);
+      f.categories.push_back(name + ", " + channel_words(controls[i].channel));
       own.x.push_back(100 * gain), own.y.push_back(near_category(i, 0, 2));
       copy.x.push_back(100 * shifted), copy.y.push_back(near_category(i, 1, 2));
       if (gain <= shifted) beaten.push_back(name);
@@ -170,59 +170,67 @@ class Belief {
     section_.add(f);
   }
 
-  std::string unit_of_size(const std::string& name) const {
-    return sizes_.is_object() && sizes_.contains(name) ? sizes_.at(name).at("unit").get<std::string>() : "";
+  /// Of the fit to all flights; null: none.
+  const gap::Estimate* estimate(const std::string& name) const {
+    const auto at = std::ranges::find(estimates_, name, &gap::Estimate::name);
+    return at == estimates_.end() ? nullptr : &*at;
+  }
+  std::string unit_of_magnitude(const std::string& name) const {
+    return estimate(name) == nullptr ? "" : estimate(name)->unit;
   }
 
-  void tell_agreements() {
-    const Json& list = json_.at("agreements");
+  void add_agreements() {
+    const std::vector<gap::Validation::Agreement>& list = validation_.agreements;
     std::vector<std::string> differ;
-    std::vector<std::pair<std::string, std::vector<const Json*>>> groups;  // sizes of one effect in one unit
+    std::vector<std::pair<std::string, std::vector<const gap::Validation::Agreement*>>>
+        groups;  // of one effect and unit
     Json rows = Json::array();
     for (std::size_t i = 0; i < list.size(); ++i) {
-      const Json& a = list[i];
-      const std::string name = a.at("name"), unit = unit_of_size(name);
+      const gap::Validation::Agreement& a = list[i];
+      const std::string &name = a.name, unit = unit_of_magnitude(name);
       const std::string at = "/validation/agreements/" + std::to_string(i);
-      const Json& p = a.at("p_value");  // null where a flight says nothing of the size
-      const bool one = p.is_null() || p.get<double>() >= kOneNumber;
+      const bool one = !(a.p_value < kOneNumber);  // NaN where a flight says nothing of it
       if (!one) differ.push_back(size_words(name, unit));
-      const std::vector<double> values = a.at("value");
+      const std::vector<double>& values = a.value;
       const auto [least, most] = std::ranges::minmax_element(values);
       const auto place = [&](auto found) { return at + "/value/" + std::to_string(found - values.begin()); };
       rows.push_back({size_words(name, unit), cell(*least, place(least)), cell(*most, place(most)), in_print(unit),
-                      p.is_null() ? Json("–") : cell(p, at + "/p_value", 2), one ? "one number" : "differs"});
+                      std::isnan(a.p_value) ? Json("–") : cell(a.p_value, at + "/p_value", 2),
+                      one ? "one number" : "differs"});
       const std::string group = name.substr(0, name.find('.')) + "|" + unit;
       if (groups.empty() || groups.back().first != group) groups.push_back({group, {}});
       groups.back().second.push_back(&a);
     }
     section_.say(
         differ.empty()
-            ? format("From flight to flight all %zu sizes are one number, as far as their errors tell.", list.size())
-            : format("From flight to flight %zu of %zu sizes are one number, as far as their errors tell. By "
+            ? format("From flight to flight all %zu magnitudes are one number, as far as their errors tell.",
+                     list.size())
+            : format("From flight to flight %zu of %zu magnitudes are one number, as far as their errors tell. By "
                      "more than that %s: there an equation holds by and large only.",
                      list.size() - differ.size(), list.size(),
                      (spoken_list(differ) + (differ.size() == 1 ? " differs" : " differ")).c_str()));
     for (std::size_t g = 0; g < groups.size(); ++g) add_agreement(g, groups[g].second);
-    section_.add(table(
-        "Sizes from flight to flight", {"size", "least", "most", "unit", "p", "verdict"}, std::move(rows),
-        format("p: that sizes which are one number differ so much; below %g they are taken to differ.", kOneNumber)));
+    section_.add(
+        table("Sizes from flight to flight", {"magnitude", "least", "most", "unit", "p", "verdict"}, std::move(rows),
+              format("p: that magnitudes which are one number differ so much; below %g they are taken to differ.",
+                     kOneNumber)));
   }
 
-  void add_agreement(std::size_t g, const std::vector<const Json*>& sizes) {
-    const std::string first = sizes.front()->at("name"), unit = unit_of_size(first);
+  void add_agreement(std::size_t g, const std::vector<const gap::Validation::Agreement*>& magnitudes) {
+    const std::string &first = magnitudes.front()->name, unit = unit_of_magnitude(first);
     const std::string effect = spoken(first.substr(0, first.find('.')));
-    Figure f{
-        .id = "agreement_" + std::to_string(g + 1),
-        .title = sizes.size() == 1 ? size_words(first, unit) + ", flight by flight" : effect + ", flight by flight",
-        .note = "What each flight alone says, with its 90 % interval; dashed: the fit to all flights.",
-        .x = {.title = "size (" + (unit.empty() ? "-" : in_print(unit)) + ")"},
-        .y = {},
-        .categories = names_,
-        .series = {}};
-    for (std::size_t k = 0; k < sizes.size(); ++k) {
-      const std::string name = sizes[k]->at("name");
+    Figure f{.id = "agreement_" + std::to_string(g + 1),
+             .title = magnitudes.size() == 1 ? size_words(first, unit) + ", flight by flight"
+                                             : effect + ", flight by flight",
+             .note = "What each flight alone says, with its 90 % interval; dashed: the fit to all flights.",
+             .x = {.title = "magnitude (" + (unit.empty() ? "-" : in_print(unit)) + ")"},
+             .y = {},
+             .categories = names_,
+             .series = {}};
+    for (std::size_t k = 0; k < magnitudes.size(); ++k) {
+      const std::string& name = magnitudes[k]->name;
       const std::string words = size_words(name.substr(name.find('.') + 1), unit);
-      const std::vector<double> value = sizes[k]->at("value"), sd = sizes[k]->at("sd");
+      const std::vector<double>&value = magnitudes[k]->value, &sd = magnitudes[k]->sd;
       Series s{.name = words,
                .draw = Draw::interval,
                .colour = kColourOf[k % std::size(kColourOf)],
@@ -231,12 +239,12 @@ class Belief {
                .low = {},
                .high = {}};
       for (std::size_t i = 0; i < value.size(); ++i) {
-        s.y.push_back(near_category(i, k, sizes.size()));
+        s.y.push_back(near_category(i, k, magnitudes.size()));
         s.low.push_back(value[i] - kHalf90 * sd.at(i)), s.high.push_back(value[i] + kHalf90 * sd.at(i));
       }
       f.series.push_back(s);
-      if (!sizes_.is_object() || !sizes_.contains(name)) continue;
-      const double all = sizes_.at(name).at("value");
+      if (estimate(name) == nullptr) continue;
+      const double all = estimate(name)->value;
       f.series.push_back({.name = words + ", all flights",
                           .colour = s.colour,
                           .x = {all, all},
@@ -249,14 +257,14 @@ class Belief {
   }
 
   Section& section_;
-  const Json& json_;
+  const gap::Validation& validation_;
   std::size_t flights_;
   std::vector<std::string> names_, rungs_, effects_, channels_;
-  Json sizes_;  ///< of the fit to all flights
+  std::vector<gap::Estimate> estimates_;  ///< of the fit to all flights
 };
 
 }  // namespace
 
-void tell_validation(Section& section, const Json& diagnosis) { Belief(section, diagnosis).tell(); }
+void add_validation(Section& section, const gap::Diagnosis& diagnosis) { ValidationPart(section, diagnosis).add(); }
 
 }  // namespace flappy::view

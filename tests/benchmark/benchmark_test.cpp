@@ -91,16 +91,20 @@ class Benchmark : public testing::Test {
     c.predictor = [this](const Question& q) {
       ++asked_;
       Prediction p;
-      p.refit = 1;
+      gap::Diagnosis& d = p.diagnosis;
+      d.refit_loss = 1;
       const bool may = std::ranges::count(q.withheld, "ground_effect") == 0;
-      p.kind = may ? "effect" : "unknown";
-      p.probability = 0.8;
+      d.verdict = {may ? gap::VerdictKind::effect : gap::VerdictKind::unknown, {}, false, 0.8};
+      gap::RankedHypothesis h;
+      h.effects = {may ? "ground_effect" : "ceiling_effect"};
+      h.probability = may ? 0.8 : 0.1;
+      h.loss = may ? 0.5 : 0.25;
+      h.loss_gain_sd = 0.01;
       if (may) {
-        p.effects = {"ground_effect"};
-        p.sets = {{{"ground_effect"}, 0.8, {{"ground_effect.gain", {0.1, 0.05, 0.15}}}, 0.5, 0.01}};
-      } else {
-        p.sets = {{{"ceiling_effect"}, 0.1, {}, 0.25, 0.01}};
+        d.verdict.effects = {"ground_effect"};
+        h.parameters = {{"ground_effect.gain", 0.1, 0.05, 0.15, ""}};
       }
+      d.hypotheses = {h};
       EXPECT_EQ(q.flights.size(), 3U);
       return p;
     };
@@ -179,16 +183,24 @@ TEST_F(Benchmark, LearnsWhatANatIsWorth) {
   ScoreCommand c = command();
   c.predictor = [](const Question&) {
     Prediction p;
-    p.weights = {{"parameters", {}, false, std::log(0.4), std::log(0.4)},
-                 {"effect", {"ground_effect"}, false, 40 + std::log(0.3), std::log(0.3)},
-                 {"effect", {"ceiling_effect"}, false, 30 + std::log(0.3), std::log(0.3)}};
+    const auto weighed = [&](std::vector<std::string> effects, double nats, double prior) {
+      gap::RankedHypothesis h;
+      h.kind = effects.empty() ? gap::HypothesisKind::parameters : gap::HypothesisKind::effect;
+      h.effects = std::move(effects);
+      h.log_evidence = nats + std::log(prior);
+      h.log_prior = std::log(prior);
+      p.diagnosis.hypotheses.push_back(std::move(h));
+    };
+    weighed({}, 0, 0.4);
+    weighed({"ground_effect"}, 40, 0.3);
+    weighed({"ceiling_effect"}, 30, 0.3);
     return p;
   };
   score_bench(c);
   const nlohmann::ordered_json json = calibrate(calibrated);
   EXPECT_EQ(json.at("cases"), 2);
   const gap::VerdictRule before = gap::read_verdict_rule(), after = gap::read_verdict_rule(calibrated.out);
-  EXPECT_GT(after.doubt.nats, 2 * before.doubt.nats);
+  EXPECT_GT(after.tempering.nats, 2 * before.tempering.nats);
   EXPECT_EQ(after.naming.of_all, before.naming.of_all) << "what is not learnt stays";
   // nearly one half each, which is the best that can be said of both
   EXPECT_LT(json.at("score_before").get<double>(), json.at("score").get<double>() - 0.1);
@@ -426,15 +438,14 @@ TEST_F(Benchmark, FliesWhatADiagnosisProposes) {
   double highest_m = 0, lasts_s = 0;
   c.predictor = [&](const Question& q) {
     Prediction p;
-    p.kind = "parameters";
-    p.probability = 0.4;
-    p.manoeuvre = "ceiling_steps";
+    p.diagnosis.verdict = {gap::VerdictKind::parameters, {}, false, 0.4};
+    p.diagnosis.next = gap::NextExperiment{"ceiling_steps", {}, 0, 0, 0.1, {}};
     if (q.flights.size() == 4) {
       const auto log = flightlog::read_flight_log(q.flights.back());
       highest_m = std::ranges::max(log.mocap.z_m);
       lasts_s = log.command.t_s.back();
-      p.kind = "effect";
-      p.effects = {"ceiling_effect"};
+      p.diagnosis.verdict.kind = gap::VerdictKind::effect;
+      p.diagnosis.verdict.effects = {"ceiling_effect"};
     }
     return p;
   };

@@ -10,6 +10,7 @@
 #include "benchmark/robot_prediction.hpp"
 #include "benchmark/true_values.hpp"
 #include "full.hpp"
+#include "gap/replay/reset_prediction.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::benchmark {
@@ -22,10 +23,10 @@ Case flown(const std::vector<BlindEffect>& effects) {
   return c;
 }
 
-gap::PredictedFlight predicted(const Case& c, std::size_t flight) {
+gap::ResetPrediction predicted(const Case& c, std::size_t flight) {
   RobotFlight f = fly(c, flight);
   EXPECT_FALSE(f.crashed) << f.how;
-  return gap::PredictedFlight(gap::Recording("flight", std::move(f.log), c.vehicle));
+  return gap::ResetPrediction(gap::Recording("flight", std::move(f.log), c.vehicle));
 }
 
 /// Rms over beats of the steady turn and force, [channel].
@@ -59,7 +60,7 @@ TEST(ResetPrediction, KnowsItsOwnFlight) {
                                                   {{"wind", 2}},            // its gusts come as they came
                                                   {{"battery_sag", 4}}}) {  // empty by as much as the trim took
     const Case c = flown(effects);
-    const gap::PredictedFlight flight = predicted(c, 0);
+    const gap::ResetPrediction flight = predicted(c, 0);
     const auto with = left(flight, {c.vehicle, c.sizes, c.seed}), without = left(flight, {c.vehicle, {}, c.seed});
     const auto noise = mean_rms(flight, flight.declared_noise(1));
     double worst = 0;

@@ -218,7 +218,7 @@ TEST(Score, ClosureIsMeasuredAgainstTheTrueEffect) {
   c.prediction.sets.pop_back();
   EXPECT_TRUE(needs_true_fit(c));
   EXPECT_FALSE(closure(c));
-  Prediction fit;
+  Answer fit;
   fit.refit = 1.0;
   fit.sets = {fitted({"tether"}, 0.5, 0.6, 0.01)};
   c.true_fit = fit;

@@ -12,7 +12,7 @@ from self_test import misjudged, run
 BASE = {"io", "model", "sim"}
 FLIGHT = BASE | {"policy", "flight"}
 ROLLOUT = FLIGHT | {"flightlog", "flightlog/check", "flightlog/ros", "rollout"}
-GAP = ROLLOUT | {"gap/replay", "gap/evidence", "gap/localise", "gap/diagnose"}
+GAP = ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise", "gap/diagnose"}
 # What a room may include besides itself. A folder is a room; a folder in it that is named here is a room of its own.
 ROOMS = {
     "io": set(),
@@ -31,10 +31,11 @@ ROOMS = {
     "deploy/header": ROLLOUT | {"deploy"},
     "deploy/proof": {"io", "policy", "deploy"},
     "identify": BASE | {"flightlog"},
+    "gap/result": {"io", "flightlog/check"},
     "gap/replay": BASE | {"flight", "flightlog"},
     "gap/evidence": BASE | {"flightlog", "gap/replay"},
-    "gap/localise": BASE | {"flightlog", "gap/replay", "gap/evidence"},
-    "gap/diagnose": ROLLOUT | {"gap/replay", "gap/evidence", "gap/localise"},
+    "gap/localise": BASE | {"flightlog", "gap/result", "gap/replay", "gap/evidence"},
+    "gap/diagnose": ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise"},
     "server": set(),  # what several of its rooms share
     "server/dds": {"io", "flightlog", "flightlog/ros"},
     "server/telemetry": ROLLOUT | {"server/dds"},
@@ -46,7 +47,7 @@ ROOMS = {
     "blind/b": {"io", "blind", "flightlog"},
     "blind/c": {"io", "blind", "flightlog"},
     "benchmark": GAP | {"blind", "blind/a", "blind/b", "blind/c", "benchmark/predict"},
-    "view": ROLLOUT | {"flightlog/check", "learn"},
+    "view": ROLLOUT | {"flightlog/check", "gap/result", "learn"},
     "server/jobs": {"io"},
     "server/http": {"io", "server", "server/jobs"},
     "benchmark/predict": GAP,  # answers the benchmark's questions, and knows nothing of who makes them

@@ -124,10 +124,10 @@ TEST(Composed, RefusesWhatDoesNotFit) {
               composed({diagnosis}, options, packing);
             }),
             "--goal and --vehicle are of flights, and none is given; accepted: a flight log beside them");
-  io::write_atomically(folder.path() / "half.json", R"({"verdict": {}, "candidates": [], "where": []})");
+  io::write_atomically(folder.path() / "half.json", R"({"schema": 2, "verdict": {}, "hypotheses": [], "where": []})");
   EXPECT_EQ(
       refusal([&] { composed({folder.path() / "half.json"}, {}, packing); }),
-      (folder.path() / "half.json").string() + ": key 'kind' not found; accepted: what flappy-gap diagnose wrote");
+      (folder.path() / "half.json").string() + ": key 'flights' not found; accepted: what flappy-gap diagnose wrote");
   std::vector<fs::path> many;
   for (int i = 0; i < 9; ++i) {
     many.push_back(folder.path() / ("f" + std::to_string(i)));
@@ -276,13 +276,6 @@ TEST(DiagnosisSection, TellsWhatTheJsonHas) {
     }
 }
 
-TEST(DiagnosisSection, DoesWithoutItsTables) {
-  const io::TemporaryFolder folder;
-  fs::copy_file(kData / "diagnosis/diagnosis.json", folder.path() / "diagnosis.json");
-  expect_cells_of(diagnosis_section(folder.path() / "diagnosis.json"), read_results(kData / "diagnosis/diagnosis.json"),
-                  20);
-}
-
 TEST(DiagnosisSection, ShowsHowRivalsWouldFlyNext) {
   const io::TemporaryFolder folder;
   Json json = read_results(kData / "diagnosis/diagnosis.json");
@@ -291,11 +284,10 @@ TEST(DiagnosisSection, ShowsHowRivalsWouldFlyNext) {
     return diagnosis_section(folder.path() / "diagnosis.json");
   };
   const std::size_t before = told().figures().size();
-  json["next_experiment"] = {{"manoeuvre", "dash"},
-                             {"separates", {"body_drag+wind", "none"}},
-                             {"expected_nats", 12.3},
-                             {"course_step_s", 0.1},
-                             {"courses", {{{"quantity", "x_m"}, {"first", {0.0, 1.0}}, {"second", {0.5, 0.25}}}}}};
+  json["next_experiment"] = {
+      {"manoeuvre", "dash"},   {"separates", {"body_drag+wind", "none"}},
+      {"expected_nats", 12.3}, {"information", 0.4},
+      {"course_step_s", 0.1},  {"courses", {{{"quantity", "x_m"}, {"first", {0.0, 1.0}}, {"second", {0.5, 0.25}}}}}};
   const Section section = told();
   ASSERT_EQ(section.figures().size(), before + 1);
   const Figure& f = section.figures().back();
@@ -306,7 +298,7 @@ TEST(DiagnosisSection, ShowsHowRivalsWouldFlyNext) {
   EXPECT_EQ(f.series[1].y, (std::vector<double>{0.5, 0.25}));
 }
 
-/// A robot that is known by the beat: two flights, one effect of two sizes that explains them and one that does not.
+/// A beat-averaged robot: two flights, one effect with two magnitudes that explains them and one that does not.
 Json by_the_beat() {
   const auto error = [](double rms, double by_type) {
     return Json{{"rms", rms}, {"low", 0.9 * rms}, {"high", 1.1 * rms}, {"by_type", by_type}};
@@ -321,29 +313,40 @@ Json by_the_beat() {
   json["flights"] = {"logs/one_1", "logs/one_2"};
   json["verdict"] = {
       {"kind", "effect"}, {"effects", {"flapping_counter_force"}}, {"remainder", false}, {"probability", 0.99}};
-  json["where"] = {{{"channel", "force_x"},
-                    {"regime", "speed above 1 m/s"},
-                    {"gap", 2.0},
-                    {"noise_floor", 0.5},
-                    {"p_value", 0.001}}};
-  const auto candidate = [](const char* group, Json effects, double probability, double evidence, Json sizes) {
-    return Json{{"effects", std::move(effects)},
+  json["locations"] = {
+      {{"stage", "refit"},
+       {"test", "regime"},
+       {"channel", "force_x"},
+       {"unit", "m/s^2"},
+       {"regime", {{"quantity", "speed"}, {"third", "high"}, {"low", 1.0}, {"high", nullptr}, {"unit", "m/s"}}},
+       {"gap", 2.0},
+       {"noise_floor", 0.5},
+       {"p_value", 0.001},
+       {"discovered", true}}};
+  const auto hypothesis = [](const char* group, Json effects, double probability, double evidence, Json magnitudes) {
+    const char* kind = effects.empty() ? "parameters" : "effect";
+    return Json{{"kind", kind},
+                {"effects", std::move(effects)},
                 {"group", group},
                 {"remainder", false},
                 {"probability", probability},
                 {"log_evidence", evidence},
-                {"parameters", std::move(sizes)},
+                {"log_prior", 0.0},
+                {"parameters", std::move(magnitudes)},
+                {"loss", nullptr},
+                {"loss_gain_sd", 0.0},
                 {"closure", nullptr}};
   };
-  json["candidates"] = {candidate("flapping_counter_force", {"flapping_counter_force"}, 0.99, -10,
-                                  {{"flapping_counter_force.x_per_s", size(3.0, "1/s")},
-                                   {"flapping_counter_force.z_per_s", size(0.5, "1/s")}}),
-                        candidate("parameters", Json::array(), 0.01, -1e9, Json::object())};
+  json["hypotheses"] = {hypothesis("flapping_counter_force", {"flapping_counter_force"}, 0.99, -10,
+                                   {{"flapping_counter_force.x_per_s", size(3.0, "1/s")},
+                                    {"flapping_counter_force.z_per_s", size(0.5, "1/s")}}),
+                        hypothesis("parameters", Json::array(), 0.01, -1e9, Json::object())};
   json["unexplained"] = {{"jointly_with", {"flapping_counter_force"}},
                          {"terms",
                           {{{"channel", "force_x"},
-                            {"harmonic", "0"},
+                            {"harmonic", 0},
                             {"function", "right_flap velocity_y"},
+                            {"regime", "velocity"},
                             {"times_usual", 3.0},
                             {"gain_nats", 7.0}}}}};
   json["closed_loop"] = Json::array();
@@ -394,7 +397,7 @@ TEST(DiagnosisSection, TellsWhatALaboratoryAsks) {
   const Figure& agreement = figures.at("agreement_1");
   EXPECT_EQ(io::joined(agreement.categories), "one_1, one_2");
   ASSERT_EQ(agreement.series.size(), 4u);  // each size, and its fit to all flights
-  EXPECT_EQ(agreement.x.title, "size (1/s)");
+  EXPECT_EQ(agreement.x.title, "magnitude (1/s)");
   EXPECT_EQ(agreement.series[0].name, "x");
   EXPECT_EQ(agreement.series[0].x, (std::vector<double>{2.9, 3.2}));
   EXPECT_NEAR(agreement.series[0].high[1], 3.2 + 1.645 * 0.2, 1e-12);
@@ -408,7 +411,7 @@ TEST(DiagnosisSection, TellsWhatALaboratoryAsks) {
       << words;
   EXPECT_TRUE(says("each takes 75 % or more off the rms where it takes most, its shifted copies 1 % at best")) << words;
   EXPECT_TRUE(
-      says("1 of 2 sizes are one number, as far as their errors tell. By more than that flapping counter force "
+      says("1 of 2 magnitudes are one number, as far as their errors tell. By more than that flapping counter force "
            "(z) differs"))
       << words;
   EXPECT_TRUE(says("Predict with vehicle_corrected.toml")) << words;

@@ -39,7 +39,7 @@ struct Scored {
     }
   }
   benchmark::Prediction prediction(std::size_t number) const {
-    return benchmark::prediction_from(benchmark::read_json(benchmark::prediction_file(folder, number)));
+    return benchmark::read_prediction(benchmark::prediction_file(folder, number));
   }
   fs::path folder;
   benchmark::Manifest manifest;
@@ -176,9 +176,10 @@ class Loop {
       const Json json = benchmark::read_json(result_of(r));
       const benchmark::Label& label = *r.label;
       const std::string& family = r.of->manifest.family;
+      const benchmark::Answer said = answer_of(r.said);
       lines += family + "," + std::to_string(label.planned.number) + "," + label.planned.part + "," +
-               io::joined(label.truth().effects, "+") + "," + r.said.kind + "," + io::joined(r.said.effects, "+") +
-               "," + std::to_string(json.at("escapes").get<std::size_t>());
+               io::joined(label.truth().effects, "+") + "," + said.kind + "," + io::joined(said.effects, "+") + "," +
+               std::to_string(json.at("escapes").get<std::size_t>());
       for (Row* row : {&rows[family], &rows["all"]}) {
         ++row->robots;
         row->escapes += json.at("escapes").get<std::size_t>();

@@ -133,18 +133,19 @@ int main(int argc, char** argv) {
       .one_at_a_time();
   io::Command diagnose = program.app().command("diagnose", "what is missing in the model of a robot that flew");
   gap::DiagnoseCommand command;
-  diagnose.option("--vehicle", command.vehicle, "the vehicle's file, as it was believed").required();
-  diagnose.option("--flights", command.flights, "folders of flight logs").required();
-  diagnose.option("--priors", command.priors,
+  diagnose.option("--vehicle", command.settings.vehicle, "the vehicle's file, as it was believed").required();
+  diagnose.option("--flights", command.settings.flights, "folders of flight logs").required();
+  diagnose.option("--priors", command.settings.priors,
                   "what is uncertain of the vehicle [configs/gap/priors.toml, as the next]");
-  diagnose.option("--discrepancy", command.discrepancy, "what every model gets wrong [model_discrepancy.toml]");
-  diagnose.option("--verdict", command.verdict, "constants of the verdict [verdict.toml]");
-  diagnose.option("--manoeuvre", command.manoeuvre,
+  diagnose.option("--discrepancy", command.settings.discrepancy,
+                  "what every model gets wrong [model_discrepancy.toml]");
+  diagnose.option("--verdict", command.settings.verdict, "constants of the verdict [verdict.toml]");
+  diagnose.option("--manoeuvre", command.settings.manoeuvre,
                   "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
-  diagnose.option("--channels", command.channels, "of a robot known by the beat: only these, as force_x");
-  diagnose.option("--withhold", command.withheld, "entries that the catalogue is to lack");
+  diagnose.option("--channels", command.settings.channels, "of a beat-averaged vehicle: only these, as force_x");
+  diagnose.option("--withhold", command.settings.withheld, "entries that the catalogue is to lack");
   diagnose.option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
-  diagnose.option("--threads", command.threads, "0: one for each processor").range(0, 1024);
+  diagnose.option("--threads", command.settings.threads, "0: one for each processor").range(0, 1024);
   io::Command learn = program.app().command(
       "learn-discrepancy", "what models get wrong, from robots of which all is known that the vehicle's file says");
   gap::LearnCommand lessons{.vehicle = {},

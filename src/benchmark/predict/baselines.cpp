@@ -27,20 +27,18 @@ struct Energy {
 };
 
 template <class Use>
-void for_rows(const std::vector<gap::PredictedFlight>& flights, const std::vector<double>& noise_sd, std::size_t f,
-              const Use& use) {
-  for (std::size_t j = 0; j < flights[f].beats(); ++j)
+void for_rows(const gap::Flights& flights, const std::vector<double>& noise_sd, std::size_t f, const Use& use) {
+  for (std::size_t j = 0; j < flights[f]->beats(); ++j)
     for (int g = 0; g < gap::kGroups; ++g) {
       const auto k = static_cast<std::size_t>(g);
-      if (!flights[f].has_rows(g / gap::kCoefficients, g % gap::kCoefficients) || !(noise_sd[k] > 0) ||
-          !flights[f].covers(j, g / gap::kCoefficients))
+      if (!flights[f]->has_rows(g / gap::kCoefficients, g % gap::kCoefficients) || !(noise_sd[k] > 0) ||
+          !flights[f]->covers(j, g / gap::kCoefficients))
         continue;
       use(k, j * gap::kRowsPerBeat + k);
     }
 }
 
-Energy energy(const std::vector<gap::PredictedFlight>& flights, const std::vector<double>& noise_sd,
-              const gap::Residuals& s) {
+Energy energy(const gap::Flights& flights, const std::vector<double>& noise_sd, const gap::Residuals& s) {
   Energy e;
   for (std::size_t f = 0; f < flights.size(); ++f)
     for_rows(flights, noise_sd, f, [&](std::size_t g, std::size_t row) {
@@ -73,13 +71,13 @@ Baseline largest_residual(const std::vector<Energy>& columns, const std::vector<
   return b;
 }
 
-Baseline best_rmse(const std::vector<gap::PredictedFlight>& flights, const gap::Diagnosis& d) {
+Baseline best_rmse(const gap::Flights& flights, const gap::Inference& d) {
   Baseline b;
   double least = 1e300;
   std::vector<std::pair<double, std::string>> left;
   for (const gap::ScoredHypothesis& a : d.hypotheses) {
     if (!a.fitted()) continue;
-    const Energy e = energy(flights, d.noise_sd, a.fit.point.residual);
+    const Energy e = energy(flights, d.noise_sd, a.fit.residual);
     double sum = 0;
     for (const double s : e.sum) sum += s;
     for (const std::string& name : a.effects) left.emplace_back(-sum, name);
@@ -151,13 +149,13 @@ Baseline stlsq(const Regression& r) {
   return b;
 }
 
-std::vector<double> features(const std::vector<gap::PredictedFlight>& flights, const gap::Diagnosis& d) {
-  const gap::Residuals& residual = d.parameters.point.residual;
+std::vector<double> features(const gap::Flights& flights, const gap::Inference& d) {
+  const gap::Residuals& residual = d.parameters.residual;
   const Energy whole = energy(flights, d.noise_sd, residual);
   std::vector<double> list;
   for (std::size_t g = 0; g < gap::kGroups; ++g) list.push_back(std::log1p(whole.rms(g)));
   std::vector<std::vector<gap::RegimeFunction>> functions;
-  for (const gap::PredictedFlight& f : flights) functions.push_back(f.functions());
+  for (const auto& f : flights) functions.push_back(f->functions());
   const auto count = static_cast<Index>(functions.front().size());
   // sums over beats of 1, r, r^2 and, of each function b, of b, b^2 and b r
   MatrixXd own = MatrixXd::Zero(gap::kGroups, 3), sum = MatrixXd::Zero(gap::kGroups, count), square = sum,
@@ -187,32 +185,32 @@ std::vector<double> features(const std::vector<gap::PredictedFlight>& flights, c
   return list;
 }
 
-std::map<std::string, Baseline> baselines(const std::vector<gap::PredictedFlight>& flights,
-                                          const sim::Randomisation& uncertain, const gap::Diagnosis& d,
-                                          const std::vector<std::string>& withheld, int threads) {
-  const gap::Hypothesis plain(uncertain, {});
-  const VectorXd at = d.parameters.point.at;
+std::map<std::string, Baseline> baselines(const gap::Flights& flights, const sim::Randomisation& uncertain,
+                                          const gap::Inference& d, const std::vector<std::string>& withheld,
+                                          int threads) {
+  const gap::Hypothesis no_effects(uncertain, {});
+  const VectorXd at = d.parameters.at;
   Regression r;
-  std::vector<gap::Candidate> candidates;
+  std::vector<gap::VehicleHypothesis> vehicles;
   std::vector<std::string> effects;
-  for (Index i = 0; i < plain.size(); ++i) {
+  for (Index i = 0; i < no_effects.size(); ++i) {
     VectorXd there = at;
-    there[i] += gap::kSizeReach;
-    candidates.push_back(plain.candidate(there));
+    there[i] += gap::kMagnitudeReach;
+    vehicles.push_back(no_effects.vehicle(there));
     effects.emplace_back();
   }
-  for (gap::SizeStep& s : gap::size_steps(uncertain, at, withheld)) {
-    candidates.push_back(std::move(s.candidate));
+  for (gap::MagnitudeStep& s : gap::magnitude_steps(uncertain, at, withheld)) {
+    vehicles.push_back(std::move(s.vehicle));
     effects.push_back(std::move(s.effect));
   }
-  std::vector<gap::Residuals> rows = residuals(flights, candidates, threads);
-  const gap::Residuals& residual = d.parameters.point.residual;
+  std::vector<gap::Residuals> rows = residuals(flights, vehicles, threads);
+  const gap::Residuals& residual = d.parameters.residual;
   std::vector<gap::Residuals> columns;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (rows[k].empty()) continue;
     for (std::size_t f = 0; f < flights.size(); ++f)
       for (std::size_t i = 0; i < rows[k][f].size(); ++i)
-        rows[k][f][i] = (residual[f][i] - rows[k][f][i]) / gap::kSizeReach;
+        rows[k][f][i] = (residual[f][i] - rows[k][f][i]) / gap::kMagnitudeReach;
     columns.push_back(std::move(rows[k]));
     r.effects.push_back(effects[k]);
   }

@@ -12,17 +12,17 @@
 #include <Eigen/Dense>
 
 #include "benchmark/predict/predict.hpp"
-#include "gap/diagnose/diagnose.hpp"
+#include "gap/diagnose/inference.hpp"
 
 namespace flappy::benchmark {
 
-std::map<std::string, Baseline> baselines(const std::vector<gap::PredictedFlight>& flights,
-                                          const sim::Randomisation& uncertain, const gap::Diagnosis& diagnosis,
-                                          const std::vector<std::string>& withheld, int threads);
+std::map<std::string, Baseline> baselines(const gap::Flights& flights, const sim::Randomisation& uncertain,
+                                          const gap::Inference& inference, const std::vector<std::string>& withheld,
+                                          int threads);
 
 /// What the parameters leave, in logarithms: the rms of every channel and harmonic in units of the noise, and, of mean and first harmonic, how
 /// much goes with each function of the regime, as correlation over what noise has.
-std::vector<double> features(const std::vector<gap::PredictedFlight>& flights, const gap::Diagnosis& diagnosis);
+std::vector<double> features(const gap::Flights& flights, const gap::Inference& inference);
 
 /// A residual and what it may be a sum of.
 struct Regression {

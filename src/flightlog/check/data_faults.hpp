@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "flightlog/check/check.hpp"
+#include "flightlog/check/data_fault.hpp"
 
 namespace flappy::flightlog {
 
@@ -13,12 +14,6 @@ namespace flappy::flightlog {
 /// are declared): ten in which the wings settle, and
 /// fifty of which mean, harmonics and noise are told apart. Nor does gravity show in less than the time.
 inline constexpr double kLeastBeats = 60, kLeastTime_s = 2;
-
-struct DataFault {
-  std::string file;  ///< of the log, in its folder
-  std::size_t line;  ///< where it first shows
-  std::string what;
-};
 
 /// At most one for each file, the one that explains the others; none where the log can be diagnosed. `report`: of the
 /// log; `folder` stands for the place in `file`. Effects of sensors within their priors are none, but for

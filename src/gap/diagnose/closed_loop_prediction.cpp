@@ -37,7 +37,7 @@ using Quantities = std::array<double, kQuantities.size()>;
 struct Beat {
   double t_s = 0, roll_rad = 0, pitch_rad = 0, heading_rad = 0;  ///< heading: whole turns counted
   Vector3d position_m = Vector3d::Zero();
-  Regime regime;
+  BeatMotion regime;
 };
 
 /// Whole beats of a recording in which all streams were there and the ground was not, from `from_s` to `to_s`.
@@ -230,14 +230,14 @@ Quantities predict(const Sortie& sortie, const Recording& r, model::Vehicle vehi
 
 }  // namespace
 
-std::vector<ClosedLoop> predict_closed_loop(const std::vector<PredictedFlight>& flights, const model::Vehicle& nominal,
+std::vector<ClosedLoop> predict_closed_loop(const Flights& flights, const model::Vehicle& nominal,
                                             const model::Vehicle& corrected, const rollout::FlyConfig& pilot,
                                             const ClosedLoopOptions& options) {
   const model::Vehicle* const vehicles[] = {&nominal, &corrected};
   std::vector<std::array<Quantities, 3>> found(flights.size());  // recorded, nominal, corrected
   io::parallel_for(2 * flights.size(), options.threads, [&](std::size_t job) {
     const std::size_t f = job / 2, v = job % 2;
-    const Recording& r = flights[f].recording();
+    const Recording& r = *flights[f]->recording();
     const double zero_s = r.log.command.t_s.front();
     const double from_s = options.own_path ? zero_s + pilot.settle_s : -1e300;
     const double to_s = options.own_path ? zero_s + pilot.duration_s : 1e300;
@@ -252,7 +252,7 @@ std::vector<ClosedLoop> predict_closed_loop(const std::vector<PredictedFlight>& 
   std::vector<ClosedLoop> rows;
   for (std::size_t f = 0; f < flights.size(); ++f)
     for (std::size_t q = 0; q < kQuantities.size(); ++q)
-      rows.push_back({flights[f].recording().name, kQuantities[q], found[f][0][q], found[f][1][q], found[f][2][q]});
+      rows.push_back({flights[f]->name(), kQuantities[q], found[f][0][q], found[f][1][q], found[f][2][q]});
   return rows;
 }
 

@@ -16,15 +16,10 @@
 #include <vector>
 
 #include "gap/replay/predicted_flight.hpp"
+#include "gap/result/diagnosis.hpp"
 #include "rollout/fly_config.hpp"
 
 namespace flappy::gap {
-
-struct ClosedLoop {
-  std::string flight, quantity;
-  /// Of predictions the mean over copies with other noise; not a number where a vehicle was lost, or flew too little.
-  double recorded = 0, nominal = 0, corrected = 0;
-};
 
 struct ClosedLoopOptions {
   /// Fly the configuration's own path and excitation, on the clock that starts with the log's first command, and judge from
@@ -35,8 +30,8 @@ struct ClosedLoopOptions {
   int threads = 0;
 };
 
-/// Rows of every flight in the order above. `pilot`: controller or actor, and sensors; its vehicle is not used.
-std::vector<ClosedLoop> predict_closed_loop(const std::vector<PredictedFlight>& flights, const model::Vehicle& nominal,
+/// Rows of every flight in the order above. Predictions are means over copies with other noise. `pilot`: controller or actor, and sensors; its vehicle is not used.
+std::vector<ClosedLoop> predict_closed_loop(const Flights& flights, const model::Vehicle& nominal,
                                             const model::Vehicle& corrected, const rollout::FlyConfig& pilot,
                                             const ClosedLoopOptions& options = {});
 

@@ -1,14 +1,17 @@
-// What a diagnosis leaves in its folder beside the corrected vehicle.
+// The files of a diagnosis in its folder.
 #pragma once
 
 #include <filesystem>
 
-#include "gap/diagnose/report.hpp"
+#include "gap/result/diagnosis.hpp"
 
 namespace flappy::gap {
 
-/// residuals.csv: every test of where; candidates.csv: a line for each parameter of each candidate; unexplained.csv: what no entry
-/// explains.
-void write_tables(const std::filesystem::path& folder, const Report& report);
+inline constexpr const char *kDiagnosisFile = "diagnosis.json", *kVehicleFile = "vehicle_corrected.toml",
+                            *kResidualsFile = "residuals.csv", *kHypothesesFile = "hypotheses.csv";
+
+/// diagnosis.json with all of it; for a spreadsheet residuals.csv, a line for each test of a residual, and hypotheses.csv, a line for each
+/// parameter of each hypothesis.
+void write_diagnosis(const std::filesystem::path& folder, const Diagnosis& diagnosis);
 
 }  // namespace flappy::gap

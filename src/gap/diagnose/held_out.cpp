@@ -16,11 +16,11 @@ using Eigen::VectorXd;
 /// Seconds of a block, draws of blocks, copies that are shifted.
 constexpr double kBlock_s = 2;
 constexpr int kDraws = 1000, kCopies = 20;
-/// On functions of rms 1: those that are nearly the same share what they explain.
+/// On functions of rms 1: functions that are nearly the same share what they explain.
 constexpr double kRidge = 0.01;
 
-/// "level_flight" of level_flight_2: names without a number at their end.
-std::string kind_of(std::string name) {
+/// Type of a flight: its name without a number at the end, as "level_flight" of level_flight_2.
+std::string type_of(std::string name) {
   while (!name.empty() && std::isdigit(static_cast<unsigned char>(name.back()))) name.pop_back();
   while (!name.empty() && (name.back() == '_' || name.back() == '-')) name.pop_back();
   for (const char* word : {"_rep", "_run"})
@@ -30,14 +30,14 @@ std::string kind_of(std::string name) {
 
 /// Calls use(flight, beat, row) for what a channel covers.
 template <class Use>
-void for_rows(const std::vector<PredictedFlight>& flights, int channel, const Use& use) {
+void for_rows(const Flights& flights, int channel, const Use& use) {
   for (std::size_t f = 0; f < flights.size(); ++f)
-    for (std::size_t j = 0; j < flights[f].beats(); ++j)
-      if (flights[f].covers(j, channel))
+    for (std::size_t j = 0; j < flights[f]->beats(); ++j)
+      if (flights[f]->covers(j, channel))
         use(f, j, j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients);
 }
 
-double rms_of(const std::vector<PredictedFlight>& flights, const Residuals& left, int channel) {
+double rms_of(const Flights& flights, const Residuals& left, int channel) {
   double sum = 0, n = 0;
   for_rows(flights, channel, [&](std::size_t f, std::size_t, std::size_t row) {
     if (left[f].empty()) return;
@@ -47,26 +47,25 @@ double rms_of(const std::vector<PredictedFlight>& flights, const Residuals& left
   return n > 0 ? std::sqrt(sum / n) : 0;
 }
 
-std::vector<int> channels_of(const std::vector<PredictedFlight>& flights) {
+std::vector<int> channels_of(const Flights& flights) {
   std::vector<int> list;
   for (int channel = 0; channel < kChannels; ++channel)
-    if (flights.front().has_rows(channel, 0)) list.push_back(channel);
+    if (flights.front()->has_rows(channel, 0)) list.push_back(channel);
   return list;
 }
 
-HeldOutError error_of(const std::vector<PredictedFlight>& flights, const Residuals& each, const Residuals& by_type,
-                      int channel) {
+HeldOutError error_of(const Flights& flights, const Residuals& each, const Residuals& by_type, int channel) {
   HeldOutError e{channel_name(channel), rms_of(flights, each, channel), 0, 0, rms_of(flights, by_type, channel)};
   std::vector<double> sums, counts;
   std::vector<std::size_t> first;  // block of each flight
   for (std::size_t f = 0; f < flights.size(); ++f) {
     first.push_back(sums.size());
     const auto length =
-        std::max<std::size_t>(1, static_cast<std::size_t>(std::round(kBlock_s * flights[f].beats_Hz())));
-    sums.resize(first[f] + flights[f].beats() / length + 1, 0);
+        std::max<std::size_t>(1, static_cast<std::size_t>(std::round(kBlock_s * flights[f]->beats_Hz())));
+    sums.resize(first[f] + flights[f]->beats() / length + 1, 0);
     counts.resize(sums.size(), 0);
-    for (std::size_t j = 0; j < flights[f].beats(); ++j) {
-      if (each[f].empty() || !flights[f].covers(j, channel)) continue;
+    for (std::size_t j = 0; j < flights[f]->beats(); ++j) {
+      if (each[f].empty() || !flights[f]->covers(j, channel)) continue;
       const double v = each[f][j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients];
       sums[first[f] + j / length] += v * v;
       counts[first[f] + j / length] += 1;
@@ -109,20 +108,19 @@ void centre(std::vector<std::vector<double>>& v) {
 }
 
 /// Each effect of a set beside the rest: all of what it changes, and copies of that at other times.
-void control(const std::vector<PredictedFlight>& flights, const Fitted& all, const VectorXd& at, int threads,
-             Validation& to) {
-  std::vector<Candidate> candidates = {all.hypothesis.candidate(at)};
+void control(const Flights& flights, const FittedHypothesis& all, const VectorXd& at, int threads, Validation& to) {
+  std::vector<VehicleHypothesis> vehicles = {all.hypothesis.vehicle(at)};
   for (const std::string& e : all.hypothesis.effects()) {
     VectorXd without = at;
     for (Index i = all.hypothesis.shared(); i < all.hypothesis.size(); ++i) {
       const Unknown& u = all.hypothesis.unknowns()[static_cast<std::size_t>(i)];
-      if (u.effect == e && u.size) without[i] = 0;
+      if (u.effect == e && u.magnitude) without[i] = 0;
     }
-    candidates.push_back(all.hypothesis.candidate(without));
+    vehicles.push_back(all.hypothesis.vehicle(without));
   }
-  const std::vector<Residuals> left = residuals(flights, candidates, threads);
+  const std::vector<Residuals> left = residuals(flights, vehicles, threads);
   std::mt19937_64 random(1);
-  for (std::size_t e = 0; e + 1 < candidates.size(); ++e) {
+  for (std::size_t e = 0; e + 1 < vehicles.size(); ++e) {
     if (left[0].empty() || left[e + 1].empty()) continue;
     Validation::Control best{all.hypothesis.effects()[e], "", 0, 0};
     for (const int channel : channels_of(flights)) {
@@ -141,9 +139,9 @@ void control(const std::vector<PredictedFlight>& flights, const Fitted& all, con
       for (int copy = 0; copy < kCopies; ++copy) {
         std::vector<std::vector<double>> moved = x;
         for (std::vector<double>& v : moved)
-          if (v.size() > 2 * kLeastShift)
+          if (v.size() > 2 * kMinShift)
             std::rotate(v.begin(),
-                        v.begin() + static_cast<std::ptrdiff_t>(kLeastShift + random() % (v.size() - 2 * kLeastShift)),
+                        v.begin() + static_cast<std::ptrdiff_t>(kMinShift + random() % (v.size() - 2 * kMinShift)),
                         v.end());
         shifted = std::max(shifted, 1 - left_beside(y, moved) / before);
       }
@@ -153,20 +151,20 @@ void control(const std::vector<PredictedFlight>& flights, const Fitted& all, con
   }
 }
 
-void agree(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Fitted& fit, Validation& to) {
+void agree(const Fitter& fitter, const Flights& flights, const FittedHypothesis& fit, Validation& to) {
   const Hypothesis& h = fit.hypothesis;
-  const Eigen::MatrixXd& axes = fit.point->directions.axes;
+  const Eigen::MatrixXd& axes = fit.fit->directions.axes;
   std::vector<VectorXd> means, sds;
   for (std::size_t f = 0; f < flights.size(); ++f) {
     std::vector<char> use(flights.size(), 0);
     use[f] = 1;
-    const Posterior p = robot.fitter().posterior(h, *fit.point, use);
-    means.push_back(h.bounded(fit.point->at + axes * p.mean));
+    const Posterior p = fitter.posterior(h, *fit.fit, use);
+    means.push_back(h.bounded(fit.fit->at + axes * p.mean));
     sds.push_back((axes * p.covariance * axes.transpose()).diagonal().cwiseSqrt());
   }
   for (Index i = h.shared(); i < h.size(); ++i) {
     const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
-    if (!u.size) continue;
+    if (!u.magnitude) continue;
     Validation::Agreement a{u.effect + "." + u.name, {}, {}, 1};
     double weight = 0, mean = 0, squares = 0;
     for (std::size_t f = 0; f < flights.size(); ++f) {
@@ -184,35 +182,50 @@ void agree(const RobotFit& robot, const std::vector<PredictedFlight>& flights, c
 
 }  // namespace
 
-std::vector<Residuals> held_out(const RobotFit& robot, const std::vector<PredictedFlight>& flights,
-                                const std::vector<Fitted>& fits, const std::vector<int>& fold, int threads) {
+std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, const std::vector<FittedHypothesis>& fits,
+                                const std::vector<int>& fold, int threads) {
   const std::size_t folds = static_cast<std::size_t>(*std::ranges::max_element(fold)) + 1;
-  std::vector<Candidate> candidates;
-  std::vector<BasisCoefficients> beside;
-  for (const Fitted& fit : fits)
+  std::vector<VehicleHypothesis> vehicles;
+  std::vector<BasisCoefficients> nuisances;
+  for (const FittedHypothesis& fit : fits)
     for (std::size_t k = 0; k < folds; ++k) {
       std::vector<char> others(flights.size(), 1);
       for (std::size_t f = 0; folds > 1 && f < flights.size(); ++f) others[f] = fold[f] != static_cast<int>(k) ? 1 : 0;
-      Fitter::Joint joint = robot.fitter().joint(fit.hypothesis, *fit.point, others);
-      candidates.push_back(fit.hypothesis.candidate(joint.at));
-      beside.push_back(std::move(joint.beside));
+      Fitter::JointFit joint = fitter.joint_fit(fit.hypothesis, *fit.fit, others);
+      vehicles.push_back(fit.hypothesis.vehicle(joint.at));
+      nuisances.push_back(std::move(joint.nuisances));
     }
-  std::vector<Residuals> rows = residuals(flights, candidates, threads);
+  const Evidence& evidence = fitter.evidence();
+  std::vector<Residuals> rows = residuals(flights, vehicles, threads);
   std::vector<Residuals> left(fits.size(), Residuals(flights.size()));
   for (std::size_t i = 0; i < fits.size(); ++i)
     for (std::size_t f = 0; f < flights.size(); ++f) {
       const std::size_t k = i * folds + static_cast<std::size_t>(fold[f]);
       Residuals& s = rows[k];
       if (s.empty()) continue;
-      // of one that is known by the beat, what stands beside a fit is noise
       left[i][f] =
-          flights[f].within_the_beat() ? robot.evidence().without(f, std::move(s[f]), beside[k]) : std::move(s[f]);
+          evidence.policy().nuisances_are_noise ? evidence.without(f, std::move(s[f]), nuisances[k]) : std::move(s[f]);
     }
   return left;
 }
 
-Residuals smoothed_away(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Residuals& residual) {
-  const RegimeBasis& basis = robot.evidence().basis();
+void hold_out(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights, int threads,
+              Inference& d) {
+  std::vector<FittedHypothesis> fits = {{Hypothesis(uncertain, {}), &d.parameters}};
+  std::vector<Residuals*> of = {&d.refit};
+  for (ScoredHypothesis& a : d.hypotheses)
+    if (a.fitted()) {
+      fits.push_back({Hypothesis(uncertain, a.effects), &a.fit});
+      of.push_back(&a.held_out);
+    }
+  std::vector<int> each(flights.size());
+  std::iota(each.begin(), each.end(), 0);
+  std::vector<Residuals> left = held_out(fitter, flights, fits, each, threads);
+  for (std::size_t i = 0; i < of.size(); ++i) *of[i] = std::move(left[i]);
+}
+
+Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const Residuals& residual) {
+  const RegimeBasis& basis = evidence.basis();
   Residuals left = residual;
   for (const int channel : channels_of(flights)) {
     struct Sums {
@@ -245,10 +258,10 @@ Residuals smoothed_away(const RobotFit& robot, const std::vector<PredictedFlight
   return left;
 }
 
-double mean_square(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Residuals& residual) {
+double mean_square(const Evidence& evidence, const Flights& flights, const Residuals& residual) {
   double sum = 0, n = 0;
   for (const int channel : channels_of(flights)) {
-    const double noise = robot.evidence().noise_sd(channel * kCoefficients);
+    const double noise = evidence.noise_sd(channel * kCoefficients);
     for_rows(flights, channel, [&](std::size_t f, std::size_t, std::size_t row) {
       if (!residual[f].empty()) sum += std::pow(residual[f][row] / noise, 2), n += 1;
     });
@@ -256,44 +269,41 @@ double mean_square(const RobotFit& robot, const std::vector<PredictedFlight>& fl
   return n > 0 ? sum / n : 0;
 }
 
-Validation validate(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Diagnosis& d,
-                    int threads) {
+Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights,
+                    const Inference& d, int threads) {
   Validation v;
-  const sim::Randomisation& uncertain = robot.uncertain();
   // the largest set that the conclusion holds, and those on the way to it
-  std::vector<Fitted> fits = {{Hypothesis(uncertain, {}), &d.parameters.point}};
+  std::vector<FittedHypothesis> fits = {{Hypothesis(uncertain, {}), &d.parameters}};
   std::vector<const Residuals*> left = {&d.refit};
-  const ScoredHypothesis& concluded = d.hypotheses[d.conclusion.hypothesis];
-  for (std::size_t n = 1; n <= concluded.effects.size(); ++n) {
-    const std::vector<std::string> set(concluded.effects.begin(),
-                                       concluded.effects.begin() + static_cast<std::ptrdiff_t>(n));
+  const std::vector<std::string>& effects = d.conclusion().effects;
+  for (std::size_t n = 1; n <= effects.size(); ++n) {
+    const std::vector<std::string> set(effects.begin(), effects.begin() + static_cast<std::ptrdiff_t>(n));
     const auto found = std::ranges::find_if(d.hypotheses, [&](const ScoredHypothesis& a) {
-      return a.fitted() && a.kind == ScoredHypothesis::Kind::effect && a.effects == set;
+      return a.fitted() && a.kind == HypothesisKind::effect && a.effects == set;
     });
     if (found == d.hypotheses.end()) continue;
-    fits.push_back({Hypothesis(uncertain, set), &found->fit.point});
-    left.push_back(&found->left);
+    fits.push_back({Hypothesis(uncertain, set), &found->fit});
+    left.push_back(&found->held_out);
   }
   std::vector<int> type;
-  std::vector<std::string> kinds;
+  std::vector<std::string> types;
   for (std::size_t f = 0; f < flights.size(); ++f) {
-    const std::string kind = kind_of(flights[f].name());
-    if (!std::ranges::count(kinds, kind)) kinds.push_back(kind);
-    type.push_back(static_cast<int>(std::ranges::find(kinds, kind) - kinds.begin()));
+    const std::string name = type_of(flights[f]->name());
+    if (!std::ranges::count(types, name)) types.push_back(name);
+    type.push_back(static_cast<int>(std::ranges::find(types, name) - types.begin()));
   }
-  const std::vector<Residuals> by_type = held_out(robot, flights, fits, type, threads);
-  const auto rung = [&](const std::string& added, const Residuals& own, const Residuals& own_by_type) {
+  const std::vector<Residuals> by_type = held_out(fitter, flights, fits, type, threads);
+  const auto rung = [&](const std::string& added, const Residuals& each, const Residuals& by_types) {
     v.ladder.push_back({added, {}});
     for (const int channel : channels_of(flights))
-      v.ladder.back().errors.push_back(error_of(flights, own, own_by_type, channel));
+      v.ladder.back().errors.push_back(error_of(flights, each, by_types, channel));
   };
   rung("file", d.nominal, d.nominal);
   for (std::size_t i = 0; i < fits.size(); ++i)
     rung(i == 0 ? "parameters" : fits[i].hypothesis.effects().back(), *left[i], by_type[i]);
-  const Fitted& last = fits.back();
-  control(flights, last, robot.fitter().joint(last.hypothesis, *last.point, robot.fitter().all_flights()).at, threads,
-          v);
-  agree(robot, flights, last, v);
+  const FittedHypothesis& last = fits.back();
+  control(flights, last, fitter.joint_fit(last.hypothesis, *last.fit, fitter.all_flights()).at, threads, v);
+  agree(fitter, flights, last, v);
   return v;
 }
 

@@ -1,29 +1,32 @@
-// What fits leave in flights that they have not seen, and what a laboratory asks besides.
+// What fits leave in flights that they have not seen.
 #pragma once
 
-#include "gap/diagnose/diagnose.hpp"
+#include "gap/diagnose/inference.hpp"
 
 namespace flappy::gap {
 
-struct Fitted {
+struct FittedHypothesis {
   Hypothesis hypothesis;
-  const Linearised* point;
+  const Fit* fit;
 };
 
-/// What is left, [fit][flight], in each flight with the fit to those of other folds; of a single fold, with its own. `fold`: of each flight.
-std::vector<Residuals> held_out(const RobotFit& robot, const std::vector<PredictedFlight>& flights,
-                                const std::vector<Fitted>& fits, const std::vector<int>& fold, int threads);
+/// Residuals, [fit][flight], of each flight with the fit to those of other folds; of a single fold, with the fit to all. `fold`: [flight].
+std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, const std::vector<FittedHypothesis>& fits,
+                                const std::vector<int>& fold, int threads);
 
-/// What smooth functions of the regime leave of a residual in each flight, by least squares on those of the others: as much as anything that
-/// depends on the regime could explain.
-Residuals smoothed_away(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Residuals& residual);
+/// Sets d.refit, and held_out of each fitted hypothesis, each flight being a fold.
+void hold_out(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights, int threads,
+              Inference& d);
+
+/// A residual less, in each flight, the smooth functions of the regime that fit the other flights by least squares: no effect can explain more.
+Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const Residuals& residual);
 /// Mean square over all rows, in units of noise.
-double mean_square(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Residuals& residual);
+double mean_square(const Evidence& evidence, const Flights& flights, const Residuals& residual);
 
-/// Of the most probable effects. Shifted copies are moved round within each flight by at least kLeastShift rows, and fitted as the effect is:
-/// to other flights, by least squares.
-inline constexpr std::size_t kLeastShift = 50;
-Validation validate(const RobotFit& robot, const std::vector<PredictedFlight>& flights, const Diagnosis& diagnosis,
-                    int threads);
+/// Controls of the most probable effects. Shifted copies are rotated within each flight by kMinShift rows or more, and fitted like the effect: to
+/// other flights, by least squares.
+inline constexpr std::size_t kMinShift = 50;
+Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights,
+                    const Inference& d, int threads);
 
 }  // namespace flappy::gap

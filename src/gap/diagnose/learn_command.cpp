@@ -6,6 +6,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/check/data_faults.hpp"
 #include "gap/evidence/learn_discrepancy.hpp"
+#include "gap/replay/reset_prediction.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
@@ -34,22 +35,19 @@ void run_learn_discrepancy(const LearnCommand& command) {
   const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kHoldStep_s);
   const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors).root());
   const ModelDiscrepancy start = read_model_discrepancy(command.discrepancy);
-  std::vector<std::vector<PredictedFlight>> flights;
+  std::vector<Flights> robots;
   for (const std::string& robot : command.robots) {
-    flights.emplace_back();
+    robots.emplace_back();
     for (const fs::path& folder : flights_of(robot)) {
       flightlog::FlightLog log = flightlog::read_flight_log(folder);
       if (const auto faults = data_faults(log, folder); !faults.empty())
         throw io::InputError(faults.front().file + ":" + std::to_string(faults.front().line) + ": " +
                              faults.front().what + "; accepted: flights that flappy-gap check finds no fault in");
-      flights.back().emplace_back(Recording(folder, std::move(log), vehicle));
+      robots.back().push_back(std::make_shared<ResetPrediction>(Recording(folder, std::move(log), vehicle)));
     }
   }
-  std::vector<std::unique_ptr<RobotFit>> robots;
-  for (const std::vector<PredictedFlight>& f : flights)
-    robots.push_back(std::make_unique<RobotFit>(f, uncertain, start, std::vector<std::string>(), command.threads));
   io::stop_on_interrupt();
-  const ModelDiscrepancy learnt = learn_discrepancy(robots, start);
+  const ModelDiscrepancy learnt = learn_discrepancy(robots, uncertain, start, command.threads);
   io::write_atomically(command.out,
                        discrepancy_text(learnt, std::to_string(robots.size()) + " robots, commit " + io::commit()));
   std::printf("%s: learnt from %zu robots\n", command.out.c_str(), robots.size());

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "gap/diagnose/verdict.hpp"
+#include "gap/replay/reset_prediction.hpp"
 #include "io/parallel.hpp"
 #include "rollout/simulated_flight.hpp"
 
@@ -24,18 +25,18 @@ struct Rival {
   Directions directions;
   MatrixXd covariance;  ///< along the directions
   bool open;            ///< its effect is left open by the flights so far: it is the parameters' vehicle but for a size
-  Candidate candidate() const { return hypothesis.candidate(at); }
+  VehicleHypothesis vehicle() const { return hypothesis.vehicle(at); }
 };
 
 std::string name_of(const ScoredHypothesis& a) {
-  if (a.kind == ScoredHypothesis::Kind::none) return "none";
-  if (a.kind == ScoredHypothesis::Kind::parameters) return "parameters";
+  if (a.kind == HypothesisKind::none) return "none";
+  if (a.kind == HypothesisKind::parameters) return "parameters";
   std::string name;
   for (const std::string& e : a.effects) name += (name.empty() ? "" : "+") + e;
   return name;
 }
 
-/// Of the most probable rivals so many have to survive a manoeuvre.
+/// The most probable rivals, which have to survive a manoeuvre.
 constexpr std::size_t kSurvive = 4;
 
 /// Of an effect that the flights leave open: beside the parameters where they are, sizes that it may well have.
@@ -44,27 +45,26 @@ VectorXd open_place(const Hypothesis& h, const Fit& fit, const VectorXd& paramet
   at.head(h.shared()) = parameters;
   const MatrixXd covariance = fit.covariance();
   for (Index i = h.shared(); i < h.size(); ++i)
-    if (h.unknowns()[static_cast<std::size_t>(i)].size)
+    if (h.unknowns()[static_cast<std::size_t>(i)].magnitude)
       at[i] = std::copysign(std::hypot(at[i], std::sqrt(covariance(i, i))), at[i]);
   return at;
 }
 
-std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncertain, double least) {
+std::vector<Rival> rivals_of(const Inference& d, const sim::Randomisation& uncertain, double least) {
   std::vector<Rival> rivals;
   for (const ScoredHypothesis& a : d.hypotheses) {
     if (a.probability < least) break;
-    if (a.kind == ScoredHypothesis::Kind::unknown || !a.terms.empty()) continue;
+    if (a.kind == HypothesisKind::unknown || a.has_remainder()) continue;
     const Hypothesis h(uncertain, a.effects);
-    if (a.kind == ScoredHypothesis::Kind::none) {
+    if (a.kind == HypothesisKind::none) {
       rivals.push_back(
           {name_of(a), a.probability, h, h.start(), {MatrixXd(h.size(), 0), VectorXd(0)}, MatrixXd(0, 0), false});
       continue;
     }
-    const Fit& fit = a.kind == ScoredHypothesis::Kind::parameters ? d.parameters : a.fit;
-    const bool open = a.kind == ScoredHypothesis::Kind::effect && !a.fitted();
+    const Fit& fit = a.kind == HypothesisKind::parameters ? d.parameters : a.fit;
+    const bool open = a.kind == HypothesisKind::effect && !a.fitted();
     const VectorXd at = open ? open_place(h, fit, d.parameters.mean()) : fit.mean();
-    rivals.push_back(
-        {name_of(a), a.probability, h, h.bounded(at), fit.point.directions, fit.posterior.covariance, open});
+    rivals.push_back({name_of(a), a.probability, h, h.bounded(at), fit.directions, fit.posterior.covariance, open});
   }
   return rivals;
 }
@@ -73,11 +73,11 @@ std::vector<Rival> rivals_of(const Diagnosis& d, const sim::Randomisation& uncer
 struct Expected {
   SufficientStatistics residual;
   std::vector<BasisCoefficients> uncertain;  ///< changes for one standard deviation each, independent of each other
-  BasisCoefficients form;                    ///< what its effects' equations get wrong
+  BasisCoefficients law_sd;                  ///< what the laws of its effects get wrong
 };
 
 /// What the parameters that all hypotheses share change, by the columns of one along the directions of another.
-std::vector<BasisCoefficients> turned(const Linearised& l, const Directions& directions, Index shared) {
+std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions, Index shared) {
   std::vector<BasisCoefficients> columns;
   const MatrixXd turn =
       l.directions.axes.topLeftCorner(shared, shared).transpose() * directions.axes.topLeftCorner(shared, shared);
@@ -95,19 +95,19 @@ std::vector<BasisCoefficients> turned(const Linearised& l, const Directions& dir
 }
 
 /// Nothing where its vehicle comes apart. `first`: the first rival with parameters, whose columns serve the others.
-std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::optional<Linearised>& first) {
+std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::optional<Fit>& first) {
   const bool with_parameters = rival.directions.reach.size() > 0;
   std::vector<BasisCoefficients> known;
   if (with_parameters && first) known = turned(*first, rival.directions, rival.hypothesis.shared());
-  const Linearised l = fitter.linearise(rival.hypothesis, rival.at, rival.directions, known);
+  const Fit l = fitter.linearise(rival.hypothesis, rival.at, rival.directions, known);
   if (l.residual.empty()) return {};
   if (with_parameters && !first) first = l;
-  Expected e{l.statistics, {}, fitter.shape_error(rival.hypothesis, l)};
+  Expected e{l.statistics, {}, fitter.law_sd(rival.hypothesis, l)};
   const Index k = rival.covariance.rows();
   if (k == 0) return e;  // without a gap nothing is uncertain
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(rival.covariance);
   for (Index i = 0; i < k; ++i) {
-    BasisCoefficients sum = BasisCoefficients::Zero(e.form.rows(), e.form.cols());
+    BasisCoefficients sum = BasisCoefficients::Zero(e.law_sd.rows(), e.law_sd.cols());
     for (Index d = 0; d < k; ++d) {
       const BasisCoefficients& column = l.columns[static_cast<std::size_t>(d)];
       if (column.size() > 0) sum += eigen.eigenvectors()(d, i) * column;
@@ -129,7 +129,7 @@ double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
     columns.push_back(&column);
   }
   const BasisCoefficients sd =
-      (evidence.discrepancy_sd().array().square() + a.form.array().square() + b.form.array().square()).sqrt();
+      (evidence.discrepancy_sd({}).array().square() + a.law_sd.array().square() + b.law_sd.array().square()).sqrt();
   Reduced reduced = evidence.reduce(difference, columns, {1}, sd);
   const VectorXd prior_mean = VectorXd::Zero(static_cast<Index>(columns.size()));
   const double with = Evidence::posterior(reduced, chosen, prior_mean).log_evidence;
@@ -140,29 +140,29 @@ double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
 
 /// Of rivals that the flights so far leave open: what the most probable one leaves, but for what their sizes change. They differ from one and the
 /// same vehicle by these alone, so nothing of it is rough, and nothing else has to be flown.
-void add_open(const std::vector<Rival>& rivals, const std::vector<PredictedFlight>& flight, const Evidence& evidence,
+void add_open(const std::vector<Rival>& rivals, const Flights& flight, const Evidence& evidence,
               std::vector<std::optional<Expected>>& expected) {
   std::vector<std::size_t> open;
-  std::vector<Candidate> candidates;
+  std::vector<VehicleHypothesis> vehicles;
   for (std::size_t i = 0; i < rivals.size(); ++i) {
     if (expected[i] || !rivals[i].open) continue;
     const Rival& r = rivals[i];
     if (open.empty()) {
       VectorXd without = r.hypothesis.start();
       without.head(r.hypothesis.shared()) = r.at.head(r.hypothesis.shared());
-      candidates.push_back(r.hypothesis.candidate(without));
+      vehicles.push_back(r.hypothesis.vehicle(without));
     }
-    candidates.push_back(r.candidate());
+    vehicles.push_back(r.vehicle());
     open.push_back(i);
   }
   if (open.empty()) return;
-  std::vector<Residuals> left = residuals(flight, candidates, 1);
+  std::vector<Residuals> left = residuals(flight, vehicles, 1);
   if (left[0].empty()) return;
   const SufficientStatistics without = evidence.statistics(left[0]);
   for (std::size_t k = 0; k < open.size(); ++k) {
     if (left[k + 1].empty()) continue;
     Expected e = *expected[0];
-    e.form.setZero();
+    e.law_sd.setZero();
     const SufficientStatistics with = evidence.statistics(left[k + 1]);
     for (std::size_t f = 0; f < with.sums.size(); ++f)
       for (std::size_t g = 0; g < with.sums[f].size(); ++g)
@@ -170,6 +170,9 @@ void add_open(const std::vector<Rival>& rivals, const std::vector<PredictedFligh
     expected[open[k]] = std::move(e);
   }
 }
+
+/// Step of the courses of a proposed flight.
+constexpr double kCourseStep_s = 0.1;
 
 constexpr const char* kCourses[] = {"x_m", "y_m", "z_m", "amplitude_V", "difference_V", "bias_V", "split_cycle"};
 
@@ -220,19 +223,19 @@ std::vector<Course> courses_of(const std::vector<std::vector<double>>& first,
 std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std::vector<Rival>& rivals,
                                                    const NextOptions& options) {
   const auto fly = [&](const Rival& r) {
-    return std::move(simulate(m.config, r.candidate().vehicle, 1, m.config.settle_s)[0]);
+    return std::move(simulate(m.config, r.vehicle().vehicle, 1, m.config.settle_s)[0]);
   };
   std::vector<rollout::SimulatedFlight> flown;
   for (std::size_t i = 0; i < std::min(rivals.size(), kSurvive); ++i) {
     flown.push_back(fly(rivals[i]));
     if (flown.back().lost || !flown.back().log) return {};
   }
-  std::vector<PredictedFlight> flight;
-  flight.emplace_back(Recording(m.name, *flown.front().log, rivals.front().candidate().vehicle));
-  const Evidence evidence(flight, options.discrepancy, 1);
-  const Fitter fitter(flight, evidence, 1);
+  const Flights flight = {
+      std::make_shared<ResetPrediction>(Recording(m.name, *flown.front().log, rivals.front().vehicle().vehicle))};
+  const Fitter fitter(flight, std::make_shared<const Evidence>(flight, options.discrepancy, 1), 1);
+  const Evidence& evidence = fitter.evidence();
   std::vector<std::optional<Expected>> expected(rivals.size());
-  std::optional<Linearised> first;
+  std::optional<Fit> first;
   for (std::size_t i = 0; i < rivals.size(); ++i)
     if (i < 2 || !rivals[i].open) expected[i] = expect(rivals[i], fitter, first);
   if (!expected[0] || !expected[1]) return {};
@@ -242,9 +245,9 @@ std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std
     if (expected[i]) all += rivals[i].probability;
   const auto information = [&](std::size_t a, double brought) {
     const double p = rivals[a].probability / all;
-    return -p * std::log(p + (1 - p) * kept_against(std::max(0.0, brought), options.rule));
+    return -p * std::log(p + (1 - p) * tempered(std::max(0.0, brought), options.rule));
   };
-  NextExperiment result{m.name, {}, 0, 0, {}};
+  NextExperiment result{m.name, {}, 0, 0, kCourseStep_s, {}};
   std::size_t other = 1;
   double most = -1;
   for (std::size_t a = 1; a < rivals.size(); ++a) {
@@ -277,9 +280,9 @@ std::vector<Manoeuvre> read_manoeuvres(const fs::path& folder) {
   return list;
 }
 
-std::vector<NextExperiment> rank_experiments(const Diagnosis& diagnosis, const sim::Randomisation& uncertain,
+std::vector<NextExperiment> rank_experiments(const Inference& inference, const sim::Randomisation& uncertain,
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options) {
-  const std::vector<Rival> rivals = rivals_of(diagnosis, uncertain, options.least_probability);
+  const std::vector<Rival> rivals = rivals_of(inference, uncertain, options.least_probability);
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
   io::parallel_for(manoeuvres.size(), options.threads,

@@ -17,8 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/diagnose/diagnose.hpp"
-#include "gap/diagnose/verdict_rule.hpp"
+#include "gap/diagnose/inference.hpp"
 #include "rollout/fly_config.hpp"
 
 namespace flappy::gap {
@@ -32,23 +31,6 @@ struct Manoeuvre {
 /// The configurations (*.toml) of a folder, by name. io::InputError where there is none or one is faulty.
 std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder);
 
-/// What a flight shows of a rival: means over kCourseStep_s, from the log's begin.
-struct Course {
-  std::string quantity;               ///< x_m, ..., amplitude_V, ...
-  std::vector<double> first, second;  ///< of the two that are told apart
-};
-inline constexpr double kCourseStep_s = 0.1;
-
-struct NextExperiment {
-  std::string manoeuvre;
-  std::vector<std::string>
-      separates;  ///< the most probable hypothesis and the one that it parts most from it: effects joined by +, or their kind
-  double expected_nats = 0;  ///< between these two, mean of both ways
-  double information = 0;    ///< I, of all rivals, nats
-  std::vector<Course>
-      courses;  ///< as each of the two would fly it; first what differs most beside what it does in the flight
-};
-
 struct NextOptions {
   int threads = 0;
   double least_probability = 0.01;  ///< of a rival
@@ -58,7 +40,7 @@ struct NextOptions {
 
 /// Most informative first. Rivals are the probable hypotheses that can fly: an unknown cause cannot. Without two of them, and for a
 /// manoeuvre that one of the four most probable vehicles would not survive, there is nothing.
-std::vector<NextExperiment> rank_experiments(const Diagnosis& diagnosis, const sim::Randomisation& uncertain,
+std::vector<NextExperiment> rank_experiments(const Inference& inference, const sim::Randomisation& uncertain,
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options = {});
 
 }  // namespace flappy::gap

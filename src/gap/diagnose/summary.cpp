@@ -11,7 +11,7 @@
 namespace flappy::gap {
 namespace {
 
-constexpr std::size_t kSizes = 6, kBackground = 2, kRunnersUp = 3, kMoved = 3, kTerms = 3, kSensors = 3;
+constexpr std::size_t kParameters = 6, kBackground = 2, kRunnersUp = 3, kMoved = 3, kTerms = 3, kSensors = 3;
 
 std::string listed(const std::vector<std::string>& words, const char* last) {
   std::string all;
@@ -20,62 +20,62 @@ std::string listed(const std::vector<std::string>& words, const char* last) {
   return all;
 }
 
-std::string size_line(const SizeEstimate& s) {
+std::string estimate_line(const Estimate& s) {
   return io::format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
                     s.unit.empty() ? "" : " ", s.unit.c_str());
 }
 
-std::string place_of(const Unexplained& u) {
-  return u.channel + ", " + (u.harmonic == "0" ? "mean of the beat" : "harmonic " + u.harmonic);
+std::string place_of(const UnexplainedTerm& u) {
+  return u.channel + ", " + (u.harmonic == 0 ? "mean of the beat" : "harmonic " + std::to_string(u.harmonic));
 }
 
-std::string verdict_line(const Conclusion& c) {
+std::string verdict_line(const Verdict& c) {
   const double p = c.probability;
   switch (c.kind) {
-    case Conclusion::Kind::effect:
+    case VerdictKind::effect:
       return io::format("Missing in the model: %s%s (probability %.2f%s)", listed(c.effects, "and").c_str(),
                         c.remainder ? ", and something more" : "", p, p < 0.5 ? ", no more than a guess" : "");
-    case Conclusion::Kind::group:
+    case VerdictKind::group:
       return io::format("Missing in the model: one of %s, which these flights cannot tell apart (together %.2f)",
                         listed(c.effects, "or").c_str(), p);
-    case Conclusion::Kind::parameters:
+    case VerdictKind::parameters:
       return io::format("Nothing is missing in the model, its parameters are off (probability %.2f)", p);
-    case Conclusion::Kind::none:
+    case VerdictKind::none:
       return io::format("No gap beyond noise: the vehicle's file explains the flights (probability %.2f)", p);
-    case Conclusion::Kind::unknown:
+    case VerdictKind::unknown:
       return io::format("Something is missing in the model that no entry of the catalogue explains (probability %.2f)",
                         p);
-    case Conclusion::Kind::data:
+    case VerdictKind::data:
       return "The data are at fault; nothing was diagnosed";
   }
   return "";
 }
 
-std::string next_line(const Report& r, const std::string& out) {
-  const Conclusion& c = r.conclusion;
+std::string next_line(const Diagnosis& r, const std::string& out) {
+  const Verdict& c = r.verdict;
   const std::string vehicle =
       (out.empty() ? "DIR" : std::filesystem::absolute(out).lexically_normal().string()) + "/vehicle_corrected.toml";
   switch (c.kind) {
-    case Conclusion::Kind::effect:
-    case Conclusion::Kind::parameters:
+    case VerdictKind::effect:
+    case VerdictKind::parameters:
       return "next: train or fly on what was found, as with flappy-train CONFIG --set vehicle=" + vehicle;
-    case Conclusion::Kind::group:
+    case VerdictKind::group:
       return "next: fly so that these differ, and diagnose old and new flights together";
-    case Conclusion::Kind::none:
+    case VerdictKind::none:
       return "next: nothing to correct; fly harder manoeuvres to look further";
-    case Conclusion::Kind::unknown:
+    case VerdictKind::unknown:
       return "next: see what the residuals depend on; where that is no help, fly harder manoeuvres there";
-    case Conclusion::Kind::data:
+    case VerdictKind::data:
       return "next: mend the logs, until flappy-gap check finds no fault";
   }
   return "";
 }
 
 /// What stands out most in the stroke, in what the vehicle did and in frequency.
-std::vector<GapLocation> one_of_each_test(const Report& r) {
-  std::vector<GapLocation> list;
-  for (const char* test : {"phase", "regime", "frequency"})
-    for (const GapLocation& p : largest_discoveries(r.places, "refit", r.places.size()))
+std::vector<ResidualLocation> one_of_each_test(const Diagnosis& r) {
+  std::vector<ResidualLocation> list;
+  for (const ResidualTest test : {ResidualTest::phase, ResidualTest::regime, ResidualTest::frequency})
+    for (const ResidualLocation& p : largest_discoveries(r, Stage::refit, r.locations.size()))
       if (p.test == test) {
         list.push_back(p);
         break;
@@ -96,7 +96,7 @@ const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
 }
 
 /// By how much, which way, and its interval.
-std::string sensor_line(const SizeEstimate& s) {
+std::string sensor_line(const Estimate& s) {
   const bool more = s.value > 0;
   const auto told = [&](const std::string& what, double factor, const char* unit, const std::string& how) {
     const double a = factor * (more ? s.low : -s.high), b = factor * (more ? s.high : -s.low);
@@ -113,83 +113,84 @@ std::string sensor_line(const SizeEstimate& s) {
   return told("the IMU sits", 1e3, "mm", "along " + way + axis);
 }
 
-std::string name_of(const Reported& c) {
-  return c.kind == ScoredHypothesis::Kind::effect ? listed(c.effects, "and") + (c.remainder ? " and more" : "")
-                                                  : "(" + c.group + ")";
+std::string words_of(const RankedHypothesis& c) {
+  return c.kind == HypothesisKind::effect ? listed(c.effects, "and") + (c.remainder ? " and more" : "")
+                                          : "(" + c.group + ")";
 }
 
 }  // namespace
 
-std::vector<std::string> summary_of(const Report& r, const std::string& out) {
+std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) {
   std::vector<std::string> lines = {
-      r.complete ? verdict_line(r.conclusion)
+      r.complete ? verdict_line(r.verdict)
                  : "Stopped before every effect was weighed: this is no verdict, only what was weighed until then"};
-  if (r.conclusion.kind == Conclusion::Kind::data) {
+  if (r.verdict.kind == VerdictKind::data) {
     for (std::size_t i = 0; i < r.faults.size() && i + 3 < kSummaryLines; ++i)
       lines.push_back(io::format("  %s:%zu: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
     lines.push_back(next_line(r, out));
     return lines;
   }
-  std::vector<const Reported*> ranked;
-  for (const Reported& c : r.candidates) ranked.push_back(&c);
-  std::ranges::stable_sort(ranked, std::greater{}, &Reported::probability);
-  const bool named = r.conclusion.kind == Conclusion::Kind::effect || r.conclusion.kind == Conclusion::Kind::group;
+  std::vector<const RankedHypothesis*> ranked;
+  for (const RankedHypothesis& c : r.hypotheses) ranked.push_back(&c);
+  std::ranges::stable_sort(ranked, std::greater{}, &RankedHypothesis::probability);
+  const bool named = r.verdict.kind == VerdictKind::effect || r.verdict.kind == VerdictKind::group;
   // its sizes: of the most probable one
-  const Reported* concluded = nullptr;
-  for (const Reported* c : ranked)
-    if (concluded == nullptr && named && c->kind == ScoredHypothesis::Kind::effect &&
+  const RankedHypothesis* concluded = nullptr;
+  for (const RankedHypothesis* c : ranked)
+    if (concluded == nullptr && named && c->kind == HypothesisKind::effect &&
         std::ranges::all_of(c->effects,
-                            [&](const std::string& e) { return std::ranges::count(r.conclusion.effects, e) > 0; }))
+                            [&](const std::string& e) { return std::ranges::count(r.verdict.effects, e) > 0; }))
       concluded = c;
   if (concluded != nullptr) {
     lines.push_back("size, with its 90 % interval:");
-    for (std::size_t i = 0; i < concluded->sizes.size() && i < kSizes; ++i)
-      lines.push_back(size_line(concluded->sizes[i]));
+    for (std::size_t i = 0; i < concluded->parameters.size() && i < kParameters; ++i)
+      lines.push_back(estimate_line(concluded->parameters[i]));
   }
-  if (r.otherwise)
+  if (r.other_law)
     lines.push_back(io::format("by another law than the entry's, most so in %s, on %s (%s)",
-                               place_of(*r.otherwise).c_str(), r.otherwise->regime.c_str(),
-                               r.otherwise->function.c_str()));
+                               place_of(*r.other_law).c_str(), r.other_law->regime.c_str(),
+                               r.other_law->function.c_str()));
   if (!r.background.empty()) {
     lines.push_back("besides, in the corrected vehicle, not told from chance:");
     for (std::size_t i = 0; i < r.background.size() && i < kBackground; ++i)
-      lines.push_back(size_line(r.background[i]));
+      lines.push_back(estimate_line(r.background[i]));
   }
-  if ((r.conclusion.kind == Conclusion::Kind::unknown || r.conclusion.remainder) && !r.unexplained.empty()) {
+  if ((r.verdict.kind == VerdictKind::unknown || r.verdict.remainder) && !r.unexplained.empty()) {
     lines.push_back(r.jointly_with.empty()
                         ? "what is left depends on:"
                         : "what is left, with " + listed(r.jointly_with, "and") + " in force, depends on:");
     for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
       lines.push_back(io::format("  %s on %s (%s), %.1f times what models of this robot get wrong",
                                  place_of(r.unexplained[i]).c_str(), r.unexplained[i].regime.c_str(),
-                                 r.unexplained[i].function.c_str(), r.unexplained[i].times));
+                                 r.unexplained[i].function.c_str(), r.unexplained[i].times_usual));
   }
   std::string others;
   std::size_t shown = 0;
-  for (const Reported* c : ranked) {
-    const bool is = named ? c == concluded : kind_name(c->kind) == std::string(kind_name(r.conclusion.kind));
+  for (const RankedHypothesis* c : ranked) {
+    const bool is = named ? c == concluded : name_of(c->kind) == std::string(name_of(r.verdict.kind));
     if (is || shown == kRunnersUp) continue;
-    others += io::format("%s%s %.2g", shown == 0 ? "" : ", ", name_of(*c).c_str(), c->probability);
+    others += io::format("%s%s %.2g", shown == 0 ? "" : ", ", words_of(*c).c_str(), c->probability);
     ++shown;
   }
   lines.push_back("runners-up: " + others);
-  const std::vector<GapLocation> places = one_of_each_test(r);
-  lines.push_back(places.empty() ? "with parameters refitted nothing stands out of the noise"
-                                 : "where the gap lies, with parameters refitted (rms, that of noise):");
-  for (const GapLocation& p : places)
-    lines.push_back(io::format("  %-12s %-34s %8.3g, noise %.3g %s", channel_name(p.channel), p.regime.c_str(), p.gap,
-                               p.noise_floor, channel_unit(p.channel)));
+  const std::vector<ResidualLocation> locations = one_of_each_test(r);
+  lines.push_back(locations.empty() ? "with parameters refitted nothing stands out of the noise"
+                                    : "where the gap lies, with parameters refitted (rms, that of noise):");
+  for (const ResidualLocation& p : locations)
+    lines.push_back(io::format("  %-12s %-34s %8.3g, noise %.3g %s", p.channel.c_str(),
+                               text_of(p.regime, p.test).c_str(), p.gap, p.noise_floor, p.unit.c_str()));
   const auto loss = [](const std::optional<double>& e) { return e ? io::format("%.3g", *e) : std::string("-"); };
-  lines.push_back("mean loss in flights held out: vehicle's file " + loss(r.nominal) + ", parameters refitted " +
-                  loss(r.refit) + ", with the best effect " + loss(r.effect) + ", noise alone " + loss(r.noise_floor));
+  lines.push_back("mean loss in flights held out: vehicle's file " + loss(r.nominal_loss) + ", parameters refitted " +
+                  loss(r.refit_loss) + ", with the best effect " + loss(r.effect_loss) + ", noise alone " +
+                  loss(r.noise_floor));
   if (r.closure)
     lines.push_back(io::format("the best effect closes %.0f %% of what refitting leaves (90 %%: %.0f to %.0f %%)",
                                100 * r.closure->value, 100 * r.closure->low, 100 * r.closure->high));
   else lines.push_back("how much of that an effect closes cannot be told from noise");
-  if (!r.moved.empty() && r.conclusion.kind != Conclusion::Kind::none) {
+  if (!r.moved_parameters.empty() && r.verdict.kind != VerdictKind::none) {
     lines.push_back("parameters that moved most, in standard deviations of what was believed:");
-    for (std::size_t i = 0; i < r.moved.size() && i < kMoved; ++i)
-      lines.push_back(io::format("  %-36s %+10.2f", r.moved[i].name.c_str(), r.moved[i].prior_sd));
+    for (std::size_t i = 0; i < r.moved_parameters.size() && i < kMoved; ++i)
+      lines.push_back(io::format("  %-36s %+10.2f", r.moved_parameters[i].first.c_str(), r.moved_parameters[i].second));
   }
   if (!r.sensors.empty()) {
     lines.push_back("beside what the headers declare (90 %):");

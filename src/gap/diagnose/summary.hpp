@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "gap/diagnose/report.hpp"
+#include "gap/result/diagnosis.hpp"
 
 namespace flappy::gap {
 
 inline constexpr std::size_t kSummaryLines = 30;
 
-/// `out`: where the files are, empty where none were written.
-std::vector<std::string> summary_of(const Report& report, const std::string& out);
+/// `out`: folder of the files; empty: none were written.
+std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::string& out);
 
 }  // namespace flappy::gap

@@ -6,19 +6,74 @@
 #include <map>
 #include <set>
 
+#include "gap/diagnose/held_out.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
+namespace {
 
-const char* kind_name(Conclusion::Kind kind) {
-  static const char* const kNames[] = {"effect", "group", "parameters", "none", "unknown", "data"};
-  return kNames[static_cast<int>(kind)];
+using Eigen::VectorXd;
+
+/// Less than this share of what the parameters leave may be chance.
+constexpr double kMinExplainable = 0.15;
+constexpr double kRefuted = -1e9;
+
+const ScoredHypothesis& parameters_alone(const std::vector<ScoredHypothesis>& all) {
+  return *std::ranges::find(all, HypothesisKind::parameters, &ScoredHypothesis::kind);
 }
 
-const char* kind_name(ScoredHypothesis::Kind kind) {
-  static const char* const kNames[] = {"none", "parameters", "effect", "unknown"};
-  return kNames[static_cast<int>(kind)];
+/// Refutes hypotheses that leave most of what depends on the regime in flights held out, however probable they are beside their rivals.
+void refute(const Evidence& evidence, const Flights& flights, double min_share, Inference& d) {
+  const double refit = mean_square(evidence, flights, d.refit);
+  const double explainable = refit - mean_square(evidence, flights, smoothed_away(evidence, flights, d.refit));
+  if (!(explainable > kMinExplainable * refit)) return;
+  for (ScoredHypothesis& a : d.hypotheses) {
+    if (a.kind == HypothesisKind::unknown) continue;
+    const double share = a.fitted() ? (refit - mean_square(evidence, flights, a.held_out)) / explainable : 0;
+    if (share < min_share) a.log_evidence = kRefuted;
+  }
 }
+
+/// A background magnitude is linear, and an effect was flown. Where the effect explains more than its linear background does, a hypothesis without
+/// the effect may have it as its background, too, at the log-prior cost of the magnitudes there.
+void share_backgrounds(const RobotFit& robot, const Scales& scales, double penalty_nats,
+                       std::vector<ScoredHypothesis>& all) {
+  const double before = parameters_alone(all).log_evidence;
+  for (const ScoredHypothesis& a : all) {
+    if (!a.fitted()) continue;
+    const Hypothesis h(robot.uncertain(), a.effects);
+    // a law that deviates much from the catalogue's counts as a larger magnitude
+    const VectorXd mean = std::max(1.0, a.fit.law_factor) * a.fit.mean();
+    std::map<std::string, double> beyond;
+    for (const std::string& e : a.effects) {
+      std::vector<double> magnitudes;
+      for (Eigen::Index i = h.shared(); i < h.size(); ++i) {
+        const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+        if (u.effect == e && u.magnitude) magnitudes.push_back(mean[i]);
+      }
+      beyond[e] = robot.beyond_background(
+          e, Eigen::Map<VectorXd>(magnitudes.data(), static_cast<Eigen::Index>(magnitudes.size())), scales);
+    }
+    for (ScoredHypothesis& b : all) {
+      if (b.kind == HypothesisKind::none || b.has_remainder() != a.has_remainder()) continue;
+      if (b.effects.size() >= a.effects.size() || (b.kind == HypothesisKind::effect && !b.fitted())) continue;
+      double explained = a.explained();
+      std::size_t shared = 0;
+      for (const std::string& e : a.effects)
+        if (std::ranges::count(b.effects, e) > 0) ++shared;
+        else explained -= std::max(beyond[e], 0.0);
+      if (b.kind == HypothesisKind::unknown && !b.has_remainder()) explained -= penalty_nats;
+      if (shared < b.effects.size() || b.log_prior + explained <= b.log_evidence) continue;
+      b.log_evidence = b.log_prior + explained;
+      b.predicted_with = a.predicted_with.empty() ? a.effects : a.predicted_with;
+    }
+  }
+  // the flights say nothing of effects that were not fitted, and this changes nothing of it
+  for (ScoredHypothesis& b : all)
+    if (b.kind == HypothesisKind::effect && !b.fitted()) b.log_evidence += parameters_alone(all).log_evidence - before;
+}
+
+}  // namespace
 
 std::string pool_name(const std::vector<std::string>& effects) {
   std::vector<std::string> groups;
@@ -30,98 +85,110 @@ std::string pool_name(const std::vector<std::string>& effects) {
 }
 
 void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
-  const Eigen::VectorXd mean = fit.mean();
+  const VectorXd mean = fit.mean();
   Eigen::MatrixXd& covariance = fit.posterior.covariance;
   for (Eigen::Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
     covariance.row(i) *= rule.interval.sd_factor;
     covariance.col(i) *= rule.interval.sd_factor;
-    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].size)
-      covariance(i, i) += std::pow(rule.interval.size_error * mean[i], 2);
+    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].magnitude)
+      covariance(i, i) += std::pow(rule.interval.magnitude_error * mean[i], 2);
   }
 }
 
-double beyond_chance(const ScoredHypothesis& a, double plain, const VerdictRule& rule) {
-  const double gain = a.log_evidence - a.log_prior - plain;
-  const bool more = a.kind == ScoredHypothesis::Kind::unknown || !a.terms.empty();
-  double chance = more ? rule.gain.by_chance_nats : 0;
+double beyond_chance(const ScoredHypothesis& a, double baseline, const VerdictRule& rule) {
+  const double gain = a.log_evidence - a.log_prior - baseline;
+  const bool unknown = a.kind == HypothesisKind::unknown || a.has_remainder();
+  double chance = unknown ? rule.gain.by_chance_nats : 0;
   for (const std::string& e : a.effects) chance += rule.gain.chance_of(e);
-  return a.log_prior + plain + std::max(gain - chance, std::min(gain, 0.0));
+  return a.log_prior + baseline + std::max(gain - chance, std::min(gain, 0.0));
 }
 
-double kept_against(double nats, const VerdictRule& rule) {
-  return std::exp(-rule.doubt.freedom / 2 * std::log1p(2 * nats / (rule.doubt.nats * rule.doubt.freedom)));
+double tempered(double nats, const VerdictRule& rule) {
+  return std::exp(-rule.tempering.freedom / 2 * std::log1p(2 * nats / (rule.tempering.nats * rule.tempering.freedom)));
 }
 
 void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule) {
-  const auto parameters = std::ranges::find(hypotheses, ScoredHypothesis::Kind::parameters, &ScoredHypothesis::kind);
-  const double plain = parameters == hypotheses.end() ? 0 : parameters->log_evidence - parameters->log_prior;
+  const auto parameters = std::ranges::find(hypotheses, HypothesisKind::parameters, &ScoredHypothesis::kind);
+  const double baseline = parameters == hypotheses.end() ? 0 : parameters->explained();
   double most = -std::numeric_limits<double>::infinity(), sum = 0;
-  for (const ScoredHypothesis& a : hypotheses) most = std::max(most, beyond_chance(a, plain, rule) - a.log_prior);
+  for (const ScoredHypothesis& a : hypotheses) most = std::max(most, beyond_chance(a, baseline, rule) - a.log_prior);
   for (ScoredHypothesis& a : hypotheses) {
-    const double behind = most + a.log_prior - beyond_chance(a, plain, rule);
-    a.probability = std::exp(a.log_prior) * kept_against(behind, rule);
+    const double behind = most + a.log_prior - beyond_chance(a, baseline, rule);
+    a.probability = std::exp(a.log_prior) * tempered(behind, rule);
     sum += a.probability;
   }
   for (ScoredHypothesis& a : hypotheses) a.probability /= sum;
   std::ranges::stable_sort(hypotheses, std::greater{}, &ScoredHypothesis::probability);
 }
 
-Conclusion conclude(const std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule) {
+void conclude(const VerdictRule& rule, Inference& d) {
   struct Pool {
-    double mass = 0;
+    double probability = 0;
     std::size_t best = 0;
   };
+  const std::vector<ScoredHypothesis>& all = d.hypotheses;
   std::map<std::string, Pool> pools;  // no effect has the name of another kind
   const auto key = [](const ScoredHypothesis& a) {
-    return a.kind == ScoredHypothesis::Kind::effect ? pool_name(a.effects) : "/" + std::string(kind_name(a.kind));
+    return a.kind == HypothesisKind::effect ? pool_name(a.effects) : "/" + std::string(name_of(a.kind));
   };
-  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-    const auto [at, fresh] = pools.try_emplace(key(hypotheses[i]), Pool{0, i});
-    at->second.mass += hypotheses[i].probability;
-    if (hypotheses[i].probability > hypotheses[at->second.best].probability) at->second.best = i;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto [at, fresh] = pools.try_emplace(key(all[i]), Pool{0, i});
+    at->second.probability += all[i].probability;
+    if (all[i].probability > all[at->second.best].probability) at->second.best = i;
   }
-  Conclusion c;
-  if (pools.empty()) return c;
-  const auto& [name, pool] = *std::ranges::max_element(pools, {}, [](const auto& named) { return named.second.mass; });
-  const ScoredHypothesis& best = hypotheses[pool.best];
-  c.hypothesis = pool.best;
-  c.probability = best.probability;
-  c.effects = best.effects;
-  c.remainder = best.kind == ScoredHypothesis::Kind::effect && !best.terms.empty();
+  d.verdict = {};
+  d.concluded = 0;
+  if (pools.empty()) return;
+  const auto& [name, pool] =
+      *std::ranges::max_element(pools, {}, [](const auto& named) { return named.second.probability; });
+  const ScoredHypothesis& best = all[pool.best];
+  d.concluded = pool.best;
+  d.verdict.effects = best.effects;
+  d.verdict.probability = best.probability;
+  d.verdict.remainder = best.kind == HypothesisKind::effect && best.has_remainder();
   switch (best.kind) {
-    case ScoredHypothesis::Kind::none:
-      c.kind = Conclusion::Kind::none;
-      return c;
-    case ScoredHypothesis::Kind::parameters:
-      c.kind = Conclusion::Kind::parameters;
-      return c;
-    case ScoredHypothesis::Kind::unknown:
-      c.kind = Conclusion::Kind::unknown;
-      return c;
-    case ScoredHypothesis::Kind::effect:
+    case HypothesisKind::none:
+      d.verdict.kind = VerdictKind::none;
+      return;
+    case HypothesisKind::parameters:
+      d.verdict.kind = VerdictKind::parameters;
+      return;
+    case HypothesisKind::unknown:
+      d.verdict.kind = VerdictKind::unknown;
+      return;
+    case HypothesisKind::effect:
       break;
   }
-  c.kind = Conclusion::Kind::effect;
-  if (best.probability >= rule.naming.of_all || best.probability >= rule.naming.of_pool * pool.mass) return c;
-  c.kind = Conclusion::Kind::group;
-  c.probability = pool.mass;
-  for (const ScoredHypothesis& a : hypotheses) {
-    if (key(a) != name || a.probability < rule.naming.member_of_pool * pool.mass) continue;
+  d.verdict.kind = VerdictKind::effect;
+  if (best.probability >= rule.naming.of_all || best.probability >= rule.naming.of_pool * pool.probability) return;
+  d.verdict.kind = VerdictKind::group;
+  d.verdict.probability = pool.probability;
+  for (const ScoredHypothesis& a : all) {
+    if (key(a) != name || a.probability < rule.naming.member_of_pool * pool.probability) continue;
     for (const std::string& e : a.effects)
-      if (!std::ranges::count(c.effects, e)) c.effects.push_back(e);
+      if (!std::ranges::count(d.verdict.effects, e)) d.verdict.effects.push_back(e);
   }
-  return c;
 }
 
-void fly_the_likeliest(std::vector<ScoredHypothesis>& hypotheses, const Conclusion& conclusion) {
-  ScoredHypothesis& concluded = hypotheses[conclusion.hypothesis];
-  if (concluded.kind == ScoredHypothesis::Kind::none) return;
+void predict_with_the_likeliest(Inference& d) {
+  ScoredHypothesis& concluded = d.hypotheses[d.concluded];
+  if (concluded.kind == HypothesisKind::none) return;
   const auto names = [](const ScoredHypothesis& a) { return std::set(a.effects.begin(), a.effects.end()); };
   double most = concluded.log_evidence;
-  for (const ScoredHypothesis& a : hypotheses)
-    if (a.fitted() && a.terms.empty() == concluded.terms.empty() && a.log_evidence > most &&
+  for (const ScoredHypothesis& a : d.hypotheses)
+    if (a.fitted() && a.has_remainder() == concluded.has_remainder() && a.log_evidence > most &&
         std::ranges::includes(names(a), names(concluded)))
-      most = a.log_evidence, concluded.flown_with = a.effects;
+      most = a.log_evidence, concluded.predicted_with = a.effects;
+}
+
+void decide(const RobotFit& robot, const Fitter& fitter, const Flights& flights, const VerdictRule& rule,
+            Inference& d) {
+  const DiagnosisPolicy& policy = robot.evidence().policy();
+  if (rule.refutation.min_share > 0) refute(robot.evidence(), flights, rule.refutation.min_share, d);
+  if (policy.discrepancy_scales) share_backgrounds(robot, fitter.scales(), rule.unknown.penalty_nats, d.hypotheses);
+  set_probabilities(d.hypotheses, rule);
+  conclude(rule, d);
+  if (policy.discrepancy_scales) predict_with_the_likeliest(d);
 }
 
 }  // namespace flappy::gap

@@ -33,11 +33,11 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
   }
   r.unknown = {root.table("unknown").number("freeing_nats", kNats)};
   if (const auto refutation = root.optional_table("refutation"))
-    r.refutation.least_share = refutation->number("least_share", kShare);
+    r.refutation.min_share = refutation->number("least_share", kShare);
   const io::Table interval = root.table("interval");
   r.interval = {interval.number("sd_factor", kPositive), interval.number("size_error", kNats)};
-  const io::Table doubt = root.table("doubt");
-  r.doubt = {doubt.number("nats", kPositive), doubt.number("freedom", kPositive)};
+  const io::Table tempering = root.table("doubt");
+  r.tempering = {tempering.number("nats", kPositive), tempering.number("freedom", kPositive)};
   const io::Table naming = root.table("naming");
   r.naming = {naming.number("of_all", kShare), naming.number("of_pool", kShare),
               naming.number("member_of_pool", kShare)};

@@ -1,5 +1,5 @@
-// The constants by which evidence becomes a verdict. What each is for, and how it was learnt, stands in
-// configs/gap/verdict.toml, whose tables and keys these are.
+// The constants by which evidence becomes a verdict: tables and keys of configs/gap/verdict.toml, which says what each is for and how it was
+// learnt.
 #pragma once
 
 #include <algorithm>
@@ -16,30 +16,32 @@ struct VerdictRule {
     double none, parameters, effect, unknown, further_effect, remainder;
   } prior;
   struct Gain {
-    double by_chance_nats, further_screened_nats, vanished_size;
-    double outside_by_chance_nats;     ///< .. of ..
-    std::vector<std::string> outside;  ///< entries that are no part of what a model of the robot itself may get wrong
+    double by_chance_nats, further_screened_nats, vanished_magnitude;
+    double outside_by_chance_nats;  ///< by_chance_nats of the effects outside the robot
+    std::vector<std::string>
+        outside;  ///< effects of the surroundings and sensors, which a model of the robot does not get wrong
     double chance_of(const std::string& effect) const {
       return std::ranges::count(outside, effect) > 0 ? outside_by_chance_nats : by_chance_nats;
     }
   } gain;
   struct UnknownCause {
-    double freeing_nats;
+    double penalty_nats;
   } unknown;
   struct Refutation {
-    double least_share;  ///< of what smooth functions of the regime take away in flights held out; 0: not asked
+    double min_share;  ///< 0: no hypothesis is refuted
   } refutation;
   struct Interval {
-    double sd_factor, size_error;
+    double sd_factor, magnitude_error;
   } interval;
-  struct Doubt {
+  struct Tempering {
     double nats, freedom;
-  } doubt;
+  } tempering;
   struct Naming {
     double of_all, of_pool, member_of_pool;
   } naming;
 };
 
+/// io::InputError by file and line.
 VerdictRule read_verdict_rule(const std::filesystem::path& path = io::config_path("gap/verdict.toml"));
 
 }  // namespace flappy::gap

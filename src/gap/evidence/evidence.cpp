@@ -14,10 +14,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Degrees of freedom of the noise's Student t.
-constexpr double kTail = 4;
-/// Of the whole basis when it is only to take structure out of the noise.
+constexpr double kNoiseFreedom = 4;
+/// Ridge of the whole basis where it only takes structure out of the noise.
 constexpr double kLooseRidge = 1e-6;
-constexpr double kMostPast = 0.95;
+constexpr double kMaxPast = 0.95;
 
 std::size_t row_of(std::size_t beat, int group) { return beat * kRowsPerBeat + static_cast<std::size_t>(group); }
 
@@ -28,7 +28,7 @@ struct WithoutDiscrepancy {
     precision.diagonal().array() += 1;
     llt.compute(precision);
   }
-  /// Of sums basis x a.
+  /// `sums`: basis x a.
   MatrixXd of(const MatrixXd& sums) const { return llt.matrixL().solve(sd.asDiagonal() * sums); }
 
   VectorXd sd;
@@ -37,29 +37,34 @@ struct WithoutDiscrepancy {
 
 }  // namespace
 
-VectorXd Columns::mean() const {
-  return Eigen::Map<const VectorXd>(prior_mean.data(), static_cast<Index>(prior_mean.size()));
+VectorXd Regressors::prior_mean() const {
+  return Eigen::Map<const VectorXd>(prior_means.data(), static_cast<Index>(prior_means.size()));
 }
 
-void Columns::add(const BasisCoefficients& column, double mean, int of_entry, Tail of_scale) {
-  chosen.push_back(static_cast<int>(columns.size()));
+void Regressors::add(const BasisCoefficients& column, double prior_mean, int effect, ScalePrior prior) {
+  all.push_back(static_cast<int>(columns.size()));
   columns.push_back(&column);
-  prior_mean.push_back(mean);
-  entry.push_back(of_entry);
-  tail.push_back(of_scale);
+  prior_means.push_back(prior_mean);
+  effects.push_back(effect);
+  priors.push_back(prior);
 }
 
-Evidence::Evidence(const std::vector<PredictedFlight>& flights, ModelDiscrepancy discrepancy, int threads)
-    : flights_(flights), discrepancy_(std::move(discrepancy)), threads_(threads), basis_(flights), groups_(kGroups) {
-  for (const PredictedFlight& f : flights) weights_.emplace_back(f.beats() * kRowsPerBeat, 1.0);
+Evidence::Evidence(const Flights& flights, ModelDiscrepancy discrepancy, int threads)
+    : flights_(&flights),
+      discrepancy_(std::move(discrepancy)),
+      threads_(threads),
+      basis_(std::make_shared<const RegimeBasis>(flights)),
+      groups_(kGroups) {
+  for (const auto& f : flights) weights_.emplace_back(f->beats() * kRowsPerBeat, 1.0);
   for (int channel = 0; channel < kChannels; ++channel) {
     double all = 0;
     for (int c = 0; c < kCoefficients; ++c) {
       const int g = channel * kCoefficients + c;
       double sum = 0, n = 0;
-      for (const PredictedFlight& f : flights)
-        for (std::size_t j = 0; j < f.beats(); ++j)
-          if (f.covers(j, channel) && has_rows(g)) sum += f.signal()[row_of(j, g)] * f.signal()[row_of(j, g)], n += 1;
+      for (const auto& f : flights)
+        for (std::size_t j = 0; j < f->beats(); ++j)
+          if (f->covers(j, channel) && has_rows(g))
+            sum += f->signal()[row_of(j, g)] * f->signal()[row_of(j, g)], n += 1;
       groups_[static_cast<std::size_t>(g)].signal = n > 0 ? sum / n : 0;
       all += groups_[static_cast<std::size_t>(g)].signal / kCoefficients;
     }
@@ -70,46 +75,58 @@ Evidence::Evidence(const std::vector<PredictedFlight>& flights, ModelDiscrepancy
     }
   }
   Residuals declared;
-  for (std::size_t f = 0; f < flights.size(); ++f) declared.push_back(flights[f].declared_noise(f + 1));
-  const Index q = basis_.size();
+  for (std::size_t f = 0; f < flights.size(); ++f) declared.push_back(flight(f).declared_noise(f + 1));
+  const Index q = basis().size();
   for (int channel = 0; channel < kChannels; ++channel) {
     MatrixXd normal = MatrixXd::Identity(q, q) * 1e-12;
     double n = 0;
     for (std::size_t f = 0; f < flights.size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool) {
-        const auto b = basis_.values(f).row(static_cast<Index>(j));
+        const auto b = basis().values(f).row(static_cast<Index>(j));
         normal.noalias() += b.transpose() * b;
         n += 1;
       });
     normal.diagonal().array() += kLooseRidge * n;
-    plain_inverse_.push_back(normal.inverse());
+    inverse_.push_back(normal.inverse());
   }
-  find_noise(declared, Find::declared);
+  learn(declared, Learn::declared);
   sum_basis();
 }
 
-void Evidence::learn_weights(const Residuals& residual) {
-  find_noise(residual, Find::weights);
-  sum_basis();
+Evidence Evidence::with_weights(const Residuals& residual) const {
+  Evidence e = *this;
+  e.learn(residual, Learn::weights);
+  e.sum_basis();
+  return e;
 }
 
-void Evidence::learn_noise(const Residuals& residual) {
-  find_noise(residual, Find::noise);
-  sum_basis();
+Evidence Evidence::with_noise(const Residuals& residual) const {
+  Evidence e = *this;
+  e.learn(residual, Learn::noise);
+  e.sum_basis();
+  return e;
 }
 
-void Evidence::learn_remainder(const Residuals& residual) {
-  find_noise(residual, Find::remainder);
-  sum_basis();
-  scales_ = {1, {}, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
-  held_ = true;
+Evidence Evidence::with_remainder(const Residuals& residual) const {
+  Evidence e = *this;
+  e.learn(residual, Learn::remainder);
+  e.sum_basis();
+  e.scales_held_ = true;
+  return e;
+}
+
+Evidence Evidence::with_discrepancy(ModelDiscrepancy discrepancy) const {
+  Evidence e = *this;
+  e.discrepancy_ = std::move(discrepancy);
+  return e;
 }
 
 Rows Evidence::without(std::size_t flight, Rows residual, const BasisCoefficients& change) const {
   for (int g = 0; g < kGroups; ++g) {
     if (!has_rows(g)) continue;
-    const VectorXd smooth = basis_.values(flight) * change.row(g).transpose();
-    for (std::size_t j = 0; j < flights_[flight].beats(); ++j) residual[row_of(j, g)] -= smooth[static_cast<Index>(j)];
+    const VectorXd smooth = basis().values(flight) * change.row(g).transpose();
+    for (std::size_t j = 0; j < this->flight(flight).beats(); ++j)
+      residual[row_of(j, g)] -= smooth[static_cast<Index>(j)];
   }
   return residual;
 }
@@ -117,7 +134,7 @@ Rows Evidence::without(std::size_t flight, Rows residual, const BasisCoefficient
 /// Calls use(beat, whether the one before it counts) for the beats of a flight that a channel covers.
 template <class Use>
 void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
-  const PredictedFlight& f = flights_[flight];
+  const PredictedFlight& f = this->flight(flight);
   bool before = false;
   for (std::size_t j = 0; j < f.beats(); ++j) {
     const bool now = f.covers(j, channel);
@@ -126,32 +143,31 @@ void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
   }
 }
 
-void Evidence::find_noise(const Residuals& residual, Find what) {
-  const Index q = basis_.size();
+void Evidence::learn(const Residuals& residual, Learn what) {
+  const Index q = basis().size();
   io::parallel_for(static_cast<std::size_t>(kGroups), threads_, [&](std::size_t k) {
     const int g = static_cast<int>(k);
     const int channel = g / kCoefficients;
     if (!has_rows(g)) return;
     VectorXd right = VectorXd::Zero(q);
     double n = 0;
-    for (std::size_t f = 0; f < flights_.size(); ++f)
+    for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool) {
-        right += residual[f][row_of(j, g)] * basis_.values(f).row(static_cast<Index>(j)).transpose();
+        right += residual[f][row_of(j, g)] * basis().values(f).row(static_cast<Index>(j)).transpose();
         n += 1;
       });
     if (n == 0) return;
-    const VectorXd delta = what == Find::remainder
-                               ? VectorXd(VectorXd::Zero(q))
-                               : VectorXd(plain_inverse_[static_cast<std::size_t>(channel)] * right);
+    const VectorXd delta = what == Learn::remainder ? VectorXd(VectorXd::Zero(q))
+                                                    : VectorXd(inverse_[static_cast<std::size_t>(channel)] * right);
     const auto left = [&](std::size_t f, std::size_t j) {
-      return residual[f][row_of(j, g)] - basis_.values(f).row(static_cast<Index>(j)).dot(delta);
+      return residual[f][row_of(j, g)] - basis().values(f).row(static_cast<Index>(j)).dot(delta);
     };
     std::vector<double> sizes;
-    for (std::size_t f = 0; f < flights_.size(); ++f)
+    for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool) { sizes.push_back(std::abs(left(f, j))); });
     const double clip = 3 * 1.4826 * io::upper_median(sizes);
     double product = 0, square = 0;
-    for (std::size_t f = 0; f < flights_.size(); ++f)
+    for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) {
         if (!before) return;
         const double a = std::clamp(left(f, j - 1), -clip, clip), b = std::clamp(left(f, j), -clip, clip);
@@ -160,21 +176,21 @@ void Evidence::find_noise(const Residuals& residual, Find what) {
       });
     Group& known = groups_[static_cast<std::size_t>(g)];
     Group group = known;
-    group.past = square > 0 ? std::clamp(product / square, -kMostPast, kMostPast) : 0;
+    group.past = square > 0 ? std::clamp(product / square, -kMaxPast, kMaxPast) : 0;
     std::vector<double> steps;
     const auto innovation = [&](std::size_t f, std::size_t j, bool before) {
       return before ? left(f, j) - group.past * left(f, j - 1) : left(f, j) * std::sqrt(1 - group.past * group.past);
     };
-    for (std::size_t f = 0; f < flights_.size(); ++f)
+    for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) { steps.push_back(std::abs(innovation(f, j, before))); });
-    group.sd = std::max({1.4826 * io::upper_median(steps), group.least_sd, 1e-9});
-    if (what == Find::declared) group.least_sd = group.sd;
-    if (what != Find::weights) known = group;
-    if (what == Find::declared) return;  // of what is declared, no row is too far off
-    for (std::size_t f = 0; f < flights_.size(); ++f)
+    group.sd = std::max({1.4826 * io::upper_median(steps), group.declared_sd, 1e-9});
+    if (what == Learn::declared) group.declared_sd = group.sd;
+    if (what != Learn::weights) known = group;
+    if (what == Learn::declared) return;  // declared noise has no outliers
+    for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) {
         const double t = innovation(f, j, before) / group.sd;
-        weights_[f][row_of(j, g)] = std::min(1.0, (kTail + 1) / (kTail + t * t));
+        weights_[f][row_of(j, g)] = std::min(1.0, (kNoiseFreedom + 1) / (kNoiseFreedom + t * t));
       });
   });
 }
@@ -191,18 +207,18 @@ void Evidence::for_whitened(std::size_t flight, int group, const Use& use) const
 }
 
 void Evidence::sum_basis() {
-  const Index q = basis_.size();
-  normal_.assign(flights_.size(), std::vector<MatrixXd>(kGroups, MatrixXd::Zero(q, q)));
-  for (std::size_t f = 0; f < flights_.size(); ++f) {
-    const MatrixXd& basis = basis_.values(f);
+  const Index q = basis().size();
+  normal_.assign(flights_->size(), std::vector<MatrixXd>(kGroups, MatrixXd::Zero(q, q)));
+  for (std::size_t f = 0; f < flights_->size(); ++f) {
+    const MatrixXd& values = basis().values(f);
     for (int g = 0; g < kGroups; ++g) {
       if (!has_rows(g)) continue;
-      MatrixXd rows(static_cast<Index>(flights_[f].beats()), q);
+      MatrixXd rows(static_cast<Index>(flight(f).beats()), q);
       Index n = 0;
       for_whitened(f, g, [&](std::size_t j, double now, double past) {
         const auto i = static_cast<Index>(j);
-        if (past != 0) rows.row(n) = now * basis.row(i) - past * basis.row(i - 1);
-        else rows.row(n) = now * basis.row(i);
+        if (past != 0) rows.row(n) = now * values.row(i) - past * values.row(i - 1);
+        else rows.row(n) = now * values.row(i);
         ++n;
       });
       if (n == 0) continue;
@@ -215,46 +231,46 @@ void Evidence::sum_basis() {
 }
 
 BasisCoefficients Evidence::basis_coefficients(const Residuals& rows) const {
-  const Index q = basis_.size();
+  const Index q = basis().size();
   BasisCoefficients result = BasisCoefficients::Zero(kGroups, q);
   for (int channel = 0; channel < kChannels; ++channel) {
     MatrixXd right = MatrixXd::Zero(q, kCoefficients);
-    for (std::size_t f = 0; f < flights_.size(); ++f) {
-      MatrixXd counted = MatrixXd::Zero(basis_.values(f).rows(), kCoefficients);
+    for (std::size_t f = 0; f < flights_->size(); ++f) {
+      MatrixXd counted = MatrixXd::Zero(basis().values(f).rows(), kCoefficients);
       for_rows(f, channel, [&](std::size_t j, bool) {
         counted.row(static_cast<Index>(j)) =
             Eigen::Map<const Eigen::RowVectorXd>(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
       });
-      right.noalias() += basis_.values(f).transpose() * counted;
+      right.noalias() += basis().values(f).transpose() * counted;
     }
     result.middleRows(Index{channel} * kCoefficients, kCoefficients) =
-        (plain_inverse_[static_cast<std::size_t>(channel)] * right).transpose();
+        (inverse_[static_cast<std::size_t>(channel)] * right).transpose();
   }
   return result;
 }
 
 SufficientStatistics Evidence::statistics(const Residuals& residual) const {
-  const Index q = basis_.size();
-  SufficientStatistics s{{flights_.size(), std::vector<VectorXd>(kGroups, VectorXd::Zero(q))}};
-  for (std::size_t f = 0; f < flights_.size(); ++f) {
-    const MatrixXd& basis = basis_.values(f);
+  const Index q = basis().size();
+  SufficientStatistics s{{flights_->size(), std::vector<VectorXd>(kGroups, VectorXd::Zero(q))}};
+  for (std::size_t f = 0; f < flights_->size(); ++f) {
+    const MatrixXd& values = basis().values(f);
     for (int g = 0; g < kGroups; ++g) {
       if (!has_rows(g)) continue;
-      VectorXd counted = VectorXd::Zero(basis.rows());
+      VectorXd counted = VectorXd::Zero(values.rows());
       for_whitened(f, g, [&](std::size_t j, double now, double past) {
         const auto i = static_cast<Index>(j);
         const double y = now * residual[f][row_of(j, g)] - (past != 0 ? past * residual[f][row_of(j - 1, g)] : 0);
         counted[i] += now * y;
         if (past != 0) counted[i - 1] -= past * y;
       });
-      s.sums[f][static_cast<std::size_t>(g)] = basis.transpose() * counted;
+      s.sums[f][static_cast<std::size_t>(g)] = values.transpose() * counted;
     }
   }
   return s;
 }
 
 void Evidence::add(double share, const BasisCoefficients& change, SufficientStatistics& to) const {
-  for (std::size_t f = 0; f < flights_.size(); ++f)
+  for (std::size_t f = 0; f < flights_->size(); ++f)
     for (int g = 0; g < kGroups; ++g)
       to.sums[f][static_cast<std::size_t>(g)] +=
           share * (normal_[f][static_cast<std::size_t>(g)] * change.row(g).transpose());
@@ -265,33 +281,33 @@ double Evidence::noise_sd(int group) const {
   return g.sd / std::sqrt(1 - g.past * g.past);
 }
 
-VectorXd Evidence::base_sd(int group) const {
-  VectorXd sd(basis_.size());
-  for (int i = 0; i < basis_.size(); ++i)
-    sd[i] = signal(group) * discrepancy_.share(group / kCoefficients, (group % kCoefficients + 1) / 2, basis_.kind(i));
+VectorXd Evidence::prior_sd(int group) const {
+  VectorXd sd(basis().size());
+  for (int i = 0; i < basis().size(); ++i)
+    sd[i] = signal(group) * discrepancy_.share(group / kCoefficients, (group % kCoefficients + 1) / 2, basis().kind(i));
   return sd;
 }
 
-BasisCoefficients Evidence::discrepancy_sd() const {
-  BasisCoefficients sd(kGroups, basis_.size());
+BasisCoefficients Evidence::discrepancy_sd(const Scales& scales) const {
+  BasisCoefficients sd(kGroups, basis().size());
   for (int g = 0; g < kGroups; ++g) {
-    sd.row(g) = base_sd(g).transpose();
-    for (int i = 0; i < basis_.size(); ++i)
-      sd(g, i) *= scales_.blocks[static_cast<std::size_t>(block_of(g, basis_.kind(i)))];
+    sd.row(g) = prior_sd(g).transpose();
+    for (int i = 0; i < basis().size(); ++i)
+      sd(g, i) *= scales.block(static_cast<std::size_t>(block_of(g, basis().kind(i))));
   }
   return sd;
 }
 
-double Evidence::squares_of(MatrixXd normal, const VectorXd& right) {
+double Evidence::smooth_square(MatrixXd normal, const VectorXd& right) {
   normal.diagonal().array() += kLooseRidge * normal(0, 0);
   return normal.ldlt().solve(right).dot(right);
 }
 
-/// Of a group over the chosen flights: basis x basis, and basis x residual.
+/// Over the chosen flights: basis x basis, and basis x residual.
 std::pair<MatrixXd, VectorXd> Evidence::sums_of(const SufficientStatistics& residual, const std::vector<char>& use,
                                                 int group) const {
   const auto g = static_cast<std::size_t>(group);
-  std::pair<MatrixXd, VectorXd> sums{MatrixXd::Zero(basis_.size(), basis_.size()), VectorXd::Zero(basis_.size())};
+  std::pair<MatrixXd, VectorXd> sums{MatrixXd::Zero(basis().size(), basis().size()), VectorXd::Zero(basis().size())};
   for (std::size_t f = 0; f < use.size(); ++f) {
     if (!use[f]) continue;
     sums.first += normal_[f][g];
@@ -300,19 +316,19 @@ std::pair<MatrixXd, VectorXd> Evidence::sums_of(const SufficientStatistics& resi
   return sums;
 }
 
-Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
+Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& regressors,
                          const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
-                         const MatrixXd* same) const {
-  const Index q = basis_.size(), k = static_cast<Index>(columns.size());
+                         const MatrixXd* known) const {
+  const Index q = basis().size(), k = static_cast<Index>(regressors.size());
   Reduced result{MatrixXd::Zero(k + 1, k + 1), 0};
-  if (same != nullptr) result.sums.topLeftCorner(k, k) = *same;
+  if (known != nullptr) result.sums.topLeftCorner(k, k) = *known;
   MatrixXd change(q, k), weighed(q, k);
   for (int g = 0; g < kGroups; ++g) {
     const auto [normal, right] = sums_of(residual, use, g);
     if (normal(0, 0) == 0) continue;  // nothing was seen
-    for (Index i = 0; i < k; ++i) change.col(i) = columns[static_cast<std::size_t>(i)]->row(g).transpose();
+    for (Index i = 0; i < k; ++i) change.col(i) = regressors[static_cast<std::size_t>(i)]->row(g).transpose();
     const WithoutDiscrepancy without(normal, discrepancy_sd.row(g).transpose());
-    if (k > 0 && same == nullptr) {  // Eigen's product of half a matrix reads the first number of none
+    if (k > 0 && known == nullptr) {  // Eigen's product of half a matrix reads the first number of none
       const MatrixXd half = without.of(normal);
       weighed.noalias() = (normal - half.transpose() * half) * change;
       result.sums.topLeftCorner(k, k).triangularView<Eigen::Lower>() += change.transpose() * weighed;
@@ -320,18 +336,18 @@ Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector
     const VectorXd half_right = without.of(right);
     const VectorXd delta = without.sd.cwiseProduct(without.llt.matrixU().solve(half_right));
     result.sums.row(k).head(k) += (right - normal * delta).transpose() * change;
-    result.sums(k, k) += squares_of(normal, right) - half_right.squaredNorm();
+    result.sums(k, k) += smooth_square(normal, right) - half_right.squaredNorm();
     result.log_scale -= without.llt.matrixLLT().diagonal().array().log().sum();
   }
   result.sums = MatrixXd(result.sums.selfadjointView<Eigen::Lower>());
   return result;
 }
 
-Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& columns, const VectorXd& prior_mean,
+Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& chosen, const VectorXd& prior_mean,
                               bool covariance) {
-  const Index k = static_cast<Index>(columns.size()), last = reduced.sums.rows() - 1;
-  MatrixXd precision = reduced.sums(columns, columns);
-  VectorXd right = reduced.sums(columns, last);
+  const Index k = static_cast<Index>(chosen.size()), last = reduced.sums.rows() - 1;
+  MatrixXd precision = reduced.sums(chosen, chosen);
+  VectorXd right = reduced.sums(chosen, last);
   precision.diagonal().array() += 1;
   right += prior_mean;
   const Eigen::LLT<MatrixXd> llt(precision);

@@ -1,12 +1,12 @@
 // How probable residuals are under a hypothesis, in closed form.
 //
-// Rows (gap/replay/beat_rows.hpp) fall into groups: one channel, one coefficient. In a group, over the beats of a flight,
-//   residual = columns theta + basis delta + noise
-//   theta  what the hypothesis leaves free, standard normal a priori: shared by all groups
-//   delta  what every model of a flapping wing gets wrong: a smooth function of input and motion (RegimeBasis) in every
-//          group, N(0, (its share x size of the signal)^2): the model discrepancy. An effect must explain more than this.
-//   noise  first-order autoregressive from beat to beat, with a scale and an autocorrelation of its own in every group,
-//          found from what even the whole basis does not explain; heavy-tailed: rows far off count less (Student t)
+// Rows (gap/replay/beat_rows.hpp) form groups: one channel, one coefficient of the beat. In a group, over the beats of a flight,
+//   residual = regressors theta + basis delta + noise
+//   theta  the unknowns of the hypothesis, standard normal a priori, shared by all groups
+//   delta  the model discrepancy: what every model of a flapping wing gets wrong, a smooth function of input and motion (RegimeBasis) in each
+//          group, N(0, (share x signal)^2); an effect has to explain more than this
+//   noise  first-order autoregressive from beat to beat, with a standard deviation and an autocorrelation of its own in each group, learnt from
+//          what even the whole basis does not explain; heavy-tailed: rows far off count less (Student t)
 // theta and delta are integrated out (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 2.7), so
 //   log p(residual) = -1/2 r^T K^-1 r - 1/2 log det K + const
 #pragma once
@@ -17,65 +17,68 @@
 #include <vector>
 
 #include "gap/evidence/model_discrepancy.hpp"
+#include "gap/replay/residuals.hpp"
 
 namespace flappy::gap {
 
-/// Rows of all flights.
-using Residuals = std::vector<Rows>;
-
 inline constexpr int kGroups = kChannels * kCoefficients;
 
-/// Smooth functions of what a beat did, over all flights of mean 0 and rms 1 but for the constant.
+/// Smooth functions of what a beat did; over all flights each has mean 0 and rms 1, except the constant.
 class RegimeBasis {
  public:
-  explicit RegimeBasis(const std::vector<PredictedFlight>& flights);
-  int size() const { return static_cast<int>(names_.size()); }
-  const std::string& name(int i) const { return names_[static_cast<std::size_t>(i)]; }
-  BasisFunction kind(int i) const { return kinds_[static_cast<std::size_t>(i)]; }
+  explicit RegimeBasis(const Flights& flights);
+  int size() const { return static_cast<int>(functions_.size()); }
+  const std::string& name(int i) const { return function(i).name; }
+  /// The quantity of the regime that the function depends on (RegimeFunction).
+  const std::string& quantity(int i) const { return function(i).quantity; }
+  BasisFunction kind(int i) const { return function(i).kind; }
   /// [beat][size()].
   const Eigen::MatrixXd& values(std::size_t flight) const { return values_[flight]; }
 
  private:
-  std::vector<std::string> names_;
-  std::vector<BasisFunction> kinds_;
+  struct Function {
+    std::string name, quantity;
+    BasisFunction kind;
+  };
+  const Function& function(int i) const { return functions_[static_cast<std::size_t>(i)]; }
+  std::vector<Function> functions_;
   std::vector<Eigen::MatrixXd> values_;
 };
 
-/// The part of rows that is a smooth function of the regime, as coefficients of its basis: [group][basis].
+/// The part of rows that is a smooth function of the regime, as coefficients of the basis: [group][basis].
 using BasisCoefficients = Eigen::MatrixXd;
 
-/// Columns beside each other, and what is thought of their coefficients: normal about these means, of sd 1.
-struct Columns {
+/// Regressors side by side, and the prior of their coefficients: normal, of standard deviation 1.
+struct Regressors {
   std::vector<const BasisCoefficients*> columns;
-  std::vector<int> chosen;  ///< all of them
-  std::vector<double> prior_mean;
-  std::vector<int>
-      entry;  ///< of what every vehicle has of an entry: which of Scales::entries it grows with; -1: of none
-  std::vector<Tail> tail;  ///< of that scale
-  Eigen::VectorXd mean() const;
-  void add(const BasisCoefficients& column, double mean, int of_entry = -1, Tail of_scale = {});
+  std::vector<double> prior_means;
+  std::vector<int> effects;        ///< place in Scales::effects of the scale that multiplies the regressor; -1: none
+  std::vector<ScalePrior> priors;  ///< of that scale
+  std::vector<int> all;            ///< 0, 1, ...
+  Eigen::VectorXd prior_mean() const;
+  void add(const BasisCoefficients& column, double prior_mean, int effect = -1, ScalePrior prior = {});
 };
 
-/// All that the rows of flights say of smooth residuals: sums over the whitened rows of a group, basis x
-/// residual, [flight][group].
+/// Sums over the whitened rows of a group, basis x residual: [flight][group].
 struct SufficientStatistics {
   std::vector<std::vector<Eigen::VectorXd>> sums;
 };
 
-/// Columns and residual with delta integrated out.
+/// Regressors and residual with delta integrated out.
 struct Reduced {
-  Eigen::MatrixXd sums;  ///< columns, then the residual: square
-  double log_scale = 0;  ///< of what was integrated out
+  Eigen::MatrixXd sums;  ///< of products of the regressors, then the residual; square
+  double log_scale = 0;  ///< log density of what was integrated out
 };
 
-/// How far models of this robot are off, beside what is usual: factors of its discrepancy.
+/// How far models of this robot are off, in units of the prior of the model discrepancy.
 struct Scales {
-  double robot = 1;
-  std::vector<double> entries;  ///< of what it has of each entry, as every vehicle does; empty: 1
-  std::vector<double> blocks;   ///< [kBlocks]
-  std::vector<char> free;       ///< [kBlocks] whether it is larger than models are, by whatever it takes
-  /// Of such an entry, where nothing was found.
-  double usual(Tail tail) const { return tail.of_model ? robot : 1; }
+  double robot = 1;             ///< of all blocks together
+  std::vector<double> effects;  ///< of the background magnitude of each effect; empty: 1
+  std::vector<double> blocks;   ///< [kBlocks] of delta; empty: 1
+  std::vector<char> free;       ///< [kBlocks] whether a block exceeds its prior, as an unknown cause makes it
+  /// Scale of a background magnitude where nothing was found of it.
+  double prior_scale(ScalePrior prior) const { return prior.follows_robot ? robot : 1; }
+  double block(std::size_t b) const { return blocks.empty() ? 1 : blocks[b]; }
 };
 inline constexpr int kClasses = static_cast<int>(Regimes::count), kBlocks = kChannels * (kHarmonics + 1) * kClasses;
 
@@ -85,92 +88,94 @@ struct Posterior {
   Eigen::MatrixXd covariance;
 };
 
-/// A hypothesis weighed with the scales that make the flights most probable.
-struct Weighed {
-  Posterior posterior;  ///< its evidence includes what is thought of the scales
+/// The evidence of a hypothesis with the scales that maximise it.
+struct ScaledEvidence {
+  Posterior posterior;  ///< its evidence includes the prior of the scales
   Scales scales;
-  double shape = 1;           ///< as of Linearised
-  BasisCoefficients delta;    ///< mean of what is left for the discrepancy, over its sd
-  BasisCoefficients squares;  ///< expected square of delta, over that of its sd where all scales are 1; 0: not seen
+  double law_factor = 1;      ///< of Fit
+  BasisCoefficients delta;    ///< posterior mean of delta over its standard deviation
+  BasisCoefficients squares;  ///< expected squares of delta over those of its prior; 0 in groups without rows
 };
 
+/// Rows of flights, whitened by a model of their noise. Immutable: with_... return another.
 class Evidence {
  public:
-  Evidence(const std::vector<PredictedFlight>& flights, ModelDiscrepancy discrepancy, int threads);
+  /// Noise as the headers declare it. `flights` are referred to.
+  Evidence(const Flights& flights, ModelDiscrepancy discrepancy, int threads);
 
-  const RegimeBasis& basis() const { return basis_; }
+  /// Noise learnt from what a good fit leaves: standard deviation, autocorrelation, and which rows count less.
+  Evidence with_noise(const Residuals& residual) const;
+  /// Which rows count less alone, for residuals that are no noise yet.
+  Evidence with_weights(const Residuals& residual) const;
+  /// All of a residual is noise, smooth or not. Scales stay 1, but for blocks that are free.
+  Evidence with_remainder(const Residuals& residual) const;
+  Evidence with_discrepancy(ModelDiscrepancy discrepancy) const;
+
+  const RegimeBasis& basis() const { return *basis_; }
   const ModelDiscrepancy& discrepancy() const { return discrepancy_; }
-  /// Noise is as the headers declare it, until it is learnt from what a good fit leaves: its scale, its autocorrelation, and
-  /// which rows count less. The weights alone are for residuals that are no noise yet.
-  void learn_weights(const Residuals& residual);
-  void learn_noise(const Residuals& residual);
-  /// By least squares. Differences of simulations are rough: where in its step a wing meets its stop decides on more than
-  /// the parameter that was moved. What is no smooth function of the regime is noise, whatever the hypothesis.
+  const DiagnosisPolicy& policy() const { return flights_->front()->policy(); }
+
+  /// Least squares on the basis. Differences of simulations are rough: small changes of a parameter move the step in which a wing meets its
+  /// stop. What is not a smooth function of the regime is noise under every hypothesis.
   BasisCoefficients basis_coefficients(const Residuals& rows) const;
   SufficientStatistics statistics(const Residuals& residual) const;
-  /// Adds to a residual `share` times a smooth one.
+  /// Adds `share` times a smooth change to the residual of `to`.
   void add(double share, const BasisCoefficients& change, SufficientStatistics& to) const;
-  /// Sd of delta that every model of this robot has.
-  BasisCoefficients discrepancy_sd() const;
-  /// `use`: which flights. `discrepancy_sd`: of delta's coefficients. `same`: sums of the columns alone, where they are known already.
-  Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& columns,
-                 const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
-                 const Eigen::MatrixXd* same = nullptr) const;
-  /// Expectation-maximisation over the scales of the discrepancy, from `start` on. `own_sd`: what equations of effects get wrong of
-  /// themselves, which no scale changes. `freeing_nats`: the price at which a block whose tails are no heavier than those of the place may be
-  /// larger than any model is off; none: no block.
-  Weighed weigh(const SufficientStatistics& residual, const Columns& columns, const std::vector<char>& use,
-                const BasisCoefficients& own_sd, const Scales& start, std::optional<double> freeing_nats = {},
-                int iterations = kMostIterations) const;
-  /// Nats that it costs a hypothesis that this robot has so many times what is usual of an entry.
-  double price_of(double times, Tail tail) const;
-  static constexpr int kMostIterations = 40;
-  void set_discrepancy(ModelDiscrepancy discrepancy) { discrepancy_ = std::move(discrepancy); }
-  /// Those that every model of this robot has from now on.
-  void set_scales(const Scales& scales) { scales_ = scales; }
-  /// From now on all of a residual is noise, smooth or not, and no hypothesis finds scales of its own, but for blocks that are free.
-  void learn_remainder(const Residuals& residual);
-  /// The residual of a flight less what columns of such coefficients make of it, as far as they are smooth.
+  /// The residual of a flight less a smooth change.
   Rows without(std::size_t flight, Rows residual, const BasisCoefficients& change) const;
-  const Scales& scales() const { return scales_; }
-  static int block_of(int group, BasisFunction function);
-  /// Of the chosen columns, whose theta has the given prior means and sd 1; without `covariance` that is empty.
-  static Posterior posterior(const Reduced& reduced, const std::vector<int>& columns, const Eigen::VectorXd& prior_mean,
+
+  /// Prior standard deviation of the discrepancy coefficients, [group][basis].
+  BasisCoefficients discrepancy_sd(const Scales& scales) const;
+  /// `use`: [flight], which count. `discrepancy_sd`: [group][basis]. `known`: sums of products of the regressors, where they are known.
+  Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& regressors,
+                 const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
+                 const Eigen::MatrixXd* known = nullptr) const;
+  /// Of the chosen regressors, whose coefficients have the given prior means and standard deviation 1.
+  static Posterior posterior(const Reduced& reduced, const std::vector<int>& chosen, const Eigen::VectorXd& prior_mean,
                              bool covariance = true);
 
-  /// Sd of a row of noise alone.
+  /// Expectation-maximisation over the scales, from `start` on (gap/evidence/weigh.cpp). `law_sd`: [group][basis] standard deviation of what
+  /// laws of effects get wrong, which no scale changes; empty: 0. `unknown_penalty_nats`: what it costs that a block is free; none: no block is.
+  ScaledEvidence weigh(const SufficientStatistics& residual, const Regressors& regressors, const std::vector<char>& use,
+                       const BasisCoefficients& law_sd, const Scales& start,
+                       std::optional<double> unknown_penalty_nats = {}, int max_iterations = kMaxIterations) const;
+  static constexpr int kMaxIterations = 40;
+  /// Log-prior cost, in nats, of a background magnitude that is `times` its prior.
+  static double scale_cost_nats(double times, ScalePrior prior, const Scales& scales);
+  static int block_of(int group, BasisFunction function);
+
+  /// Standard deviation of a row of noise alone.
   double noise_sd(int group) const;
+  /// Rms of the signal of a group, half that of its channel.
   double signal(int group) const { return groups_[static_cast<std::size_t>(group)].signal; }
 
  private:
   struct Group {
     double sd = 1, past = 0, signal = 0;
-    double least_sd = 0;  ///< as declared
+    double declared_sd = 0;
   };
-  bool has_rows(int group) const { return flights_.front().has_rows(group / kCoefficients, group % kCoefficients); }
+  enum class Learn { declared, weights, noise, remainder };
+  const PredictedFlight& flight(std::size_t f) const { return *(*flights_)[f]; }
+  bool has_rows(int group) const { return flight(0).has_rows(group / kCoefficients, group % kCoefficients); }
   void sum_basis();
   std::pair<Eigen::MatrixXd, Eigen::VectorXd> sums_of(const SufficientStatistics& residual,
                                                       const std::vector<char>& use, int group) const;
-  enum class Find { declared, weights, noise, remainder };
-  void find_noise(const Residuals& residual, Find what);
+  void learn(const Residuals& residual, Learn what);
   template <class Use>
   void for_rows(std::size_t flight, int channel, const Use& use) const;
-  /// Sd of a group's delta where every scale is 1.
-  Eigen::VectorXd base_sd(int group) const;
-  /// Of a residual whose sums are given, as far as the basis has it.
-  static double squares_of(Eigen::MatrixXd normal, const Eigen::VectorXd& right);
   template <class Use>
   void for_whitened(std::size_t flight, int group, const Use& use) const;
+  Eigen::VectorXd prior_sd(int group) const;
+  static double smooth_square(Eigen::MatrixXd normal, const Eigen::VectorXd& right);
 
-  const std::vector<PredictedFlight>& flights_;
+  const Flights* flights_;
   ModelDiscrepancy discrepancy_;
   int threads_;
-  RegimeBasis basis_;
+  std::shared_ptr<const RegimeBasis> basis_;
   std::vector<Group> groups_;
-  bool held_ = false;
-  Scales scales_{1, {}, std::vector<double>(kBlocks, 1), std::vector<char>(kBlocks, 0)};
+  bool scales_held_ = false;
   Residuals weights_;
-  std::vector<Eigen::MatrixXd> plain_inverse_;        ///< of basis x basis, by channel
+  std::vector<Eigen::MatrixXd> inverse_;              ///< [channel] of basis x basis, without whitening
   std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< basis x basis of the whitened rows, [flight][group]
 };
 

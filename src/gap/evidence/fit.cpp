@@ -4,9 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <optional>
 
-#include "gap/replay/sensor_correction.hpp"
 #include "io/parallel.hpp"
 
 namespace flappy::gap {
@@ -16,124 +14,77 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Reach of the first differences, and bounds of the later ones: so many standard deviations of what is known then, for a
-/// step has to be long where little is known and short where much is.
-constexpr double kFirstReach = 0.3, kLeastReach = 0.1, kMostReach = 1, kReachSd = 3;
-/// Points around another, and their share of the reach of its differences.
+/// Reach of the first differences; and bounds of later ones, which go so many standard deviations of the posterior: a step has to be long where
+/// little is known and short where much is.
+constexpr double kFirstReach = 0.3, kMinReach = 0.1, kMaxReach = 1, kReachSd = 3;
+/// Points around another one, and their distance in reaches.
 constexpr int kAround = 8;
 constexpr double kAroundReach = 0.2;
+/// Largest step that is not worth another iteration.
 constexpr double kConverged = 0.02;
-/// Nats that another step has to bring, where steps are flown, and where they cost nothing.
-constexpr double kWorthwhile = 0.5, kWorthwhileByTheBeat = 0.05;
-/// Information in a column of standard normal coefficient below which it changes nothing: its evidence by some hundredths of a nat.
-constexpr double kTelling = 0.05;
-/// How far, in reaches of its differences, columns of another point are trusted.
-constexpr double kFar = 2;
-/// Of functions of the place those are of another shape which its change follows by so much of the square by which it follows any.
-constexpr double kNatural = 0.1;
-/// Times that effects are moved where parameters stay.
-constexpr int kMostOwn = 2;
-/// Steps towards a robot that has nothing of any entry.
-constexpr int kMostAlone = 6;
+/// Information of a regressor with standard normal coefficient below which it says nothing: some hundredths of a nat.
+constexpr double kMinInformation = 0.05;
+/// Largest distance, in reaches, at which the columns of another point are used.
+constexpr double kMaxDistance = 2;
+/// A change follows a function of the place if it has this share of the largest square of any.
+constexpr double kFollows = 0.1;
+/// Steps of the effects where the parameters stay.
+constexpr int kMaxEffectSteps = 2;
+constexpr int kMaxWithoutBackground = 6;
 
 }  // namespace
-
-std::vector<Residuals> residuals(const std::vector<PredictedFlight>& flights, const std::vector<Candidate>& candidates,
-                                 int threads) {
-  // candidates whose sensors agree share a log
-  std::map<EffectValues, std::vector<std::size_t>> by_sensors;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    // a vehicle that is known by the beat has its sensors in its prediction
-    EffectValues sensors =
-        candidates[i].vehicle.beat_averaged ? EffectValues() : sensor_effects(candidates[i].vehicle.effects);
-    sensors.insert(candidates[i].sensors.begin(), candidates[i].sensors.end());
-    by_sensors[sensors].push_back(i);
-  }
-  std::vector<Residuals> list(candidates.size());
-  const auto compare = [&](const std::vector<PredictedFlight>& seen, const std::vector<std::size_t>& which,
-                           int at_once) {
-    std::vector<Candidate> group;
-    for (const std::size_t i : which) group.push_back(candidates[i]);
-    std::vector<Residuals> predicted = predict_all(seen, group, at_once);
-    for (std::size_t g = 0; g < which.size(); ++g) {
-      Residuals& s = predicted[g];
-      const bool whole = std::ranges::none_of(s, [](const Rows& rows) { return rows.empty(); });
-      for (std::size_t f = 0; whole && f < seen.size(); ++f)
-        for (std::size_t i = 0; i < s[f].size(); ++i) s[f][i] = seen[f].measured()[i] - s[f][i];
-      if (whole) list[which[g]] = std::move(s);
-    }
-  };
-  std::vector<std::pair<EffectValues, std::vector<std::size_t>>> corrected;
-  for (auto& [sensors, which] : by_sensors) {
-    if (sensors.empty()) compare(flights, which, threads);
-    else corrected.emplace_back(sensors, which);
-  }
-  // few logs leave threads to their flights
-  const int at_once =
-      std::max(1, io::thread_count(threads) / static_cast<int>(std::max<std::size_t>(1, corrected.size())));
-  io::parallel_for(corrected.size(), threads, [&](std::size_t k) {
-    std::vector<std::optional<PredictedFlight>> logs(flights.size());
-    io::parallel_for(flights.size(), at_once, [&](std::size_t f) {
-      logs[f] = flights[f].with_log(without(corrected[k].first, flights[f].recording().log));
-    });
-    std::vector<PredictedFlight> seen;
-    for (std::optional<PredictedFlight>& log : logs) seen.push_back(std::move(*log));
-    compare(seen, corrected[k].second, at_once);
-  });
-  return list;
-}
 
 Directions Fitter::axes(const Hypothesis& hypothesis) {
   return {MatrixXd::Identity(hypothesis.size(), hypothesis.size()), VectorXd::Constant(hypothesis.size(), kFirstReach)};
 }
 
-Linearised Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions,
-                             const std::vector<BasisCoefficients>& known) const {
-  std::vector<Candidate> candidates = {hypothesis.candidate(at)};
+Fit Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions,
+                      const std::vector<BasisCoefficients>& known) const {
+  std::vector<VehicleHypothesis> vehicles = {hypothesis.vehicle(at)};
   std::vector<double> spans;
   const auto first = static_cast<Index>(known.size());
   for (Index d = first; d < directions.reach.size(); ++d) {
-    if (line_of(hypothesis, d)) continue;
+    if (linear_column(hypothesis, d)) continue;
     const VectorXd axis = directions.axes.col(d);
     const VectorXd up = hypothesis.bounded(at + directions.reach[d] * axis);
     const VectorXd down = hypothesis.bounded(at - directions.reach[d] * axis);
     spans.push_back((up - down).dot(axis));
-    candidates.push_back(hypothesis.candidate(up));
-    candidates.push_back(hypothesis.candidate(down));
+    vehicles.push_back(hypothesis.vehicle(up));
+    vehicles.push_back(hypothesis.vehicle(down));
   }
-  const std::vector<VectorXd> shifts = around(hypothesis, at, directions, known, candidates);
-  std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
-  Linearised l{at, std::move(directions), std::move(rows[0]), {}, known};
+  const std::vector<VectorXd> shifts = around(hypothesis, at, directions, known, vehicles);
+  std::vector<Residuals> rows = residuals(*flights_, vehicles, threads_);
+  Fit l{at, std::move(directions), std::move(rows[0]), {}, known, 1, {}};
   std::vector<std::size_t> flown;
   for (Index d = first; d < l.directions.reach.size(); ++d) {
-    const BasisCoefficients* line = line_of(hypothesis, d);
-    if (line == nullptr) flown.push_back(l.columns.size());
-    l.columns.push_back(line == nullptr ? BasisCoefficients() : *line);
+    const BasisCoefficients* linear = linear_column(hypothesis, d);
+    if (linear == nullptr) flown.push_back(l.columns.size());
+    l.columns.push_back(linear == nullptr ? BasisCoefficients() : *linear);
   }
   io::parallel_for(flown.size(), threads_, [&](std::size_t n) {
     Residuals &up = rows[1 + 2 * n], &down = rows[2 + 2 * n];
     if (up.empty() || down.empty() || !(spans[n] > 0)) return;
     for (std::size_t f = 0; f < up.size(); ++f)
       for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / spans[n];
-    l.columns[flown[n]] = evidence_.basis_coefficients(up);
+    l.columns[flown[n]] = evidence_->basis_coefficients(up);
   });
   if (l.residual.empty()) return l;
-  l.statistics = evidence_.statistics(l.residual);
+  l.statistics = evidence_->statistics(l.residual);
   average({rows.begin() + static_cast<std::ptrdiff_t>(rows.size() - shifts.size()), rows.end()}, shifts, l);
   return l;
 }
 
-const BasisCoefficients* Fitter::line_of(const Hypothesis& hypothesis, Index direction) const {
+const BasisCoefficients* Fitter::linear_column(const Hypothesis& hypothesis, Index direction) const {
   if (direction < hypothesis.shared()) return nullptr;
   const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(direction)];
-  const auto line = lines_.find({u.effect, u.name});
-  return line == lines_.end() ? nullptr : &line->second;
+  const auto linear = linear_.find({u.effect, u.name});
+  return linear == linear_.end() ? nullptr : &linear->second;
 }
 
-/// Points around another, as the steps to them along the directions.
+/// Steps along the directions to points around another.
 std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorXd& at, const Directions& directions,
                                      const std::vector<BasisCoefficients>& known,
-                                     std::vector<Candidate>& candidates) const {
+                                     std::vector<VehicleHypothesis>& vehicles) const {
   std::vector<VectorXd> shifts;
   const Index k = std::min(directions.reach.size(), hypothesis.shared());
   for (int i = 0; k > 0 && i < kAround; ++i) {
@@ -147,24 +98,24 @@ std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorX
     }
     const VectorXd there = hypothesis.bounded(at + directions.axes.leftCols(k) * shift);
     shifts.push_back(directions.axes.leftCols(k).transpose() * (there - at));
-    candidates.push_back(hypothesis.candidate(there));
+    vehicles.push_back(hypothesis.vehicle(there));
   }
   return shifts;
 }
 
-/// The residual at a point is as rough as the columns were: its mean over points around, each brought back by the columns,
-/// is less so. Where a column is missing, nothing would bring it back.
-void Fitter::average(const std::vector<Residuals>& rows, const std::vector<VectorXd>& shifts, Linearised& l) const {
+/// Averages the statistics over points around, each brought back by the columns: the residual at one point is as rough as differences are. Where
+/// a column is missing, nothing can be brought back.
+void Fitter::average(const std::vector<Residuals>& rows, const std::vector<VectorXd>& shifts, Fit& l) const {
   for (Index d = 0; !shifts.empty() && d < shifts[0].size(); ++d)
     if (shifts[0][d] != 0 && l.columns[static_cast<std::size_t>(d)].size() == 0) return;
   std::vector<SufficientStatistics> around(rows.size());
   io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
     if (rows[i].empty()) return;
-    around[i] = evidence_.statistics(rows[i]);
-    BasisCoefficients back = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
+    around[i] = evidence_->statistics(rows[i]);
+    BasisCoefficients back = BasisCoefficients::Zero(kGroups, evidence_->basis().size());
     for (Index d = 0; d < shifts[i].size(); ++d)
       if (shifts[i][d] != 0) back += shifts[i][d] * l.columns[static_cast<std::size_t>(d)];
-    evidence_.add(1, back, around[i]);
+    evidence_->add(1, back, around[i]);
   });
   double n = 1;
   for (const SufficientStatistics& there : around) {
@@ -177,123 +128,137 @@ void Fitter::average(const std::vector<Residuals>& rows, const std::vector<Vecto
     for (VectorXd& sum : flight) sum /= n;
 }
 
-void Fitter::set_background(const Columns& same, const std::vector<Background>& of_entries, const Fit& beside) {
-  background_.clear();
-  means_.clear();
-  entry_.clear();
-  tails_.clear();
-  places_.clear();
-  Columns all = own_columns_of(beside.point);
-  const std::size_t first = all.columns.size(), scaled = first + same.columns.size();
-  for (std::size_t k = 0; k < same.columns.size(); ++k) all.add(*same.columns[k], same.prior_mean[k]);
-  for (const Background& b : of_entries) {
-    int entry = entry_of(b.entry);
-    if (entry < 0) {  // scales that were found stay with their entries
-      entry = static_cast<int>(entries_.size());
-      entries_.push_back(b.entry);
+Fitter::Fitter(const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads)
+    : flights_(&flights), evidence_(std::move(evidence)), threads_(threads) {}
+
+Fitter Fitter::with_evidence(std::shared_ptr<const Evidence> evidence) const {
+  Fitter f = *this;
+  f.evidence_ = std::move(evidence);
+  return f;
+}
+
+Fitter Fitter::with_linear_magnitudes(LinearMagnitudes magnitudes) const {
+  Fitter f = *this;
+  f.linear_ = std::move(magnitudes);
+  return f;
+}
+
+Fitter Fitter::with_nuisances(const Regressors& nuisances, const std::vector<Background>& background,
+                              const Fit& fit) const {
+  Fitter f = *this;
+  f.nuisances_.clear();
+  f.places_.clear();
+  Regressors all = own_regressors(fit);
+  const std::size_t first = all.columns.size(), scaled = first + nuisances.columns.size();
+  for (std::size_t k = 0; k < nuisances.columns.size(); ++k) all.add(*nuisances.columns[k], nuisances.prior_means[k]);
+  for (const Background& b : background) {
+    int effect = f.place_of(b.effect);
+    if (effect < 0) {  // scales that were found keep their places
+      effect = static_cast<int>(f.effects_.size());
+      f.effects_.push_back(b.effect);
     }
-    all.add(b.column, 0, entry, evidence_.discrepancy().tail_of(b.entry));
+    all.add(b.column, 0, effect, evidence_->discrepancy().scale_prior(b.effect));
   }
-  const Reduced reduced = reduce(beside.point, all);
+  const Reduced reduced = reduce(fit, all);
   for (std::size_t i = first; i < all.columns.size(); ++i) {
     const auto diagonal = static_cast<Index>(i);
-    if (!(reduced.sums(diagonal, diagonal) > kTelling)) continue;
-    background_.push_back(*all.columns[i]);
-    means_.push_back(all.prior_mean[i]);
-    entry_.push_back(all.entry[i]);
-    tails_.push_back(all.tail[i]);
-    if (i < scaled) places_.push_back(i - first);
+    if (!(reduced.sums(diagonal, diagonal) > kMinInformation)) continue;
+    f.nuisances_.push_back({*all.columns[i], {}, all.prior_means[i], all.effects[i], all.priors[i]});
+    if (i < scaled) f.places_.push_back(i - first);
   }
-  take_scales();
+  return f.with_scales(scales_);
 }
 
-int Fitter::entry_of(const std::string& effect) const {
-  const auto at = std::ranges::find(entries_, effect);
-  return at == entries_.end() ? -1 : static_cast<int>(at - entries_.begin());
+Fitter Fitter::with_scales(Scales scales) const {
+  Fitter f = *this;
+  f.scales_ = std::move(scales);
+  for (Nuisance& n : f.nuisances_) {
+    n.scaled = n.column;
+    const auto effect = static_cast<std::size_t>(n.effect);
+    if (n.effect >= 0)
+      n.scaled *= effect < f.scales_.effects.size() ? f.scales_.effects[effect] : f.scales_.prior_scale(n.prior);
+  }
+  return f;
 }
 
-std::vector<Fitter::Beside> Fitter::beside(const Linearised& point) const {
-  const Columns c = columns_of(point);
-  const Posterior p = Evidence::posterior(reduce(point, c), c.chosen, c.mean());
-  std::vector<Beside> list;
+int Fitter::place_of(const std::string& effect) const {
+  const auto at = std::ranges::find(effects_, effect);
+  return at == effects_.end() ? -1 : static_cast<int>(at - effects_.begin());
+}
+
+std::vector<Fitter::NuisanceEstimate> Fitter::nuisances(const Fit& fit) const {
+  const Regressors r = regressors(fit);
+  const Posterior p = Evidence::posterior(reduce(fit, r), r.all, r.prior_mean());
+  std::vector<NuisanceEstimate> list;
   for (std::size_t k = 0; k < places_.size(); ++k) {
-    const Index i = static_cast<Index>(c.columns.size() - scaled_.size() + k);
+    const Index i = static_cast<Index>(r.columns.size() - nuisances_.size() + k);
     list.push_back({places_[k], p.mean[i], std::sqrt(p.covariance(i, i))});
   }
   return list;
 }
 
-void Fitter::take_scales() {
-  const Scales& s = evidence_.scales();
-  scaled_ = background_;
-  for (std::size_t k = places_.size(); k < scaled_.size(); ++k) {
-    const auto entry = static_cast<std::size_t>(entry_[k]);
-    scaled_[k] *= entry < s.entries.size() ? s.entries[entry] : s.usual(tails_[k]);
-  }
+Regressors Fitter::own_regressors(const Fit& fit) {
+  Regressors r;
+  for (std::size_t d = 0; d < fit.columns.size(); ++d)
+    if (fit.columns[d].size() > 0) r.add(fit.columns[d], -fit.directions.axes.col(static_cast<Index>(d)).dot(fit.at));
+  return r;
 }
 
-Columns Fitter::own_columns_of(const Linearised& point) {
-  Columns c;
-  for (std::size_t d = 0; d < point.columns.size(); ++d)
-    if (point.columns[d].size() > 0)
-      c.add(point.columns[d], -point.directions.axes.col(static_cast<Index>(d)).dot(point.at));
-  return c;
+void Fitter::add_nuisances(bool scaled, Regressors& to) const {
+  for (const Nuisance& n : nuisances_) to.add(scaled ? n.scaled : n.column, n.prior_mean, n.effect, n.prior);
 }
 
-void Fitter::add_background(const std::vector<BasisCoefficients>& list, Columns& to) const {
-  for (std::size_t k = 0; k < list.size(); ++k) to.add(list[k], means_[k], entry_[k], tails_[k]);
+Regressors Fitter::regressors(const Fit& fit) const {
+  Regressors r = own_regressors(fit);
+  add_nuisances(true, r);
+  return r;
 }
 
-Columns Fitter::columns_of(const Linearised& point) const {
-  Columns c = own_columns_of(point);
-  add_background(scaled_, c);
-  return c;
+Regressors Fitter::unscaled_regressors(const Fit& fit) const {
+  Regressors r = own_regressors(fit);
+  add_nuisances(false, r);
+  return r;
 }
 
-Columns Fitter::unscaled_columns_of(const Linearised& point) const {
-  Columns c = own_columns_of(point);
-  add_background(background_, c);
-  return c;
-}
-
-/// What all sizes of each effect change that flies. How a sensor errs is known but for its size.
-std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypothesis, const Linearised& point) const {
+/// What all magnitudes of each effect change. Effects of sensors are left out: their laws are known.
+std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypothesis, const Fit& fit) const {
   std::map<std::string, BasisCoefficients> whole;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
     const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(i)];
-    const BasisCoefficients& column = point.columns[static_cast<std::size_t>(i)];
-    if (!u.size || u.log || column.size() == 0) continue;
-    BasisCoefficients& own = whole[u.effect];
-    if (own.size() == 0) own = BasisCoefficients::Zero(column.rows(), column.cols());
-    own += point.at[i] * column;
+    const BasisCoefficients& column = fit.columns[static_cast<std::size_t>(i)];
+    if (!u.magnitude || u.in_log || column.size() == 0) continue;
+    BasisCoefficients& change = whole[u.effect];
+    if (change.size() == 0) change = BasisCoefficients::Zero(column.rows(), column.cols());
+    change += fit.at[i] * column;
   }
   return whole;
 }
 
-BasisCoefficients Fitter::shape_error(const Hypothesis& hypothesis, const Linearised& point, double shape) const {
-  BasisCoefficients squares = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
-  for (const auto& [effect, own] : changes(hypothesis, point)) squares += shape_of(own, shape).cwiseAbs2();
+BasisCoefficients Fitter::law_sd(const Hypothesis& hypothesis, const Fit& fit, double law_factor) const {
+  BasisCoefficients squares = BasisCoefficients::Zero(kGroups, evidence_->basis().size());
+  for (const auto& [effect, change] : changes(hypothesis, fit)) squares += law_sd_of(change, law_factor).cwiseAbs2();
   return squares.cwiseSqrt();
 }
 
-bool Fitter::has_shape(const Hypothesis& hypothesis, const Linearised& point) const {
-  return std::ranges::any_of(changes(hypothesis, point),
-                             [&](const auto& own) { return shape_of(own.second, 1).any(); });
+bool Fitter::acts_by_place(const Hypothesis& hypothesis, const Fit& fit) const {
+  return std::ranges::any_of(changes(hypothesis, fit),
+                             [&](const auto& change) { return law_sd_of(change.second, 1).any(); });
 }
 
-/// Laws of what acts by the place (near surfaces, at a line, in time) differ in more than size: along the functions of the place that this change
-/// follows, every load of the body may have as much of it as they have on average, times the shape. Of what it follows by little (as gusts do of
-/// time) no load has more than that, for a shape may be many times the entry's, and a heating motor would else explain what turns with the heading.
-BasisCoefficients Fitter::shape_of(const BasisCoefficients& change, double shape) const {
-  const RegimeBasis& basis = evidence_.basis();
+/// The law of an effect that acts by the place (near surfaces, at a tether, in time) may deviate from the catalogue's in more than its magnitude. Along
+/// each function of the place that the change follows, each load of the body may deviate by the rms of the loads times the law factor. Along a
+/// function that the change hardly follows, as gusts follow time, the factor does not count: it may be large, and a heating motor would else explain
+/// what turns with the heading.
+BasisCoefficients Fitter::law_sd_of(const BasisCoefficients& change, double law_factor) const {
+  const RegimeBasis& basis = evidence_->basis();
   BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
-  if (evidence_.discrepancy().spread.beside_all) return sd;
+  if (!evidence_->policy().discrepancy_scales) return sd;
   const auto of_place = [&](int i) { return regimes_of(basis.kind(i)) == Regimes::place; };
   const auto load = [](int g) { return g / kCoefficients <= kForceZ; };
   VectorXd squares = VectorXd::Zero(change.cols());
   double groups = 0, place = 0, all = 0, most = 0;
   for (int g = 0; g < kGroups; ++g) {
-    const double signal = evidence_.signal(g);
+    const double signal = evidence_->signal(g);
     if (!load(g) || !(signal > 0)) continue;
     squares += (change.row(g).transpose() / signal).cwiseAbs2();
     ++groups;
@@ -306,84 +271,82 @@ BasisCoefficients Fitter::shape_of(const BasisCoefficients& change, double shape
   for (int g = 0; g < kGroups; ++g)
     for (int i = 1; i < basis.size(); ++i)
       if (load(g) && of_place(i))
-        sd(g, i) = (squares[i] > kNatural * most ? shape : 1) * std::sqrt(squares[i] / groups) * evidence_.signal(g);
+        sd(g, i) =
+            (squares[i] > kFollows * most ? law_factor : 1) * std::sqrt(squares[i] / groups) * evidence_->signal(g);
   return sd;
 }
 
-Posterior Fitter::posterior(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use) const {
-  const Columns columns = columns_of(point);
-  return solve(point, columns,
-               evidence_.reduce(point.statistics, columns.columns, use, discrepancy_sd(hypothesis, point)));
+Posterior Fitter::posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const {
+  const Regressors r = regressors(fit);
+  return solve(fit, r, evidence_->reduce(fit.statistics, r.columns, use, discrepancy_sd(hypothesis, fit)));
 }
 
-BasisCoefficients Fitter::discrepancy_sd(const Hypothesis& hypothesis, const Linearised& point) const {
-  return (evidence_.discrepancy_sd().cwiseAbs2() + shape_error(hypothesis, point).cwiseAbs2()).cwiseSqrt();
+BasisCoefficients Fitter::discrepancy_sd(const Hypothesis& hypothesis, const Fit& fit) const {
+  return (evidence_->discrepancy_sd(scales_).cwiseAbs2() + law_sd(hypothesis, fit).cwiseAbs2()).cwiseSqrt();
 }
 
-Fitter::Joint Fitter::joint(const Hypothesis& hypothesis, const Linearised& point, const std::vector<char>& use,
-                            bool alone) const {
-  const Columns all = columns_of(point);
-  Columns columns;
+Fitter::JointFit Fitter::joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use,
+                                   bool with_background) const {
+  const Regressors all = regressors(fit);
+  Regressors r;
   for (std::size_t i = 0; i < all.columns.size(); ++i)
-    if (!alone || all.entry[i] < 0) columns.add(*all.columns[i], all.prior_mean[i]);
-  const Posterior p =
-      Evidence::posterior(evidence_.reduce(point.statistics, columns.columns, use, discrepancy_sd(hypothesis, point)),
-                          columns.chosen, columns.mean(), false);
-  VectorXd own = VectorXd::Zero(static_cast<Index>(point.columns.size()));
+    if (with_background || all.effects[i] < 0) r.add(*all.columns[i], all.prior_means[i]);
+  const Posterior p = Evidence::posterior(
+      evidence_->reduce(fit.statistics, r.columns, use, discrepancy_sd(hypothesis, fit)), r.all, r.prior_mean(), false);
+  VectorXd along = VectorXd::Zero(static_cast<Index>(fit.columns.size()));
   Index k = 0;
-  for (std::size_t d = 0; d < point.columns.size(); ++d)
-    if (point.columns[d].size() > 0) own[static_cast<Index>(d)] = p.mean[k++];
-  Joint joint{hypothesis.bounded(point.at + point.directions.axes * own),
-              BasisCoefficients::Zero(kGroups, evidence_.basis().size())};
-  for (; k < p.mean.size(); ++k) joint.beside += p.mean[k] * *columns.columns[static_cast<std::size_t>(k)];
+  for (std::size_t d = 0; d < fit.columns.size(); ++d)
+    if (fit.columns[d].size() > 0) along[static_cast<Index>(d)] = p.mean[k++];
+  JointFit joint{hypothesis.bounded(fit.at + fit.directions.axes * along),
+                 BasisCoefficients::Zero(kGroups, evidence_->basis().size())};
+  for (; k < p.mean.size(); ++k) joint.nuisances += p.mean[k] * *r.columns[static_cast<std::size_t>(k)];
   return joint;
 }
 
-Reduced Fitter::reduce(const Linearised& point, const Columns& columns) const {
-  return evidence_.reduce(point.statistics, columns.columns, all_flights(), evidence_.discrepancy_sd());
+Reduced Fitter::reduce(const Fit& fit, const Regressors& r) const {
+  return evidence_->reduce(fit.statistics, r.columns, all_flights(), evidence_->discrepancy_sd(scales_));
 }
 
-Posterior Fitter::solve(const Linearised& point, const Columns& columns, Reduced reduced, double damping) const {
+/// Along all directions. `damping` of a step adds so much precision around the point (Levenberg); the covariance is left out then.
+Posterior Fitter::solve(const Fit& fit, const Regressors& r, Reduced reduced, double damping) const {
   std::vector<Index> seen;
-  for (std::size_t d = 0; d < point.columns.size(); ++d)
-    if (point.columns[d].size() > 0) seen.push_back(static_cast<Index>(d));
-  const auto own = static_cast<Index>(seen.size()), k = static_cast<Index>(point.columns.size());
+  for (std::size_t d = 0; d < fit.columns.size(); ++d)
+    if (fit.columns[d].size() > 0) seen.push_back(static_cast<Index>(d));
+  const auto own = static_cast<Index>(seen.size()), k = static_cast<Index>(fit.columns.size());
   reduced.sums.diagonal().head(own).array() += damping;
-  const Posterior p = Evidence::posterior(reduced, columns.chosen, columns.mean(), damping == 0);
+  const Posterior p = Evidence::posterior(reduced, r.all, r.prior_mean(), damping == 0);
   Posterior all{p.log_evidence, VectorXd::Zero(k), MatrixXd::Identity(k, k)};
   all.mean(seen) = p.mean.head(own);
   if (damping == 0) all.covariance(seen, seen) = p.covariance.topLeftCorner(own, own);
   return all;
 }
 
-VectorXd Fit::mean() const { return point.at + point.directions.axes * posterior.mean; }
-MatrixXd Fit::covariance() const {
-  return point.directions.axes * posterior.covariance * point.directions.axes.transpose();
-}
+VectorXd Fit::mean() const { return at + directions.axes * posterior.mean; }
+MatrixXd Fit::covariance() const { return directions.axes * posterior.covariance * directions.axes.transpose(); }
 
-double Fitter::cost(const Columns& background, const MatrixXd& sums, const SufficientStatistics& residual,
+double Fitter::cost(const Regressors& nuisances, const MatrixXd& sums, const SufficientStatistics& residual,
                     const VectorXd& at) const {
   const Reduced reduced =
-      evidence_.reduce(residual, background.columns, all_flights(), evidence_.discrepancy_sd(), &sums);
+      evidence_->reduce(residual, nuisances.columns, all_flights(), evidence_->discrepancy_sd(scales_), &sums);
   return 0.5 * at.squaredNorm() -
-         Evidence::posterior(reduced, background.chosen, background.mean(), false).log_evidence;
+         Evidence::posterior(reduced, nuisances.all, nuisances.prior_mean(), false).log_evidence;
 }
 
-/// Those of the parameters' fit, and the effects' own.
+/// Directions of the parameters of another fit, and the coordinates of the effects.
 Directions Fitter::joint_directions(const Hypothesis& hypothesis, const Fit& parameters) {
   Directions d = axes(hypothesis);
   const Index shared = hypothesis.shared();
-  d.axes.topLeftCorner(shared, shared) = parameters.point.directions.axes.topLeftCorner(shared, shared);
-  d.reach.head(shared) = parameters.point.directions.reach.head(shared);
+  d.axes.topLeftCorner(shared, shared) = parameters.directions.axes.topLeftCorner(shared, shared);
+  d.reach.head(shared) = parameters.directions.reach.head(shared);
   return d;
 }
 
-std::vector<BasisCoefficients> Fitter::known(const Hypothesis& hypothesis, const Fit& parameters) {
-  const auto& columns = parameters.point.columns;
+std::vector<BasisCoefficients> Fitter::shared_columns(const Hypothesis& hypothesis, const Fit& parameters) {
+  const auto& columns = parameters.columns;
   return {columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(hypothesis.shared())};
 }
 
-/// The axes of what is known: parameters turned among themselves, effects as they are.
+/// Principal axes of the posterior of the parameters, and the coordinates of the effects.
 Directions Fitter::principal(const Hypothesis& hypothesis, const Fit& fit) {
   const Index shared = hypothesis.shared(), size = hypothesis.size();
   const MatrixXd covariance = fit.covariance();
@@ -392,152 +355,146 @@ Directions Fitter::principal(const Hypothesis& hypothesis, const Fit& fit) {
   d.axes.topLeftCorner(shared, shared) = eigen.eigenvectors();
   for (Index i = 0; i < size; ++i) {
     const double variance = i < shared ? eigen.eigenvalues()[i] : covariance(i, i);
-    d.reach[i] = std::clamp(kReachSd * std::sqrt(variance), kLeastReach, kMostReach);
+    d.reach[i] = std::clamp(kReachSd * std::sqrt(variance), kMinReach, kMaxReach);
   }
   return d;
 }
 
-Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int iterations) const {
-  Fit result;
-  result.point = linearise(hypothesis, hypothesis.bounded(std::move(start)), axes(hypothesis));
-  return improve(hypothesis, std::move(result), iterations, nullptr, true);
+Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int max_iterations) const {
+  return improve(hypothesis, linearise(hypothesis, hypothesis.bounded(std::move(start)), axes(hypothesis)),
+                 max_iterations, nullptr, true);
 }
 
-Fit Fitter::fit(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters, int iterations) const {
-  Fit result;
-  result.point = linearise(hypothesis, hypothesis.bounded(start), joint_directions(hypothesis, parameters),
-                           known(hypothesis, parameters));
-  return improve(hypothesis, std::move(result), iterations, &parameters, true);
+Fit Fitter::fit_given(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters,
+                      int max_iterations) const {
+  return improve(hypothesis,
+                 linearise(hypothesis, hypothesis.bounded(start), joint_directions(hypothesis, parameters),
+                           shared_columns(hypothesis, parameters)),
+                 max_iterations, &parameters, true);
 }
 
-Fit Fitter::fit_beside(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters) const {
-  Fit result;
+Fit Fitter::fit_effects(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters) const {
   VectorXd at = hypothesis.bounded(start);
-  const Index own = hypothesis.size() - hypothesis.shared();
-  at.head(hypothesis.shared()) = parameters.point.at.head(hypothesis.shared());
+  const Index effects = hypothesis.size() - hypothesis.shared();
+  at.head(hypothesis.shared()) = parameters.at.head(hypothesis.shared());
   for (int n = 0;; ++n) {
-    result.point = linearise(hypothesis, at, joint_directions(hypothesis, parameters), known(hypothesis, parameters));
-    if (result.point.residual.empty()) return result;
-    const Columns columns = columns_of(result.point);
-    result.posterior = solve(result.point, columns, reduce(result.point, columns));
+    Fit result =
+        linearise(hypothesis, at, joint_directions(hypothesis, parameters), shared_columns(hypothesis, parameters));
+    if (!result.flown()) return result;
+    const Regressors r = regressors(result);
+    result.posterior = solve(result, r, reduce(result, r));
     const VectorXd there = hypothesis.bounded(result.mean());
-    if (n == kMostOwn || (there - at).tail(own).cwiseAbs().maxCoeff() < kFirstReach) return result;
-    at.tail(own) = there.tail(own);
+    if (n == kMaxEffectSteps || (there - at).tail(effects).cwiseAbs().maxCoeff() < kFirstReach) return result;
+    at.tail(effects) = there.tail(effects);
   }
 }
 
-Fit Fitter::linear(const Hypothesis& hypothesis, const Fit& parameters,
-                   const std::vector<BasisCoefficients>& own) const {
-  Fit result;
-  Linearised& l = result.point;
-  l = parameters.point;
-  l.residual.clear();
-  l.at = hypothesis.start();
-  l.at.head(hypothesis.shared()) = parameters.point.at;
-  l.directions = joint_directions(hypothesis, parameters);
-  l.columns.insert(l.columns.end(), own.begin(), own.end());
-  const Columns columns = columns_of(l);
-  result.posterior = solve(l, columns, reduce(l, columns));
+Fit Fitter::fit_linear(const Hypothesis& hypothesis, const Fit& parameters,
+                       const std::vector<BasisCoefficients>& effects) const {
+  Fit result = parameters;
+  result.residual.clear();
+  result.at = hypothesis.start();
+  result.at.head(hypothesis.shared()) = parameters.at;
+  result.directions = joint_directions(hypothesis, parameters);
+  result.columns.insert(result.columns.end(), effects.begin(), effects.end());
+  const Regressors r = regressors(result);
+  result.posterior = solve(result, r, reduce(result, r));
   return result;
 }
 
-Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int iterations) const {
+Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int max_iterations) const {
   Fit result = before;
-  result.point.statistics = evidence_.statistics(before.point.residual);
-  return improve(hypothesis, std::move(result), iterations, nullptr, false);
+  result.statistics = evidence_->statistics(before.residual);
+  return improve(hypothesis, std::move(result), max_iterations, nullptr, false);
 }
 
-Fit Fitter::alone(const Hypothesis& hypothesis, const Fit& before) const {
-  Fitter bare = *this;
-  // those of no entry come first
-  bare.background_.resize(places_.size());
-  bare.scaled_.resize(places_.size());
-  bare.means_.resize(places_.size());
-  bare.entry_.resize(places_.size());
-  bare.tails_.resize(places_.size());
-  return bare.improve(hypothesis, before, kMostAlone, &before, true);
+Fit Fitter::refit_without_background(const Hypothesis& hypothesis, const Fit& before) const {
+  Fitter without = *this;
+  without.nuisances_.resize(places_.size());  // those of no effect come first
+  return without.improve(hypothesis, before, kMaxWithoutBackground, &before, true);
 }
 
-/// Steps by columns of a point that was passed, as long as they do not lead far from it; those of the last one are its own.
-Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int iterations, const Fit* parameters, bool own) const {
-  if (fit.point.residual.empty()) return fit;  // comes apart
-  VectorXd linearised_at = fit.point.at;
-  std::vector<Index> of_log;
+/// Gauss-Newton. Columns of another point serve as long as steps do not lead far from it; the last point gets columns of its own.
+/// `columns_are_here`: whether the columns of `fit` are.
+Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, const Fit* parameters,
+                    bool columns_are_here) const {
+  if (!fit.flown()) return fit;
+  VectorXd linearised_at = fit.at;
+  std::vector<Index> in_log;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i)
-    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].log) of_log.push_back(i);
+    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].in_log) in_log.push_back(i);
   const auto linearise_here = [&](const VectorXd& at) {
-    Linearised next = parameters == nullptr
-                          ? linearise(hypothesis, at, principal(hypothesis, fit))
-                          : linearise(hypothesis, at, fit.point.directions, known(hypothesis, *parameters));
-    if (next.residual.empty()) return false;
-    fit.point = std::move(next);
+    Fit next = parameters == nullptr
+                   ? linearise(hypothesis, at, principal(hypothesis, fit))
+                   : linearise(hypothesis, at, fit.directions, shared_columns(hypothesis, *parameters));
+    if (!next.flown()) return false;
+    next.posterior = std::move(fit.posterior);
+    fit = std::move(next);
     linearised_at = at;
-    own = true;
+    columns_are_here = true;
     return true;
   };
   for (int n = 1;; ++n) {
-    const Linearised& l = fit.point;
-    const Columns columns = columns_of(l);
-    const Reduced reduced = reduce(l, columns);
-    fit.posterior = solve(l, columns, reduced);
-    const VectorXd step = l.directions.axes * fit.posterior.mean;
-    bool improved = n < iterations && step.cwiseAbs().maxCoeff() >= kConverged;
+    const Regressors r = regressors(fit);
+    const Reduced reduced = reduce(fit, r);
+    fit.posterior = solve(fit, r, reduced);
+    const VectorXd step = fit.directions.axes * fit.posterior.mean;
+    bool improved = n < max_iterations && step.cwiseAbs().maxCoeff() >= kConverged;
     if (improved) {
-      // shares of the step, and steps that go less far where little is known; all tried at once
+      // shares of the step, and damped steps, which go less far where little is known; all tried at once
       constexpr double kShares[] = {1.4, 1, 0.7, 0.5, 0.35, 0.25, 0.1, 0.03},
                        kDampings[] = {0.3, 1, 3, 10, 30, 100, 300, 1000};
       std::vector<VectorXd> tries;
-      for (const double share : kShares) tries.push_back(hypothesis.bounded(l.at + share * step));
+      for (const double share : kShares) tries.push_back(hypothesis.bounded(fit.at + share * step));
       for (const double damping : kDampings)
-        tries.push_back(hypothesis.bounded(l.at + l.directions.axes * solve(l, columns, reduced, damping).mean));
-      // flown with the log as it is here, so that all share one; what else they would have the log say is a line
-      std::vector<Candidate> candidates;
+        tries.push_back(hypothesis.bounded(fit.at + fit.directions.axes * solve(fit, r, reduced, damping).mean));
+      // effects of sensors stay as they are here, so that all tries share one log; their changes are taken as linear
+      std::vector<VehicleHypothesis> vehicles;
       for (VectorXd at : tries) {
-        at(of_log) = l.at(of_log);
-        candidates.push_back(hypothesis.candidate(at));
+        at(in_log) = fit.at(in_log);
+        vehicles.push_back(hypothesis.vehicle(at));
       }
-      std::vector<Residuals> left = residuals(flights_, candidates, threads_);
-      left.push_back(l.residual);
-      tries.push_back(l.at);
+      std::vector<Residuals> left = residuals(*flights_, vehicles, threads_);
+      left.push_back(fit.residual);
+      tries.push_back(fit.at);
       std::vector<SufficientStatistics> statistics(left.size());
       std::vector<double> costs(left.size(), std::numeric_limits<double>::infinity());
-      Columns background;
-      add_background(scaled_, background);
-      const Index others = static_cast<Index>(background.columns.size()),
-                  first = static_cast<Index>(columns.columns.size()) - others;
+      Regressors nuisances;
+      add_nuisances(true, nuisances);
+      const Index others = static_cast<Index>(nuisances.columns.size()),
+                  first = static_cast<Index>(r.columns.size()) - others;
       const MatrixXd sums = reduced.sums.block(first, first, others, others);
-      const auto weigh = [&](std::size_t i, const std::vector<Index>& lines) {
+      const auto weigh = [&](std::size_t i, const std::vector<Index>& linear) {
         if (left[i].empty()) return;
-        statistics[i] = evidence_.statistics(left[i]);
-        for (const Index line : lines)
-          if (const BasisCoefficients& column = l.columns[static_cast<std::size_t>(line)]; column.size() > 0)
-            evidence_.add(l.at[line] - tries[i][line], column, statistics[i]);
-        costs[i] = cost(background, sums, statistics[i], tries[i]);
+        statistics[i] = evidence_->statistics(left[i]);
+        for (const Index k : linear)
+          if (const BasisCoefficients& column = fit.columns[static_cast<std::size_t>(k)]; column.size() > 0)
+            evidence_->add(fit.at[k] - tries[i][k], column, statistics[i]);
+        costs[i] = cost(nuisances, sums, statistics[i], tries[i]);
       };
-      io::parallel_for(left.size(), threads_, [&](std::size_t i) { weigh(i, of_log); });
+      io::parallel_for(left.size(), threads_, [&](std::size_t i) { weigh(i, in_log); });
       const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
-      if (!of_log.empty() && best + 1 < left.size()) {
-        left[best] = std::move(residuals(flights_, {hypothesis.candidate(tries[best])}, threads_)[0]);
+      if (!in_log.empty() && best + 1 < left.size()) {
+        left[best] = std::move(residuals(*flights_, {hypothesis.vehicle(tries[best])}, threads_)[0]);
         costs[best] = std::numeric_limits<double>::infinity();
         weigh(best, {});
       }
-      improved =
-          costs.back() - costs[best] >= (flights_.front().within_the_beat() ? kWorthwhile : kWorthwhileByTheBeat);
+      improved = costs.back() - costs[best] >= evidence_->policy().min_step_nats;
       if (improved) {
-        const VectorXd away = l.directions.axes.transpose() * (tries[best] - linearised_at);
-        if (away.cwiseAbs().cwiseQuotient(l.directions.reach).maxCoeff() > kFar) {
+        const VectorXd away = fit.directions.axes.transpose() * (tries[best] - linearised_at);
+        if (away.cwiseAbs().cwiseQuotient(fit.directions.reach).maxCoeff() > kMaxDistance) {
           if (!linearise_here(tries[best])) return fit;
         } else {
-          fit.point.at = tries[best];
-          fit.point.residual = std::move(left[best]);
-          fit.point.statistics = std::move(statistics[best]);
-          own = false;
+          fit.at = tries[best];
+          fit.residual = std::move(left[best]);
+          fit.statistics = std::move(statistics[best]);
+          columns_are_here = false;
         }
       }
     }
     if (improved) continue;
-    if (own || !linearise_here(fit.point.at)) return fit;
-    iterations = n + 1;  // what the new columns say
+    if (columns_are_here || !linearise_here(fit.at)) return fit;
+    max_iterations = n + 1;  // the posterior by the new columns
   }
 }
 

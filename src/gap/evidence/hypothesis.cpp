@@ -7,10 +7,10 @@
 namespace flappy::gap {
 namespace {
 
-/// How well a header's latency and bandwidth say when a sample was taken, which may be an instant, a mean, or held.
+/// Prior standard deviation of the IMU's lag: a header does not say whether a sample is an instant, a mean, or held.
 constexpr double kImuLagSd_s = 5e-4;
-/// Draws farther out are none of nature's.
-constexpr double kFarthest = 4;
+/// Largest deviation of a parameter, in standard deviations.
+constexpr double kMaxDeviation = 4;
 /// Half of 90 % of a normal distribution, in standard deviations; all of 90 % of one that has one side only.
 constexpr double kHalf90 = 1.645;
 
@@ -22,14 +22,14 @@ std::vector<Unknown> unknowns_of(const std::string& effect) {
   return unknowns_of(model::effects()[static_cast<std::size_t>(model::effect_index(effect.c_str()))]);
 }
 
-std::vector<Unknown> unknowns_of(const model::EffectEntry& entry) {
+std::vector<Unknown> unknowns_of(const model::EffectEntry& effect) {
   std::vector<Unknown> list;
-  for (std::size_t k = 0; k < entry.parameters.size(); ++k) {
-    const model::EffectParameter& p = entry.parameters[k];
-    Unknown u{entry.info.id, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < entry.info.sizes};
-    if (u.size) u.scale = std::max(-p.prior_low, p.prior_high) / kHalf90;
+  for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
+    const model::EffectParameter& p = effect.parameters[k];
+    Unknown u{effect.info.id, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < effect.info.sizes};
+    if (u.magnitude) u.scale = std::max(-p.prior_low, p.prior_high) / kHalf90;
     else u.centre = p.typical, u.scale = (p.prior_high - p.prior_low) / (2 * kHalf90);
-    u.log = entry.info.stage == model::Stage::sensor;
+    u.in_log = effect.info.stage == model::Stage::sensor;
     list.push_back(std::move(u));
   }
   return list;
@@ -38,22 +38,24 @@ std::vector<Unknown> unknowns_of(const model::EffectEntry& entry) {
 Hypothesis::Hypothesis(const sim::Randomisation& uncertain, std::vector<std::string> effects)
     : uncertain_(&uncertain), effects_(std::move(effects)) {
   for (std::size_t d = 0; d < uncertain.majors(); ++d)
-    unknowns_.push_back({"", uncertain.name(d), 0, 1, uncertain.is_uniform(d) ? -1.0 : -kFarthest,
-                         uncertain.is_uniform(d) ? 1.0 : kFarthest, false});
-  unknowns_.push_back({"", "imu.latency_s", 0, kImuLagSd_s, -kFarthest * kImuLagSd_s, kFarthest * kImuLagSd_s, false});
+    unknowns_.push_back({"", uncertain.name(d), 0, 1, uncertain.is_uniform(d) ? -1.0 : -kMaxDeviation,
+                         uncertain.is_uniform(d) ? 1.0 : kMaxDeviation, false});
+  unknowns_.push_back(
+      {"", "imu.latency_s", 0, kImuLagSd_s, -kMaxDeviation * kImuLagSd_s, kMaxDeviation * kImuLagSd_s, false});
   for (const std::string& e : effects_)
     for (Unknown& u : unknowns_of(*model::find_effect(uncertain.nominal(), e))) {
-      u.log = u.log && !uncertain.nominal().beat_averaged;  // which has its sensors in its prediction
+      u.in_log = u.in_log && !uncertain.nominal().beat_averaged;  // whose sensors are part of its prediction
       unknowns_.push_back(std::move(u));
     }
 }
 
 Eigen::VectorXd Hypothesis::start(const model::Vehicle& vehicle) const {
   Eigen::VectorXd at = Eigen::VectorXd::Zero(size());
-  const auto& own = vehicle.effects;
+  const auto& effects = vehicle.effects;
   for (Eigen::Index i = shared(); i < size(); ++i) {
     const Unknown& u = unknowns_[static_cast<std::size_t>(i)];
-    if (const auto effect = own.find(u.effect); effect != own.end()) at[i] = u.coordinate(effect->second.at(u.name));
+    if (const auto effect = effects.find(u.effect); effect != effects.end())
+      at[i] = u.coordinate(effect->second.at(u.name));
   }
   return at;
 }
@@ -66,8 +68,8 @@ Eigen::VectorXd Hypothesis::bounded(Eigen::VectorXd coordinates) const {
   return coordinates;
 }
 
-Candidate Hypothesis::candidate(const Eigen::VectorXd& coordinates,
-                                std::optional<std::pair<std::size_t, double>> minor) const {
+VehicleHypothesis Hypothesis::vehicle(const Eigen::VectorXd& coordinates,
+                                      std::optional<std::pair<std::size_t, double>> minor) const {
   std::vector<double> variates(static_cast<std::size_t>(parameters()));
   for (std::size_t d = 0; d < variates.size(); ++d)
     variates[d] = unknowns_[d].value(coordinates[static_cast<Eigen::Index>(d)]);
@@ -75,12 +77,12 @@ Candidate Hypothesis::candidate(const Eigen::VectorXd& coordinates,
     variates.insert(variates.end(), uncertain_->minors().begin(), uncertain_->minors().end());
     variates[minor->first] += minor->second;
   }
-  Candidate c{uncertain_->at(variates), unknowns_[static_cast<std::size_t>(lag())].value(coordinates[lag()])};
+  VehicleHypothesis h{uncertain_->at(variates), unknowns_[static_cast<std::size_t>(lag())].value(coordinates[lag()])};
   for (Eigen::Index i = shared(); i < size(); ++i) {
     const Unknown& u = unknowns_[static_cast<std::size_t>(i)];
-    c.vehicle.effects[u.effect][u.name] = u.value(coordinates[i]);
+    h.vehicle.effects[u.effect][u.name] = u.value(coordinates[i]);
   }
-  return c;
+  return h;
 }
 
 }  // namespace flappy::gap

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "io/files.hpp"
 #include "io/progress.hpp"
@@ -15,8 +16,8 @@ using Eigen::Index;
 constexpr int kIterations = 16;
 /// Coefficients that the mean of like channels counts for.
 constexpr double kShrink = 6;
-/// Below these nothing was learnt, but that the robots were few.
-constexpr double kLeastShare = 2e-4, kLeastSize = 0.01;
+/// Smaller estimates say only that the robots are few.
+constexpr double kMinShare = 2e-4, kMinBackground = 0.01;
 constexpr std::size_t kKinds = static_cast<std::size_t>(BasisFunction::count);
 
 struct Moment {
@@ -25,45 +26,46 @@ struct Moment {
 };
 using Shares = std::array<std::array<std::array<Moment, kKinds>, kHarmonics + 1>, kChannels>;
 
-/// What a robot has of each entry, in units of what is usual: heavy-tailed.
+/// Scales of the background magnitudes of a robot, over their prior: heavy-tailed.
 using Factors = std::map<std::string, double>;
 
-/// What every robot says of the variances, given those that are thought.
-void expect(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDiscrepancy& now, Shares& shares,
-            std::map<std::string, Moment>& sizes, std::vector<Factors>& factors) {
+using Robots = std::vector<std::unique_ptr<const RobotFit>>;
+
+/// Expected squares, over all robots, given the model discrepancy so far.
+void expect(const Robots& robots, const ModelDiscrepancy& now, Shares& shares,
+            std::map<std::string, Moment>& backgrounds, std::vector<Factors>& factors) {
   factors.resize(robots.size());
-  for (std::size_t r = 0; r < robots.size(); ++r) {
-    const std::unique_ptr<RobotFit>& robot = robots[r];
-    robot->set_discrepancy(now);
-    const Evidence& evidence = robot->evidence();
-    const Linearised& at = robot->parameters().point;
-    Columns c = robot->fitter().own_columns_of(at);
-    const Columns lines = robot->lines();
-    for (std::size_t k = 0; k < lines.columns.size(); ++k) c.add(*lines.columns[k], lines.prior_mean[k]);
-    const std::size_t first = c.columns.size();
-    std::vector<Background> background = robot->background(false);
+  for (std::size_t k = 0; k < robots.size(); ++k) {
+    const RobotFit& robot = *robots[k];
+    const Evidence evidence = robot.evidence().with_discrepancy(now);
+    Regressors r = Fitter::own_regressors(robot.parameters());
+    const Regressors nuisances = robot.nuisance_regressors();
+    for (std::size_t i = 0; i < nuisances.columns.size(); ++i) r.add(*nuisances.columns[i], nuisances.prior_means[i]);
+    const std::size_t first = r.columns.size();
+    std::vector<Background> background = robot.background(now, false);
     for (Background& b : background) {
-      b.column *= factors[r].try_emplace(b.entry, 1).first->second;
-      c.add(b.column, 0);
+      b.column *= factors[k].try_emplace(b.effect, 1).first->second;
+      r.add(b.column, 0);
     }
-    const Weighed w = evidence.weigh(at.statistics, c, robot->fitter().all_flights(), {}, Scales{}, {}, 1);
-    std::map<std::string, Moment> own;
-    for (std::size_t k = 0; k < background.size(); ++k) {
-      const auto i = static_cast<Index>(first + k);
-      Moment& m = own[background[k].entry];
-      m.sum += std::pow(factors[r].at(background[k].entry), 2) *
+    const ScaledEvidence w =
+        evidence.weigh(robot.parameters().statistics, r, robot.fitter().all_flights(), {}, Scales{}, {}, 1);
+    std::map<std::string, Moment> of_robot;
+    for (std::size_t n = 0; n < background.size(); ++n) {
+      const auto i = static_cast<Index>(first + n);
+      Moment& m = of_robot[background[n].effect];
+      m.sum += std::pow(factors[k].at(background[n].effect), 2) *
                (w.posterior.mean[i] * w.posterior.mean[i] + w.posterior.covariance(i, i));
       m.count += 1;
     }
-    for (const auto& [entry, m] : own) {
-      const double nu = now.tail_of(entry).freedom, factor2 = (m.sum + nu) / (m.count + nu);
-      factors[r][entry] = std::sqrt(factor2);
-      sizes[entry].sum += std::pow(now.background_sd(entry), 2) * m.sum / factor2;
-      sizes[entry].count += m.count;
+    for (const auto& [effect, m] : of_robot) {
+      const double nu = now.scale_prior(effect).freedom, factor2 = (m.sum + nu) / (m.count + nu);
+      factors[k][effect] = std::sqrt(factor2);
+      backgrounds[effect].sum += std::pow(now.background_sd(effect), 2) * m.sum / factor2;
+      backgrounds[effect].count += m.count;
     }
     for (int g = 0; g < kGroups; ++g)
       for (int i = 0; i < evidence.basis().size(); ++i) {
-        if (w.squares(g, i) == 0) continue;  // nothing was seen
+        if (w.squares(g, i) == 0) continue;  // no rows
         const int channel = g / kCoefficients, harmonic = (g % kCoefficients + 1) / 2;
         const BasisFunction kind = evidence.basis().kind(i);
         Moment& m = shares[static_cast<std::size_t>(channel)][static_cast<std::size_t>(harmonic)]
@@ -74,7 +76,7 @@ void expect(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDis
   }
 }
 
-/// Channels whose figures are alike.
+/// Channels with like parameters.
 constexpr std::array<std::pair<int, int>, 7> kAlike = {{{kTorqueX, kTorqueZ},
                                                         {kForceX, kForceZ},
                                                         {kStrokeLeft, kStrokeRight},
@@ -101,63 +103,64 @@ void shrink(Shares& shares) {
       }
 }
 
-/// What most of an entry's columns is: of which regimes, in units of what models get wrong.
-std::map<std::string, std::size_t> classes_of(const std::vector<std::unique_ptr<RobotFit>>& robots) {
+/// The class of regimes that each effect's background acts in most, in units of the model discrepancy.
+std::map<std::string, std::size_t> classes_of(const Robots& robots, const ModelDiscrepancy& now) {
   std::map<std::string, std::array<double, kClasses>> sums;
-  for (const std::unique_ptr<RobotFit>& robot : robots) {
-    const Evidence& evidence = robot->evidence();
-    const BasisCoefficients sd = evidence.discrepancy_sd();
-    for (const Background& b : robot->background(false))
+  for (const auto& robot : robots) {
+    const Evidence evidence = robot->evidence().with_discrepancy(now);
+    const BasisCoefficients sd = evidence.discrepancy_sd(robot->fitter().scales());
+    for (const Background& b : robot->background(now, false))
       for (int g = 0; g < kGroups; ++g)
         for (int i = 0; i < evidence.basis().size(); ++i)
           if (sd(g, i) > 0)
-            sums[b.entry][static_cast<std::size_t>(regimes_of(evidence.basis().kind(i)))] +=
+            sums[b.effect][static_cast<std::size_t>(regimes_of(evidence.basis().kind(i)))] +=
                 std::pow(b.column(g, i) / sd(g, i), 2);
   }
   std::map<std::string, std::size_t> classes;
-  for (const auto& [effect, of] : sums)
-    classes[effect] = static_cast<std::size_t>(std::ranges::max_element(of) - of.begin());
+  for (const auto& [effect, of_class] : sums)
+    classes[effect] = static_cast<std::size_t>(std::ranges::max_element(of_class) - of_class.begin());
   return classes;
 }
 
-/// Robots are of few makings, of which each looks like a few entries: half of an entry's variance is that of the median of its class,
-/// which those few do not move.
-void shrink(const std::map<std::string, std::size_t>& classes, std::map<std::string, Moment>& sizes) {
+/// The robots come from few simulators, each of which looks like a few effects. So half of an effect's variance is the median of its class, which
+/// those few do not move.
+void shrink(const std::map<std::string, std::size_t>& classes, std::map<std::string, Moment>& backgrounds) {
   std::array<std::vector<double>, kClasses> of_class;
-  for (const auto& [effect, m] : sizes) of_class[classes.at(effect)].push_back(m.sum / m.count);
-  for (auto& [effect, m] : sizes) m = {m.sum / m.count + io::upper_median(of_class[classes.at(effect)]), 2};
+  for (const auto& [effect, m] : backgrounds) of_class[classes.at(effect)].push_back(m.sum / m.count);
+  for (auto& [effect, m] : backgrounds) m = {m.sum / m.count + io::upper_median(of_class[classes.at(effect)]), 2};
 }
 
-void take(const Shares& shares, const std::map<std::string, Moment>& sizes, ModelDiscrepancy& d) {
+void take(const Shares& shares, const std::map<std::string, Moment>& backgrounds, ModelDiscrepancy& d) {
   for (std::size_t c = 0; c < kChannels; ++c)
     for (std::size_t h = 0; h <= kHarmonics; ++h)
       for (std::size_t k = 0; k < kKinds; ++k)
-        if (shares[c][h][k].count > 0) d.shares[c][h][k] = std::max(shares[c][h][k].root(), kLeastShare);
-  for (const auto& [effect, m] : sizes) d.background[effect] = std::max(m.root(), kLeastSize);
+        if (shares[c][h][k].count > 0) d.shares[c][h][k] = std::max(shares[c][h][k].root(), kMinShare);
+  for (const auto& [effect, m] : backgrounds) d.background[effect] = std::max(m.root(), kMinBackground);
 }
 
 }  // namespace
 
-ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>& robots,
-                                   const ModelDiscrepancy& start) {
-  ModelDiscrepancy now = start;
+ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
+                                   const ModelDiscrepancy& start, int threads) {
   io::ProgressLine line("learning");
-  for (std::size_t i = 0; i < robots.size() && !io::interrupted(); ++i) {
-    line.show(static_cast<double>(i) / static_cast<double>(robots.size()), "fitting robot " + std::to_string(i + 1));
-    robots[i]->fit_parameters();
-    robots[i]->refit_beside_background();
+  Robots robots;
+  for (std::size_t i = 0; i < flights.size() && !io::interrupted(); ++i) {
+    line.show(static_cast<double>(i) / static_cast<double>(flights.size()), "fitting robot " + std::to_string(i + 1));
+    robots.push_back(
+        std::make_unique<const RobotFit>(flights[i], uncertain, start, std::vector<std::string>(), threads));
   }
   if (io::interrupted()) throw io::InputError("stopped: nothing was learnt; accepted: all robots");
+  ModelDiscrepancy now = start;
   std::vector<Factors> factors;
   for (int n = 1; n <= kIterations; ++n) {
     Shares shares{};
-    std::map<std::string, Moment> sizes;
-    expect(robots, now, shares, sizes, factors);
+    std::map<std::string, Moment> backgrounds;
+    expect(robots, now, shares, backgrounds, factors);
     if (n == kIterations) {
       shrink(shares);
-      shrink(classes_of(robots), sizes);
+      shrink(classes_of(robots, now), backgrounds);
     }
-    take(shares, sizes, now);
+    take(shares, backgrounds, now);
   }
   return now;
 }

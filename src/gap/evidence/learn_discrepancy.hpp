@@ -1,7 +1,6 @@
-// What models get wrong, learnt from robots that somebody trusts: flights of which all is known that the vehicle's file says.
+// Learns the model discrepancy from robots that are trusted: their flights contain nothing that the vehicle file lacks.
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -9,9 +8,10 @@
 
 namespace flappy::gap {
 
-/// The variances of delta's coefficients by channel, harmonic and kind of function, and of every entry's sizes, that make the
-/// residuals of all robots most probable: expectation-maximisation, from `start` on, whose other figures stay. Each robot is fitted;
-/// what is found is taken towards that of like channels and entries, for single ones hold few coefficients.
-ModelDiscrepancy learn_discrepancy(const std::vector<std::unique_ptr<RobotFit>>& robots, const ModelDiscrepancy& start);
+/// The prior variances of the discrepancy coefficients by channel, harmonic and kind of function, and of the background magnitudes, that make the
+/// residuals of all robots most probable: expectation-maximisation from `start` on, whose other parameters stay. Each robot is fitted first. Estimates
+/// are shrunk towards those of like channels and effects, for single ones rest on few coefficients. `flights`: of each robot. io::InputError after Ctrl-C.
+ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
+                                   const ModelDiscrepancy& start, int threads);
 
 }  // namespace flappy::gap

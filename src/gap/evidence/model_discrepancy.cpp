@@ -43,8 +43,8 @@ constexpr const char* kBackground =
 # (1: the catalogue's prior). Only more than that is an effect. `other`: of every entry that is not named.
 )";
 
-/// What a name of a background is of: what both wings have of an entry is of that entry.
-std::string entry_of(const std::string& background) {
+/// The effect of a background magnitude, without the suffix of what both wings share.
+std::string effect_of(const std::string& background) {
   return background.ends_with(kOfBoth) ? background.substr(0, background.size() - std::strlen(kOfBoth)) : background;
 }
 
@@ -69,14 +69,14 @@ Regimes regimes_of(BasisFunction function) {
 double ModelDiscrepancy::background_sd(const std::string& effect) const {
   const auto at = background.find(effect);
   if (at != background.end()) return at->second;
-  const std::string entry = entry_of(effect);
-  return entry != effect ? background_sd(entry) : background.at("other");
+  const std::string own = effect_of(effect);
+  return own != effect ? background_sd(own) : background.at("other");
 }
 
-Tail ModelDiscrepancy::tail_of(const std::string& effect) const {
-  if (spread.beside_all) return {spread.entry_freedom, true};
-  const bool of_model = std::ranges::count(of_models, entry_of(effect)) > 0;
-  return {of_model ? spread.model_freedom : spread.entry_freedom, of_model};
+ScalePrior ModelDiscrepancy::scale_prior(const std::string& effect) const {
+  if (beat_averaged) return {spread.effect_freedom, true};
+  const bool of_model = std::ranges::count(of_models, effect_of(effect)) > 0;
+  return {of_model ? spread.model_freedom : spread.effect_freedom, of_model};
 }
 
 std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learnt) {
@@ -101,9 +101,9 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
   }
   text += std::string(kSpread) + "[spread]\nrobot_sd = " + number(d.spread.robot_sd) +
           "\nblock_freedom = " + number(d.spread.block_freedom) +
-          (d.spread.beside_all ? "" : "\nplace_freedom = " + number(d.spread.place_freedom)) +
-          "\nentry_freedom = " + number(d.spread.entry_freedom) + of_models +
-          (d.spread.beside_all ? "\nbeside_all = true\n\n" : "\n\n") + kSensors +
+          (d.beat_averaged ? "" : "\nplace_freedom = " + number(d.spread.place_freedom)) +
+          "\nentry_freedom = " + number(d.spread.effect_freedom) + of_models +
+          (d.beat_averaged ? "\nbeside_all = true\n\n" : "\n\n") + kSensors +
           "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") + "  # as it is mounted, about each axis\n" +
           "imu_place_m = " + sensor("imu_place") + "  # along each axis\npower_latency_s = " + sensor("power_delay") +
           "  # of a sample that is an instant, a mean, or held\nclock_rate = " + sensor("imu_clock") +
@@ -118,13 +118,10 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   root.schema(1);
   ModelDiscrepancy d;
   const io::Table spread = root.table("spread");
-  d.spread = {spread.number("robot_sd", io::positive()),
-              spread.number("block_freedom", io::positive()),
-              spread.number("block_freedom", io::positive()),
-              spread.number("entry_freedom", io::positive()),
-              0,
-              spread.boolean_or("beside_all", false)};
-  if (!d.spread.beside_all) {
+  d.spread = {spread.number("robot_sd", io::positive()), spread.number("block_freedom", io::positive()),
+              spread.number("block_freedom", io::positive()), spread.number("entry_freedom", io::positive()), 0};
+  d.beat_averaged = spread.boolean_or("beside_all", false);
+  if (!d.beat_averaged) {
     d.spread.place_freedom = spread.number("place_freedom", io::positive());
     d.spread.model_freedom = spread.number("model_freedom", io::positive());
     d.of_models = spread.strings("of_models");
@@ -157,7 +154,7 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   const io::Table background = root.table("background_sd");
   d.background["other"] = background.number("other", io::positive());
   for (const std::string& key : background.keys())
-    if (key == "other" || model::is_effect(entry_of(key))) d.background[key] = background.number(key, io::positive());
+    if (key == "other" || model::is_effect(effect_of(key))) d.background[key] = background.number(key, io::positive());
   root.finish();
   return d;
 }

@@ -5,20 +5,20 @@
 
 namespace flappy::gap {
 
-RegimeBasis::RegimeBasis(const std::vector<PredictedFlight>& flights) {
+RegimeBasis::RegimeBasis(const Flights& flights) {
   values_.resize(flights.size());
   std::vector<std::vector<RegimeFunction>> functions;
   std::vector<Eigen::VectorXd> column;
-  for (const PredictedFlight& f : flights) {
-    functions.push_back(f.functions());
-    column.push_back(Eigen::VectorXd::Ones(static_cast<Eigen::Index>(f.beats())));
+  for (const auto& f : flights) {
+    functions.push_back(f->functions());
+    column.push_back(Eigen::VectorXd::Ones(static_cast<Eigen::Index>(f->beats())));
   }
   // centred and of rms 1, but for the constant; what never changes is the constant
-  const auto append = [&](const std::string& name, BasisFunction kind) {
+  const auto append = [&](const std::string& name, const std::string& quantity, BasisFunction kind) {
     double sum = 0, squares = 0, n = 0;
     for (const Eigen::VectorXd& v : column)
       sum += v.sum(), squares += v.squaredNorm(), n += static_cast<double>(v.size());
-    const bool constant = names_.empty();
+    const bool constant = functions_.empty();
     const double mean = constant ? 0 : sum / n;
     const double sd = constant ? 1 : std::sqrt(std::max(0.0, squares / n - mean * mean));
     if (!(sd > 1e-9 * (std::abs(mean) + 1e-3))) return;
@@ -26,32 +26,30 @@ RegimeBasis::RegimeBasis(const std::vector<PredictedFlight>& flights) {
       values_[f].conservativeResize(column[f].size(), values_[f].cols() + 1);
       values_[f].rightCols(1) = (column[f].array() - mean) / sd;
     }
-    names_.push_back(name);
-    kinds_.push_back(kind);
+    functions_.push_back({name, quantity, kind});
   };
-  append("1", BasisFunction::constant);
+  append("1", "always", BasisFunction::constant);
   if (flights.empty()) return;
   for (std::size_t i = 0; i < functions.front().size(); ++i) {
     for (std::size_t f = 0; f < flights.size(); ++f) column[f] = functions[f][i].values;
-    append(functions.front()[i].name, functions.front()[i].kind);
+    append(functions.front()[i].name, functions.front()[i].quantity, functions.front()[i].kind);
   }
-  // what changes from flight to flight, and would else look like a height at which one of them flew
-  for (std::size_t own = 1; own < flights.size() && flights.front().within_the_beat(); ++own) {
-    for (std::size_t f = 0; f < flights.size(); ++f) column[f].setConstant(f == own ? 1 : 0);
-    append("flight " + flights[own].name(), BasisFunction::flight);
+  // an offset of each flight, which would else look like a height at which one of them flew
+  for (std::size_t offset = 1; offset < flights.size() && flights.front()->policy().flight_offsets; ++offset) {
+    for (std::size_t f = 0; f < flights.size(); ++f) column[f].setConstant(f == offset ? 1 : 0);
+    append("flight " + flights[offset]->name(), "flight", BasisFunction::flight);
   }
-  // of what is already centred, so that a product says what its factors do not
+  // products of centred functions, none of them where a factor never changes
   const auto index = [&](const std::string& name) {
-    return static_cast<Eigen::Index>(std::ranges::find(names_, name) - names_.begin());
+    return static_cast<int>(std::ranges::find(functions_, name, &Function::name) - functions_.begin());
   };
-  // none of them where a factor never changes
-  const std::vector<std::pair<std::string, std::string>> products = flights.front().products();
+  const std::vector<std::pair<std::string, std::string>> products = flights.front()->products();
   if (std::ranges::any_of(products, [&](const auto& p) { return std::max(index(p.first), index(p.second)) >= size(); }))
     return;
   for (const auto& [a, b] : products) {
-    const Eigen::Index i = index(a), j = index(b);
+    const int i = index(a), j = index(b);
     for (std::size_t f = 0; f < flights.size(); ++f) column[f] = values_[f].col(i).cwiseProduct(values_[f].col(j));
-    append(a + " " + b, BasisFunction::product);
+    append(a + " " + b, quantity(j), BasisFunction::product);
   }
 }
 

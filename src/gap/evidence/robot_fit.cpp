@@ -14,200 +14,196 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kMostRounds = 5, kRefitIterations = 6;
-/// So many times what is usual of an entry.
-constexpr double kWide = 5;
-/// Noise and what it lets the catalogue explain, by turns.
+constexpr int kFirstIterations = 4, kMaxRefits = 5, kRefitIterations = 6;
+/// Scale of background magnitudes for the first fit, over their prior scale.
+constexpr double kWideScale = 5;
+/// Rounds in which the remainder is learnt and the catalogue explains some of it.
 constexpr int kRemainderRounds = 3;
-/// Nats that another round has to bring; and that a round may lose, as lines are no curves.
-constexpr double kWorthwhileNats = 2;
+/// Evidence that another round has to bring, and that it may lose, as linear models are not exact.
+constexpr double kMinGain_nats = 2;
 
-/// How far another law than the entry's may go: sd of the log of its factor, and the largest.
-constexpr double kShapeSd = 1, kMostShape = 32;
+/// Prior of the law factor: standard deviation of its log, and its largest value.
+constexpr double kLawFactorSd = 1, kMaxLawFactor = 32;
 
 constexpr const char* kDelay = "delay_s";
 
-/// Whether an entry has a size for each wing, and no other.
-bool of_sides(const model::EffectEntry& entry) {
-  return entry.info.sizes == 2 && std::string_view(entry.parameters[0].name).starts_with("left_") &&
-         std::string_view(entry.parameters[1].name).starts_with("right_");
+/// Whether an effect has a magnitude for each wing, and no other.
+bool of_sides(const model::EffectEntry& effect) {
+  return effect.info.sizes == 2 && std::string_view(effect.parameters[0].name).starts_with("left_") &&
+         std::string_view(effect.parameters[1].name).starts_with("right_");
 }
 
 }  // namespace
 
-RobotFit::RobotFit(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
-                   const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads)
+RobotFit::RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
+                   std::vector<std::string> withheld, int threads)
     : flights_(flights),
       uncertain_(uncertain),
       withheld_(std::move(withheld)),
       threads_(io::thread_count(threads)),
-      evidence_(flights, discrepancy, threads_),
-      fitter_(flights, evidence_, threads_),
-      plain_(uncertain_, {}) {}
+      fitter_(flights, std::make_shared<const Evidence>(flights, discrepancy, threads_), threads_),
+      no_effects_(uncertain_, {}) {
+  fit_parameters();
+  refit_with_nuisances();
+}
 
 void RobotFit::fit_parameters() {
-  const Directions none{MatrixXd(plain_.size(), 0), VectorXd(0)};
-  nominal_ = fitter_.linearise(plain_, plain_.start(), none);
-  evidence_.learn_weights(nominal_.residual);
-  parameters_ = fitter_.fit(plain_, plain_.start(), 4);
-  evidence_.learn_noise(parameters_.point.residual);
-  parameters_.point.statistics = evidence_.statistics(parameters_.point.residual);
-  take_scales(plain_, parameters_.point);
-  parameters_ = fitter_.refit(plain_, parameters_, 6);
-  nominal_.statistics = evidence_.statistics(nominal_.residual);
+  const Directions none{MatrixXd(no_effects_.size(), 0), VectorXd(0)};
+  nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), none);
+  take_evidence(evidence().with_weights(nominal_.residual));
+  parameters_ = fitter_.fit(no_effects_, no_effects_.start(), kFirstIterations);
+  take_evidence(evidence().with_noise(parameters_.residual));
+  parameters_.statistics = evidence().statistics(parameters_.residual);
+  take_scales();
+  parameters_ = fitter_.refit(no_effects_, parameters_, kRefitIterations);
+  nominal_.statistics = evidence().statistics(nominal_.residual);
 }
 
-void RobotFit::refit_beside_background() {
-  find_sizes();
-  find_lines();
-  set_background();
-  if (evidence_.discrepancy().spread.beside_all) learn_remainder();
-  widen_entries();
-  parameters_ = fitter_.refit(plain_, parameters_, kRefitIterations);
-  take_scales(plain_, parameters_.point);
-  for (int round = 0; round < kMostRounds && refit_with_minors(); ++round) continue;
+void RobotFit::refit_with_nuisances() {
+  find_magnitudes();
+  find_nuisances();
+  set_nuisances();
+  if (evidence().policy().discrepancy_scales) widen_effects();
+  else learn_remainder();
+  parameters_ = fitter_.refit(no_effects_, parameters_, kRefitIterations);
+  take_scales();
+  for (int round = 0; round < kMaxRefits && refit_with_minors(); ++round) continue;
 }
 
-/// Parameters that were fitted where a robot may have little of an entry make up for what it has much of, and then nothing tells it: so the
-/// first fit is one where it may have much of each.
-void RobotFit::widen_entries() {
-  if (evidence_.discrepancy().spread.beside_all) return;
-  Scales wide = weigh(plain_, parameters_.point).scales;
-  for (std::size_t e = 0; e < wide.entries.size(); ++e)
-    wide.entries[e] = kWide * wide.usual(evidence_.discrepancy().tail_of(fitter_.entries()[e]));
-  set_scales(wide);
+/// Parameters that are fitted while background magnitudes are small make up for a large one, and then nothing shows it. So the first fit is one in
+/// which each may be large.
+void RobotFit::widen_effects() {
+  Scales wide = weigh(no_effects_, parameters_, fitter_.scales()).scales;
+  for (std::size_t e = 0; e < wide.effects.size(); ++e)
+    wide.effects[e] = kWideScale * wide.prior_scale(evidence().discrepancy().scale_prior(fitter_.effects()[e]));
+  fitter_ = fitter_.with_scales(wide);
 }
 
-double RobotFit::beyond_background(const std::string& effect, const VectorXd& sizes) const {
-  const Tail tail = evidence_.discrepancy().tail_of(effect);
-  const double nu = tail.freedom, f = evidence_.scales().usual(tail);
-  const auto improbable = [&](const std::string& entry, const VectorXd& own) {
-    const double sd = evidence_.discrepancy().background_sd(entry), n = static_cast<double>(own.size());
-    const double times = std::sqrt((own.squaredNorm() / (sd * sd) + nu * f * f) / (n + nu));
-    return 0.5 * own.squaredNorm() / std::pow(times * sd, 2) + n * std::log(times * sd) +
-           evidence_.price_of(times, tail);
+double RobotFit::beyond_background(const std::string& effect, const VectorXd& magnitudes, const Scales& scales) const {
+  const ScalePrior prior = evidence().discrepancy().scale_prior(effect);
+  const double nu = prior.freedom, f = scales.prior_scale(prior);
+  const auto improbable = [&](const std::string& name, const VectorXd& m) {
+    const double sd = evidence().discrepancy().background_sd(name), n = static_cast<double>(m.size());
+    const double times = std::sqrt((m.squaredNorm() / (sd * sd) + nu * f * f) / (n + nu));
+    return 0.5 * m.squaredNorm() / std::pow(times * sd, 2) + n * std::log(times * sd) +
+           Evidence::scale_cost_nats(times, prior, scales);
   };
-  const double usual = -0.5 * sizes.squaredNorm();
-  if (!of_sides(*model::find_effect(uncertain_.nominal(), effect))) return usual + improbable(effect, sizes);
+  const double as_effect = -0.5 * magnitudes.squaredNorm();
+  if (!of_sides(*model::find_effect(uncertain_.nominal(), effect))) return as_effect + improbable(effect, magnitudes);
   const double half = std::numbers::sqrt2 / 2;
-  return usual + improbable(effect, VectorXd::Constant(1, half * (sizes[0] - sizes[1]))) +
-         improbable(effect + kOfBoth, VectorXd::Constant(1, half * (sizes[0] + sizes[1])));
+  return as_effect + improbable(effect, VectorXd::Constant(1, half * (magnitudes[0] - magnitudes[1]))) +
+         improbable(effect + kOfBoth, VectorXd::Constant(1, half * (magnitudes[0] + magnitudes[1])));
 }
 
-/// From now on what the flights say of the minor figures is flown, and parameters are fitted beside it. False where that brought next to
-/// nothing, or so much less than nothing that it is taken back.
+/// Moves the minor draws to what the flights show of them, and fits the parameters again. False where that brings next to nothing, or loses so much
+/// that it is undone.
 bool RobotFit::refit_with_minors() {
-  const auto log_evidence = [&] { return weigh(plain_, parameters_.point).posterior.log_evidence; };
+  const auto log_evidence = [&] { return weigh(no_effects_, parameters_, fitter_.scales()).posterior.log_evidence; };
   const std::vector<double> minors = uncertain_.minors();
   const Fit parameters = parameters_;
   const double before = log_evidence();
   std::vector<double> there = minors;
-  for (const Fitter::Beside& b : fitter_.beside(parameters_.point))
-    if (b.place >= nuisances_.size()) there[b.place - nuisances_.size()] += b.mean;
+  for (const Fitter::NuisanceEstimate& n : fitter_.nuisances(parameters_))
+    if (n.place >= sensor_errors_.size()) there[n.place - sensor_errors_.size()] += n.mean;
   const auto take = [&](const std::vector<double>& variates, Fit fit) {
     uncertain_.set_minors(variates);
-    set_background();
+    set_nuisances();
     parameters_ = std::move(fit);
   };
   take(there, parameters_);
-  // with columns of its own: beside those of another point a fit may stay where it is, a hundred nats below what is near
-  parameters_ = fitter_.fit(plain_, parameters_.mean(), kRefitIterations);
-  take_scales(plain_, parameters_.point);
+  // with new columns: by those of another point a fit may end a hundred nats below what is near
+  parameters_ = fitter_.fit(no_effects_, parameters_.mean(), kRefitIterations);
+  take_scales();
   const double gain = log_evidence() - before;
-  if (gain < -kWorthwhileNats) {
+  if (gain < -kMinGain_nats) {
     take(minors, parameters);
-    take_scales(plain_, parameters_.point);
+    take_scales();
   }
-  return gain > kWorthwhileNats;
+  return gain > kMinGain_nats;
 }
 
-Columns RobotFit::lines() const {
-  Columns c;
-  for (const BasisCoefficients& n : nuisances_) c.add(n, 0);
-  for (std::size_t k = 0; k < minors_.size(); ++k) c.add(minors_[k], -uncertain_.minors()[k]);
-  return c;
+Regressors RobotFit::nuisance_regressors() const {
+  Regressors r;
+  for (const BasisCoefficients& e : sensor_errors_) r.add(e, 0);
+  for (std::size_t k = 0; k < minors_.size(); ++k) r.add(minors_[k], -uncertain_.minors()[k]);
+  return r;
 }
 
-std::vector<Background> RobotFit::background(bool shapes) const {
+std::vector<Background> RobotFit::background(const ModelDiscrepancy& discrepancy, bool shapes) const {
   std::vector<Background> list;
-  for (std::size_t i = 0; i < sizes_.size(); ++i) {
-    const std::string& effect = sizes_[i].effect;
-    const double sd = evidence_.discrepancy().background_sd(effect);
+  for (std::size_t i = 0; i < magnitudes_.size(); ++i) {
+    const std::string& effect = magnitudes_[i].effect;
+    const double sd = discrepancy.background_sd(effect);
     if (!of_sides(*model::find_effect(uncertain_.nominal(), effect))) {
-      const auto n = static_cast<double>(sizes_[i].near.size());
-      for (const BasisCoefficients& near : sizes_[i].near) list.push_back({effect, sd / std::sqrt(n) * near});
+      const auto n = static_cast<double>(magnitudes_[i].near.size());
+      for (const BasisCoefficients& near : magnitudes_[i].near) list.push_back({effect, sd / std::sqrt(n) * near});
       continue;
     }
-    if (i + 1 == sizes_.size() || sizes_[i + 1].effect != effect) continue;
+    if (i + 1 == magnitudes_.size() || magnitudes_[i + 1].effect != effect) continue;
     const std::string both = effect + kOfBoth;
-    const BasisCoefficients &left = sizes_[i].near[0], &right = sizes_[i + 1].near[0];
+    const BasisCoefficients &left = magnitudes_[i].near[0], &right = magnitudes_[i + 1].near[0];
     list.push_back({effect, sd * std::numbers::sqrt2 / 2 * (left - right)});
-    list.push_back({both, evidence_.discrepancy().background_sd(both) * std::numbers::sqrt2 / 2 * (left + right)});
+    list.push_back({both, discrepancy.background_sd(both) * std::numbers::sqrt2 / 2 * (left + right)});
     ++i;
   }
   for (std::size_t i = 0; shapes && i < shapes_.size(); ++i)
-    list.push_back({shapes_[i].effect, evidence_.discrepancy().background_sd(shapes_[i].effect) * shapes_[i].change});
+    list.push_back({shapes_[i].effect, discrepancy.background_sd(shapes_[i].effect) * shapes_[i].change});
   return list;
 }
 
-void RobotFit::set_background() { fitter_.set_background(lines(), background(true), parameters_); }
+void RobotFit::set_nuisances() {
+  fitter_ = fitter_.with_nuisances(nuisance_regressors(), background(evidence().discrepancy(), true), parameters_);
+}
 
-/// What is left beside every size of the catalogue together is noise to every hypothesis.
+/// What is left given all magnitudes of the catalogue is noise under every hypothesis.
 void RobotFit::learn_remainder() {
   for (int round = 0; round < kRemainderRounds; ++round) {
-    Columns c = Fitter::own_columns_of(parameters_.point);
-    for (const SizeColumn& s : sizes_) c.add(s.change, 0);
+    Regressors r = Fitter::own_regressors(parameters_);
+    for (const MagnitudeColumn& m : magnitudes_) r.add(m.change, 0);
     const Posterior p =
-        Evidence::posterior(evidence_.reduce(evidence_.statistics(parameters_.point.residual), c.columns,
-                                             fitter_.all_flights(), evidence_.discrepancy_sd()),
-                            c.chosen, c.mean());
-    BasisCoefficients all = BasisCoefficients::Zero(kGroups, evidence_.basis().size());
-    for (std::size_t k = 0; k < c.columns.size(); ++k) all += p.mean[static_cast<Eigen::Index>(k)] * *c.columns[k];
-    Residuals left = parameters_.point.residual;
-    for (std::size_t f = 0; f < left.size(); ++f) left[f] = evidence_.without(f, std::move(left[f]), all);
-    evidence_.learn_remainder(left);
+        Evidence::posterior(evidence().reduce(evidence().statistics(parameters_.residual), r.columns,
+                                              fitter_.all_flights(), evidence().discrepancy_sd(fitter_.scales())),
+                            r.all, r.prior_mean());
+    BasisCoefficients all = BasisCoefficients::Zero(kGroups, evidence().basis().size());
+    for (std::size_t k = 0; k < r.columns.size(); ++k) all += p.mean[static_cast<Eigen::Index>(k)] * *r.columns[k];
+    Residuals left = parameters_.residual;
+    for (std::size_t f = 0; f < left.size(); ++f) left[f] = evidence().without(f, std::move(left[f]), all);
+    take_evidence(evidence().with_remainder(left));
+    fitter_ = fitter_.with_scales({});
   }
-  parameters_.point.statistics = evidence_.statistics(parameters_.point.residual);
-  nominal_.statistics = evidence_.statistics(nominal_.residual);
-  fitter_.take_scales();
+  parameters_.statistics = evidence().statistics(parameters_.residual);
+  nominal_.statistics = evidence().statistics(nominal_.residual);
 }
 
-void RobotFit::set_scales(const Scales& scales) {
-  evidence_.set_scales(scales);
-  fitter_.take_scales();
-}
-
-void RobotFit::take_scales(const Hypothesis& hypothesis, const Linearised& at) {
-  Weighed best = weigh(hypothesis, at);
-  // expectation-maximisation leaves to the blocks what they took first: one entry after another may have it instead
-  for (bool better = true; better;) {
-    set_scales(best.scales);
-    better = false;
-    if (evidence_.discrepancy().spread.beside_all) break;
-    if (const auto larger = larger_entry(hypothesis, at)) {
-      Weighed other = weigh(hypothesis, at, *larger);
-      better = other.posterior.log_evidence > best.posterior.log_evidence + kWorthwhileNats;
-      if (better) best = std::move(other);
-    }
+Scales RobotFit::find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const {
+  ScaledEvidence best = weigh(hypothesis, fit, start);
+  // expectation-maximisation leaves to the blocks what they took first: one effect after another may have it instead
+  while (evidence().policy().discrepancy_scales) {
+    const std::optional<Scales> larger = larger_effect(hypothesis, fit, best.scales);
+    if (!larger) break;
+    ScaledEvidence other = weigh(hypothesis, fit, *larger);
+    if (!(other.posterior.log_evidence > best.posterior.log_evidence + kMinGain_nats)) break;
+    best = std::move(other);
   }
+  return best.scales;
 }
 
-/// The scales at hand, but for that entry which gains most where this robot has more of it; none where none gains. Given all else, what the
-/// flights say of its coefficients is normal with precision C^-1 - 1 and sum C^-1 m, m and C being their posterior.
-std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const Linearised& at) const {
-  const Scales& now = evidence_.scales();
-  const Columns c = fitter_.columns_of(at);
-  const BasisCoefficients own = fitter_.shape_error(hypothesis, at);
-  const Posterior p =
-      Evidence::posterior(evidence_.reduce(at.statistics, c.columns, fitter_.all_flights(),
-                                           (evidence_.discrepancy_sd().cwiseAbs2() + own.cwiseAbs2()).cwiseSqrt()),
-                          c.chosen, c.mean());
+/// The scales, but for the background magnitude that gains most where it is larger; none where none gains. Given all else, the likelihood of its
+/// coefficients is normal with precision C^-1 - 1 and sum C^-1 m, where m and C are their posterior.
+std::optional<Scales> RobotFit::larger_effect(const Hypothesis& hypothesis, const Fit& fit, const Scales& now) const {
+  const Fitter fitter = fitter_.with_scales(now);
+  const Regressors r = fitter.regressors(fit);
+  const BasisCoefficients law_sd = fitter.law_sd(hypothesis, fit);
+  const Posterior p = Evidence::posterior(
+      evidence().reduce(fit.statistics, r.columns, fitter.all_flights(),
+                        (evidence().discrepancy_sd(now).cwiseAbs2() + law_sd.cwiseAbs2()).cwiseSqrt()),
+      r.all, r.prior_mean());
   std::optional<Scales> best;
-  double most = kWorthwhileNats;
-  for (std::size_t e = 0; e < now.entries.size(); ++e) {
+  double most = kMinGain_nats;
+  for (std::size_t e = 0; e < now.effects.size(); ++e) {
     std::vector<Eigen::Index> columns;
-    for (std::size_t k = 0; k < c.entry.size(); ++k)
-      if (c.entry[k] == static_cast<int>(e)) columns.push_back(static_cast<Eigen::Index>(k));
+    for (std::size_t k = 0; k < r.effects.size(); ++k)
+      if (r.effects[k] == static_cast<int>(e)) columns.push_back(static_cast<Eigen::Index>(k));
     if (columns.empty()) continue;
     const auto n = static_cast<Eigen::Index>(columns.size());
     const MatrixXd inverse = MatrixXd(p.covariance(columns, columns)).inverse();
@@ -216,7 +212,7 @@ std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const
     const auto log_evidence = [&](double factor) {
       const Eigen::LLT<MatrixXd> llt(factor * factor * precision + MatrixXd::Identity(n, n));
       return 0.5 * factor * factor * sum.dot(llt.solve(sum)) - llt.matrixLLT().diagonal().array().log().sum() -
-             evidence_.price_of(factor * now.entries[e], c.tail[static_cast<std::size_t>(columns[0])]);
+             Evidence::scale_cost_nats(factor * now.effects[e], r.priors[static_cast<std::size_t>(columns[0])], now);
     };
     const double before = log_evidence(1);
     for (const double factor : {2.0, 4.0, 8.0, 16.0, 32.0, 64.0}) {
@@ -224,83 +220,81 @@ std::optional<Scales> RobotFit::larger_entry(const Hypothesis& hypothesis, const
       if (!(gain > most)) continue;
       most = gain;
       best = now;
-      best->entries[e] *= factor;
+      best->effects[e] *= factor;
     }
   }
   return best;
 }
 
-Weighed RobotFit::weigh(const Hypothesis& hypothesis, const Linearised& at, const Scales& start,
-                        std::optional<double> freeing_nats) const {
-  const Columns columns = fitter_.unscaled_columns_of(at);
-  const auto with = [&](double shape, const Scales& from) {
-    Weighed w = evidence_.weigh(at.statistics, columns, fitter_.all_flights(),
-                                fitter_.shape_error(hypothesis, at, shape), from, freeing_nats);
-    w.shape = shape;
-    w.posterior.log_evidence -= 0.5 * std::pow(std::log(shape) / kShapeSd, 2);
+ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
+                               std::optional<double> unknown_penalty_nats) const {
+  const Regressors regressors = fitter_.unscaled_regressors(fit);
+  const auto with = [&](double law_factor, const Scales& from) {
+    ScaledEvidence w = evidence().weigh(fit.statistics, regressors, fitter_.all_flights(),
+                                        fitter_.law_sd(hypothesis, fit, law_factor), from, unknown_penalty_nats);
+    w.law_factor = law_factor;
+    w.posterior.log_evidence -= 0.5 * std::pow(std::log(law_factor) / kLawFactorSd, 2);
     return w;
   };
-  Weighed best = with(1, start);
-  // what the effect explains now need not be this robot's own any longer
-  Scales usual = start;
+  ScaledEvidence best = with(1, start);
+  // the effect may explain now what was taken for a large background magnitude
+  Scales without_background = start;
   bool differs = false;
   for (const std::string& effect : hypothesis.effects())
-    for (const std::string& entry : {effect, effect + kOfBoth})
-      if (const auto e = static_cast<std::size_t>(fitter_.entry_of(entry)); e < usual.entries.size()) {
-        usual.entries[e] = usual.usual(evidence_.discrepancy().tail_of(entry));
+    for (const std::string& name : {effect, effect + kOfBoth})
+      if (const auto e = static_cast<std::size_t>(fitter_.place_of(name)); e < start.effects.size()) {
+        without_background.effects[e] = start.prior_scale(evidence().discrepancy().scale_prior(name));
         differs = true;
       }
   if (differs)
-    if (Weighed w = with(1, usual); w.posterior.log_evidence > best.posterior.log_evidence) best = std::move(w);
-  if (!fitter_.has_shape(hypothesis, at)) return best;
+    if (ScaledEvidence w = with(1, without_background); w.posterior.log_evidence > best.posterior.log_evidence)
+      best = std::move(w);
+  if (!fitter_.acts_by_place(hypothesis, fit)) return best;
   for (const double step : {2.0, 0.5})
-    for (double shape = step; shape <= kMostShape && shape >= 1 / kMostShape; shape *= step) {
-      Weighed other = with(shape, best.scales);
+    for (double law_factor = step; law_factor <= kMaxLawFactor && law_factor >= 1 / kMaxLawFactor; law_factor *= step) {
+      ScaledEvidence other = with(law_factor, best.scales);
       if (other.posterior.log_evidence < best.posterior.log_evidence) break;
       best = std::move(other);
     }
   return best;
 }
 
-std::vector<SensorFinding> RobotFit::sensors(const Hypothesis& hypothesis, const Fit& fit) const {
+std::vector<SensorFinding> RobotFit::sensors(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) const {
   const Eigen::Index lag = hypothesis.lag();
   const Unknown& late = hypothesis.unknowns()[static_cast<std::size_t>(lag)];
   std::vector<SensorFinding> list = {
       {late.name, late.value(fit.mean()[lag]), late.scale * std::sqrt(fit.covariance()(lag, lag)), late.scale}};
-  for (const Fitter::Beside& b : fitter_.beside(fit.point)) {
-    if (b.place >= nuisances_.size()) break;  // figures of the vehicle
-    const ModelDiscrepancy::Nuisance& n = evidence_.discrepancy().nuisances[b.place];
-    list.push_back({n.id + "." + n.value, b.mean * n.sd, b.sd * n.sd, n.sd});
+  for (const Fitter::NuisanceEstimate& e : fitter.nuisances(fit)) {
+    if (e.place >= sensor_errors_.size()) break;  // minor draws of the vehicle
+    const ModelDiscrepancy::Nuisance& n = evidence().discrepancy().nuisances[e.place];
+    list.push_back({n.id + "." + n.value, e.mean * n.sd, e.sd * n.sd, n.sd});
   }
   return list;
 }
 
-/// Of a residual `steps` steps away from that of the parameters, for one step.
+/// Change of the prediction for one step, of a residual that is `steps` steps away from that of the parameters.
 BasisCoefficients RobotFit::change(Residuals there, double steps) const {
   for (std::size_t f = 0; f < there.size(); ++f)
-    for (std::size_t k = 0; k < there[f].size(); ++k)
-      there[f][k] = (parameters_.point.residual[f][k] - there[f][k]) / steps;
-  return evidence_.basis_coefficients(there);
+    for (std::size_t k = 0; k < there[f].size(); ++k) there[f][k] = (parameters_.residual[f][k] - there[f][k]) / steps;
+  return evidence().basis_coefficients(there);
 }
 
-void RobotFit::find_sizes() {
-  std::vector<SizeStep> steps = size_steps(uncertain_, parameters_.point.at, withheld_, &evidence_.discrepancy());
-  std::vector<Candidate> candidates;
-  for (SizeStep& s : steps) {
-    candidates.push_back(std::move(s.candidate));
-    for (Candidate& c : s.shaped) candidates.push_back(std::move(c));
-    for (Candidate& c : s.further) candidates.push_back(std::move(c));
-    for (Candidate& c : s.near) candidates.push_back(std::move(c));
+void RobotFit::find_magnitudes() {
+  std::vector<MagnitudeStep> steps = magnitude_steps(uncertain_, parameters_.at, withheld_, &evidence().discrepancy());
+  std::vector<VehicleHypothesis> vehicles;
+  for (MagnitudeStep& s : steps) {
+    vehicles.push_back(std::move(s.vehicle));
+    for (VehicleHypothesis& v : s.shaped) vehicles.push_back(std::move(v));
+    for (VehicleHypothesis& v : s.further) vehicles.push_back(std::move(v));
+    for (VehicleHypothesis& v : s.near) vehicles.push_back(std::move(v));
   }
-  std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
-  std::vector<BasisCoefficients> changes(rows.size());  // of all that there is
+  std::vector<Residuals> rows = residuals(flights_, vehicles, threads_);
+  std::vector<BasisCoefficients> changes(rows.size());  // of the whole step
   io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
     if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), 1);
   });
-  sizes_.clear();
-  shapes_.clear();
   std::size_t i = 0;
-  for (const SizeStep& s : steps) {
+  for (const MagnitudeStep& s : steps) {
     std::vector<BasisCoefficients> along = {changes[i++]};
     const std::size_t shapes = i;
     i += s.shaped.size();
@@ -308,58 +302,59 @@ void RobotFit::find_sizes() {
     const std::size_t near = i;
     i += s.near.size();
     if (along[0].size() == 0) continue;
-    sizes_.push_back({static_cast<const EffectSize&>(s), along[0] / kSizeReach, {}, {}});
+    magnitudes_.push_back({static_cast<const Magnitude&>(s), along[0] / kMagnitudeReach, {}, {}});
+    MagnitudeColumn& m = magnitudes_.back();
     for (std::size_t n = 0; n < s.near.size(); ++n) {
       const BasisCoefficients& there = changes[near + n];
-      sizes_.back().near.push_back(there.size() > 0 ? BasisCoefficients(there / (n == 0 ? s.reach : -s.reach))
-                                                    : sizes_.back().change);
+      m.near.push_back(there.size() > 0 ? BasisCoefficients(there / (n == 0 ? s.near_reach : -s.near_reach))
+                                        : m.change);
     }
-    if (s.near.empty()) sizes_.back().near.push_back(sizes_.back().change);
+    if (s.near.empty()) m.near.push_back(m.change);
     for (std::size_t k = shapes; k < shapes + s.shaped.size(); ++k)
       if (changes[k].size() > 0)
-        shapes_.push_back({static_cast<const EffectSize&>(s), (changes[k] - along[0]) / kSizeReach, {}, {}});
+        shapes_.push_back({static_cast<const Magnitude&>(s), (changes[k] - along[0]) / kMagnitudeReach, {}, {}});
     for (std::size_t n = 1; n + 1 < along.size() && along[n].size() > 0 && along[n + 1].size() > 0; ++n) {
-      const double at = kSizeReach * static_cast<double>(n + 1);
-      sizes_.back().large.push_back({at, along[n] / at, (along[n + 1] - along[n - 1]) / (2 * kSizeReach)});
+      const double at = kMagnitudeReach * static_cast<double>(n + 1);
+      m.large.push_back({at, along[n] / at, (along[n + 1] - along[n - 1]) / (2 * kMagnitudeReach)});
     }
   }
-  set_lines();
+  find_linear_magnitudes();
 }
 
-/// What a sensor adds is a line; how late it is turns what it says of a beat.
-void RobotFit::set_lines() {
-  std::map<std::pair<std::string, std::string>, BasisCoefficients> lines;
-  for (const SizeColumn& s : sizes_) {
-    const Hypothesis h(uncertain_, {s.effect});
-    const Unknown& u = h.unknowns()[static_cast<std::size_t>(h.shared() + s.unknown)];
-    if (u.log && u.name != kDelay) lines[{u.effect, u.name}] = s.change;
+/// An error that a sensor adds is linear; its delay is not.
+void RobotFit::find_linear_magnitudes() {
+  Fitter::LinearMagnitudes linear;
+  for (const MagnitudeColumn& m : magnitudes_) {
+    const Hypothesis h(uncertain_, {m.effect});
+    const Unknown& u = h.unknowns()[static_cast<std::size_t>(h.shared() + m.unknown)];
+    if (u.in_log && u.name != kDelay) linear[{u.effect, u.name}] = m.change;
   }
-  fitter_.set_lines(std::move(lines));
+  fitter_ = fitter_.with_linear_magnitudes(std::move(linear));
 }
 
-void RobotFit::find_lines() {
-  const std::vector<ModelDiscrepancy::Nuisance>& all = evidence_.discrepancy().nuisances;
-  std::vector<Candidate> candidates;
+void RobotFit::find_nuisances() {
+  const std::vector<ModelDiscrepancy::Nuisance>& all = evidence().discrepancy().nuisances;
+  std::vector<VehicleHypothesis> vehicles;
   std::vector<double> steps(all.size(), 1);
   for (const ModelDiscrepancy::Nuisance& n : all) {
-    Candidate c = plain_.candidate(parameters_.point.at);
+    VehicleHypothesis v = no_effects_.vehicle(parameters_.at);
     for (const ModelDiscrepancy::Nuisance& other : all)
-      if (other.id == n.id) c.sensors[n.id][other.value] = other.value == n.value ? n.sd : 0;
-    candidates.push_back(std::move(c));
+      if (other.id == n.id) v.sensors[n.id][other.value] = other.value == n.value ? n.sd : 0;
+    vehicles.push_back(std::move(v));
   }
   for (std::size_t d = uncertain_.majors(); d < uncertain_.draws(); ++d) {
-    // on the side on which its body is possible
-    Candidate c = plain_.candidate(parameters_.point.at, std::pair{d, 1.0});
-    const bool other = model::physical_fault(c.vehicle).has_value();
+    // in the direction in which its body is physical
+    VehicleHypothesis v = no_effects_.vehicle(parameters_.at, std::pair{d, 1.0});
+    const bool other = model::physical_fault(v.vehicle).has_value();
     steps.push_back(other ? -1 : 1);
-    candidates.push_back(other ? plain_.candidate(parameters_.point.at, std::pair{d, -1.0}) : std::move(c));
+    vehicles.push_back(other ? no_effects_.vehicle(parameters_.at, std::pair{d, -1.0}) : std::move(v));
   }
-  std::vector<Residuals> rows = residuals(flights_, candidates, threads_);
-  std::vector<BasisCoefficients> changes(rows.size(), BasisCoefficients::Zero(kGroups, evidence_.basis().size()));
+  std::vector<Residuals> rows = residuals(flights_, vehicles, threads_);
+  std::vector<BasisCoefficients> changes(rows.size(), BasisCoefficients::Zero(kGroups, evidence().basis().size()));
   io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
     if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), steps[i]);
   });
-  nuisances_.assign(changes.begin(), changes.begin() + static_cast<std::ptrdiff_t>(all.size()));
+  sensor_errors_.assign(changes.begin(), changes.begin() + static_cast<std::ptrdiff_t>(all.size()));
   minors_.assign(changes.begin() + static_cast<std::ptrdiff_t>(all.size()), changes.end());
 }
 

@@ -1,85 +1,80 @@
-// A robot's flights with its vehicle's parameters fitted to them, and what is learnt on the way: its noise, how far models of it are
-// off, what its sensors and small effects do beside every hypothesis. Every further question starts here.
+// The flights of a robot with its vehicle's parameters fitted to them, and what is learnt with these: the noise, the scales of the model
+// discrepancy, nuisance regressors, and the change that each magnitude of the catalogue makes. All other stages of a diagnosis start here.
 #pragma once
 
 #include "gap/evidence/screening.hpp"
 
 namespace flappy::gap {
 
-/// A number that a header has wrong by so much.
+/// Error of a declared sensor.
 struct SensorFinding {
   std::string name;  ///< as "imu_mounting.x_rad", or "imu.latency_s"
   double value, sd;
-  double believed_sd;  ///< before the flights
+  double prior_sd;
 };
 
 class RobotFit {
  public:
-  /// `withheld`: entries that the catalogue is to lack. `flights` are kept.
-  RobotFit(const std::vector<PredictedFlight>& flights, const sim::Randomisation& uncertain,
-           const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
+  /// Fits. `flights` are referred to; `withheld`: effects that the catalogue is to lack; `threads`: as for io::parallel_for.
+  RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
+           std::vector<std::string> withheld, int threads);
+  RobotFit(const RobotFit&) = delete;
+  RobotFit& operator=(const RobotFit&) = delete;
 
-  /// Parameters, noise, and how far models of this robot are off.
-  void fit_parameters();
-  /// The same beside what sensors may have and every vehicle has a little of, which is found first.
-  void refit_beside_background();
-
-  void set_discrepancy(const ModelDiscrepancy& discrepancy) { evidence_.set_discrepancy(discrepancy); }
-  const Evidence& evidence() const { return evidence_; }
+  const Evidence& evidence() const { return fitter_.evidence(); }
+  /// With the scales of the parameters' fit.
   const Fitter& fitter() const { return fitter_; }
-  /// With what the flights say of its minor draws.
+  /// With the minor draws that the flights show.
   const sim::Randomisation& uncertain() const { return uncertain_; }
-  const Hypothesis& plain() const { return plain_; }
+  /// The hypothesis without effects.
+  const Hypothesis& no_effects() const { return no_effects_; }
   const Fit& parameters() const { return parameters_; }
-  /// The vehicle's file, weighed by the same noise.
-  const Linearised& nominal() const { return nominal_; }
-  /// What every size of the catalogue changes.
-  const std::vector<SizeColumn>& sizes() const { return sizes_; }
-  /// What it makes of that to have another shape, by a standard deviation of each.
-  const std::vector<SizeColumn>& shapes() const { return shapes_; }
-  /// What every vehicle has of each entry. Of one that has a size for each wing, what the wings have apart, and what both have: there a
-  /// model of a wing is off for both alike. `shapes`: with what other shapes make of it.
-  std::vector<Background> background(bool shapes) const;
-  /// What each number that a header may have wrong, and each minor figure of the vehicle, changes for one standard deviation, and what is
-  /// thought of its coefficient, from what is flown on.
-  Columns lines() const;
-  /// Nats by which coordinates of an entry's sizes are more probable of an effect than of what every vehicle has of it.
-  double beyond_background(const std::string& effect, const Eigen::VectorXd& sizes) const;
-  /// What sensors are off by beyond their headers, given a fit.
-  std::vector<SensorFinding> sensors(const Hypothesis& hypothesis, const Fit& fit) const;
+  /// The vehicle file under the same noise; without columns.
+  const Fit& nominal() const { return nominal_; }
+  const std::vector<MagnitudeColumn>& magnitudes() const { return magnitudes_; }
 
-  /// From now on models of this robot are off by what they are beside a fit.
-  void take_scales(const Hypothesis& hypothesis, const Linearised& at);
-  /// A hypothesis, with scales of its own, looked for from `start` on.
-  Weighed weigh(const Hypothesis& hypothesis, const Linearised& at, const Scales& start,
-                std::optional<double> freeing_nats = {}) const;
-  Weighed weigh(const Hypothesis& hypothesis, const Linearised& at, std::optional<double> freeing_nats = {}) const {
-    return weigh(hypothesis, at, evidence_.scales(), freeing_nats);
-  }
+  /// Background magnitudes of all effects. Of an effect with a magnitude for each wing: the difference of the wings, and what both share, for
+  /// there a model of a wing is off in both alike. `shapes`: with changes by another shape parameter.
+  std::vector<Background> background(const ModelDiscrepancy& discrepancy, bool shapes) const;
+  /// Errors of declared sensors, then minor draws of the vehicle, for one standard deviation each.
+  Regressors nuisance_regressors() const;
+  /// Nats by which magnitudes of an effect are more probable as an effect than as its background.
+  double beyond_background(const std::string& effect, const Eigen::VectorXd& magnitudes, const Scales& scales) const;
+  /// Errors of declared sensors, given a fit. `fitter`: with scales of the fit.
+  std::vector<SensorFinding> sensors(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) const;
+
+  /// Evidence of a hypothesis with its own scales, searched from `start` on. `unknown_penalty_nats`: as in Evidence::weigh.
+  ScaledEvidence weigh(const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
+                       std::optional<double> unknown_penalty_nats = {}) const;
+  /// Scales given a fit, searched from `start` on; also where one effect's background magnitude is much larger.
+  Scales find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const;
 
  private:
+  void fit_parameters();
+  void refit_with_nuisances();
   void learn_remainder();
-  void find_sizes();
-  void set_lines();
-  void find_lines();
-  void set_background();
-  void set_scales(const Scales& scales);
-  void widen_entries();
+  void find_magnitudes();
+  void find_linear_magnitudes();
+  void find_nuisances();
+  void set_nuisances();
+  void widen_effects();
   bool refit_with_minors();
-  std::optional<Scales> larger_entry(const Hypothesis& hypothesis, const Linearised& at) const;
+  void take_scales() { fitter_ = fitter_.with_scales(find_scales(no_effects_, parameters_, fitter_.scales())); }
+  void take_evidence(Evidence evidence) {
+    fitter_ = fitter_.with_evidence(std::make_shared<const Evidence>(std::move(evidence)));
+  }
+  std::optional<Scales> larger_effect(const Hypothesis& hypothesis, const Fit& fit, const Scales& now) const;
   BasisCoefficients change(Residuals there, double steps) const;
 
-  const std::vector<PredictedFlight>& flights_;
+  const Flights& flights_;
   sim::Randomisation uncertain_;
   std::vector<std::string> withheld_;
   int threads_;
-  Evidence evidence_;
   Fitter fitter_;
-  Hypothesis plain_;
-  Linearised nominal_;
-  Fit parameters_;
-  std::vector<SizeColumn> sizes_, shapes_;
-  std::vector<BasisCoefficients> nuisances_, minors_;
+  Hypothesis no_effects_;
+  Fit nominal_, parameters_;
+  std::vector<MagnitudeColumn> magnitudes_, shapes_;
+  std::vector<BasisCoefficients> sensor_errors_, minors_;
 };
 
 }  // namespace flappy::gap

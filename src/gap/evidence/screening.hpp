@@ -1,40 +1,41 @@
-// What every effect of the catalogue would explain beside a fit, as far as a linear model sees.
+// What each effect of the catalogue would explain beside a fit, as far as a linear model shows.
 #pragma once
 
 #include "gap/evidence/fit.hpp"
 
 namespace flappy::gap {
 
-/// A size of an effect.
-struct EffectSize {
+/// A magnitude of an effect.
+struct Magnitude {
   std::string effect;
-  Eigen::Index unknown, unknowns;  ///< which of the effect's, and how many it has
+  Eigen::Index unknown, unknowns;  ///< which of the effect's unknowns, and how many it has
   bool one_sided;
-  double from;  ///< coordinate that the vehicle's file gives it
+  double from;  ///< coordinate in the vehicle file
 };
 
-/// A size a step of kSizeReach away from that, with all else as it was.
-struct SizeStep : EffectSize {
-  Candidate candidate;
-  std::vector<Candidate> shaped;   ///< the same with each of its shapes a standard deviation away
-  std::vector<Candidate> further;  ///< of a size of one sign: two steps away, three, .. kFurthest
-  double reach;                    ///< as far as vehicles without the effect go, ..
-  std::vector<Candidate> near;     ///< .. and there: above, and below where a size may be
+/// Vehicles that differ from the fitted one in a magnitude.
+struct MagnitudeStep : Magnitude {
+  VehicleHypothesis vehicle;               ///< kMagnitudeReach away
+  std::vector<VehicleHypothesis> shaped;   ///< the same with each shape parameter a standard deviation away
+  std::vector<VehicleHypothesis> further;  ///< of one sign: two steps away, three, .. kMaxSteps
+  double near_reach;                       ///< about as far as vehicles without the effect go
+  std::vector<VehicleHypothesis> near;     ///< there: above and, where it may be negative, below
 };
-inline constexpr std::size_t kFurthest = 5;
-inline constexpr double kSizeReach = 0.4;
+inline constexpr std::size_t kMaxSteps = 5;
+inline constexpr double kMagnitudeReach = 0.4;
 
-/// Of every entry of the catalogue but `withheld`, at the given coordinates of the parameters; shapes are in the middle. `usual`: what
-/// vehicles have of it without the effect, for steps as near as that.
-std::vector<SizeStep> size_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
-                                 const std::vector<std::string>& withheld, const ModelDiscrepancy* usual = nullptr);
+/// For each effect of the catalogue but `withheld`, at the given coordinates of the parameters, with shape parameters in the middle of their
+/// prior. `background`: for steps as near as a vehicle without the effect; null: none.
+std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
+                                           const std::vector<std::string>& withheld,
+                                           const ModelDiscrepancy* background = nullptr);
 
-/// What a size changes for a unit of its coordinate, near the file's; and where it is large, as a delay of a third of a beat turns what a smaller
-/// one does into something else.
-struct SizeColumn : EffectSize {
+/// Change of the prediction for a unit of a magnitude's coordinate, near the vehicle file's.
+struct MagnitudeColumn : Magnitude {
   BasisCoefficients change;
-  /// Where it is as small as in vehicles without the effect, above 0 and below: how a wing lands on its stop is another matter there.
+  /// At background magnitudes, above and below: there a wing lands on its stop in another way.
   std::vector<BasisCoefficients> near;
+  /// Where the magnitude is large, as a delay of a third of a beat turns the change of a small one.
   struct Large {
     double at;                        ///< coordinate beyond the file's
     BasisCoefficients chord, change;  ///< on the way there, and there
@@ -42,14 +43,13 @@ struct SizeColumn : EffectSize {
   std::vector<Large> large;
 };
 
-struct Screened {
+struct ScreenedEffect {
   std::string effect;
-  double gain = 0;              ///< nats
+  double gain = 0;              ///< evidence, nats
   Eigen::VectorXd coordinates;  ///< of its unknowns
 };
 
-/// Every effect that has columns, those that follow one another; the largest gain first.
-std::vector<Screened> screen(const Evidence& evidence, const Fitter& fitter, const Fit& fit,
-                             const std::vector<SizeColumn>& columns);
+/// Each effect that has columns, the largest gain first. Columns of one effect follow each other.
+std::vector<ScreenedEffect> screen(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns);
 
 }  // namespace flappy::gap

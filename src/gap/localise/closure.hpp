@@ -24,9 +24,6 @@ Losses losses_of(const RowContext& around, const Residuals& residual);
 /// Sd of the difference of two means, from its scatter over blocks.
 double sd_of_difference(const Losses& a, const Losses& b);
 
-struct Closure {
-  double value = 0, low = 0, high = 0;  ///< 90 % of draws of blocks with replacement lie between
-};
 /// Nothing where E_refit is not two of its standard deviations, by the same draws, above the floor.
 std::optional<Closure> closure_of(const Losses& refit, const Losses& effect, double floor);
 

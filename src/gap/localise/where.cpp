@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 #include "gap/localise/significance.hpp"
 #include "io/statistics.hpp"
-#include "io/text.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -30,8 +28,6 @@ double share_below(double frequency, double past) {
   return 2 / std::numbers::pi * std::atan((1 + past) / (1 - past) * std::tan(std::numbers::pi / 2 * frequency));
 }
 
-std::string in_short(double value) { return io::format("%.4g", value); }
-
 struct TestedBeat {
   std::size_t flight, beat;
 };
@@ -39,7 +35,7 @@ struct TestedBeat {
 /// The rows of one channel.
 class ChannelRows {
  public:
-  ChannelRows(const RowContext& around, const Residuals& residual, int channel, const std::string& stage)
+  ChannelRows(const RowContext& around, const Residuals& residual, int channel, Stage stage)
       : around_(around), channel_(channel), stage_(stage) {
     const std::vector<int> all = blocks_of(around.beats, kLongBlock), fine = blocks_of(around.beats, kShortBlock);
     std::size_t i = 0;
@@ -57,15 +53,15 @@ class ChannelRows {
     }
   }
 
-  void test_all(std::vector<GapLocation>& places) const {
+  void test_all(std::vector<ResidualLocation>& places) const {
     if (beats_.empty()) return;
     const std::vector<double> all(beats_.size(), 1);
-    add_cell("channel", "all", all, 0, kCoefficients, places);
+    add_cell(ResidualTest::channel, {}, all, 0, kCoefficients, places);
     for (const Quantity& q : around_.regimes) test_thirds(q, places);
     if (around_.has_rows(channel_, 1))
       for (int h = 0; h <= kHarmonics; ++h)
-        add_cell("phase", h == 0 ? "mean of the beat" : "harmonic " + std::to_string(h) + " of the beat", all,
-                 h == 0 ? 0 : 2 * h - 1, h == 0 ? 1 : 2 * h + 1, places);
+        add_cell(ResidualTest::phase, {"harmonic", Regime::Third::all, h, h, ""}, all, h == 0 ? 0 : 2 * h - 1,
+                 h == 0 ? 1 : 2 * h + 1, places);
     test_bands(places);
     for (const Quantity& q : around_.inputs) test_input(q, places);
     test_whiteness(places);
@@ -73,14 +69,15 @@ class ChannelRows {
 
  private:
   double noise_sd(int coefficient) const { return around_.noise_sd[group_of(channel_, coefficient)]; }
-  void add(const char* test, const std::string& regime, double gap, double floor, double p,
-           std::vector<GapLocation>& places) const {
-    places.push_back({stage_, test, channel_, regime, gap, floor, p, false});
+  void add(ResidualTest test, Regime regime, double gap, double floor, double p,
+           std::vector<ResidualLocation>& places) const {
+    places.push_back(
+        {stage_, test, channel_name(channel_), channel_unit(channel_), std::move(regime), gap, floor, p, false});
   }
 
   /// Coefficients from `first` to before `last`, in the beats where `in` is 1.
-  void add_cell(const char* test, const std::string& regime, const std::vector<double>& in, int first, int last,
-                std::vector<GapLocation>& places) const {
+  void add_cell(ResidualTest test, Regime regime, const std::vector<double>& in, int first, int last,
+                std::vector<ResidualLocation>& places) const {
     double squares = 0, noise = 0, n = 0, least_p = 1;
     int tests = 0;
     for (const double i : in) n += i;
@@ -94,7 +91,7 @@ class ChannelRows {
       least_p = std::min(least_p, slope->p_value);
       ++tests;
     }
-    add(test, regime, std::sqrt(squares), std::sqrt(noise), std::min(1.0, tests * least_p), places);
+    add(test, std::move(regime), std::sqrt(squares), std::sqrt(noise), std::min(1.0, tests * least_p), places);
   }
 
   std::vector<double> of(const Quantity& q) const {
@@ -103,20 +100,19 @@ class ChannelRows {
     return x;
   }
 
-  void test_thirds(const Quantity& q, std::vector<GapLocation>& places) const {
+  void test_thirds(const Quantity& q, std::vector<ResidualLocation>& places) const {
     const std::vector<double> x = of(q);
     std::vector<double> sorted = x;
     std::ranges::sort(sorted);
-    const double low = sorted[sorted.size() / 3], high = sorted[2 * sorted.size() / 3];
-    if (!(sorted.front() < low && low < high && high < sorted.back())) return;
-    const std::string unit = q.unit.empty() ? "" : " " + q.unit;
-    const std::string names[] = {q.name + " below " + in_short(low) + unit,
-                                 q.name + " " + in_short(low) + " to " + in_short(high) + unit,
-                                 q.name + " above " + in_short(high) + unit};
+    const double first = sorted[sorted.size() / 3], last = sorted[2 * sorted.size() / 3];
+    if (!(sorted.front() < first && first < last && last < sorted.back())) return;
+    const Regime thirds[] = {{q.name, Regime::Third::low, {}, first, q.unit},
+                             {q.name, Regime::Third::middle, first, last, q.unit},
+                             {q.name, Regime::Third::high, last, {}, q.unit}};
     for (int third = 0; third < 3; ++third) {
       std::vector<double> in;
-      for (const double v : x) in.push_back((v < low ? 0 : v < high ? 1 : 2) == third ? 1 : 0);
-      add_cell("regime", names[third], in, 0, kCoefficients, places);
+      for (const double v : x) in.push_back((v < first ? 0 : v < last ? 1 : 2) == third ? 1 : 0);
+      add_cell(ResidualTest::regime, thirds[third], in, 0, kCoefficients, places);
     }
   }
 
@@ -142,7 +138,7 @@ class ChannelRows {
     return std::clamp((products / squares + 1.0 / kLongBlock) / (1 - 3.0 / kLongBlock), -kMostMemory, kMostMemory);
   }
 
-  void test_bands(std::vector<GapLocation>& places) const {
+  void test_bands(std::vector<ResidualLocation>& places) const {
     std::vector<double> ends(std::begin(kBandEnds_Hz), std::end(kBandEnds_Hz));
     ends.push_back(*std::ranges::max_element(around_.beats_Hz) / 2);
     const double past = memory();
@@ -167,14 +163,14 @@ class ChannelRows {
     const double scale = left.power[highest] / noise[highest];
     for (std::size_t b = 0; b < highest; ++b)
       if (left.bins[b] > 0)
-        add("frequency", (b == 0 ? "0" : in_short(ends[b - 1])) + " to " + in_short(ends[b]) + " Hz",
+        add(ResidualTest::frequency, {"frequency", Regime::Third::all, b == 0 ? 0 : ends[b - 1], ends[b], "Hz"},
             std::sqrt(left.power[b] / static_cast<double>(beats_.size())), noise_sd(0) * std::sqrt(noise[b]),
             io::f_tail(left.power[b] / noise[b] / scale, 2 * static_cast<double>(left.bins[b]),
                        2 * static_cast<double>(left.bins[highest])),
             places);
   }
 
-  void test_input(const Quantity& q, std::vector<GapLocation>& places) const {
+  void test_input(const Quantity& q, std::vector<ResidualLocation>& places) const {
     std::vector<double> x = of(q);
     const double n = static_cast<double>(x.size());
     double mean = 0, square = 0;
@@ -196,19 +192,20 @@ class ChannelRows {
       least_p = std::min(least_p, slope->p_value);
       ++tests;
     }
-    add("input", q.name, std::sqrt(explained), std::sqrt(noise), std::min(1.0, tests * least_p), places);
+    add(ResidualTest::input, {q.name, Regime::Third::all, {}, {}, ""}, std::sqrt(explained), std::sqrt(noise),
+        std::min(1.0, tests * least_p), places);
   }
 
-  void test_whiteness(std::vector<GapLocation>& places) const {
+  void test_whiteness(std::vector<ResidualLocation>& places) const {
     if (channel_ >= kPathX) return;
     if (const auto w = whiteness_test(rows_[0], short_block_))
-      add("whiteness", "means of " + std::to_string(kShortBlock) + " beats", w->rms,
+      add(ResidualTest::whiteness, {"block", Regime::Third::all, {}, kShortBlock, "beats"}, w->rms,
           noise_sd(0) / std::sqrt(double{kShortBlock}), w->p_value, places);
   }
 
   const RowContext& around_;
   int channel_;
-  const std::string& stage_;
+  Stage stage_;
   std::vector<TestedBeat> beats_;
   std::vector<int> block_, short_block_;
   std::vector<std::vector<double>> rows_;  ///< [coefficient][beat]
@@ -216,30 +213,22 @@ class ChannelRows {
 
 }  // namespace
 
-const char* channel_unit(int channel) {
-  if (channel < kForceX) return "rad/s^2";
-  if (channel < kStrokeLeft) return "m/s^2";
-  if (channel < kBattery) return "rad";
-  if (channel < kPathX) return channel == kBattery ? "V" : "A";
-  return channel < kTurnX ? "m/s^2" : "rad/s";
-}
-
-RowContext row_context_of(const std::vector<PredictedFlight>& flights, std::vector<double> noise_sd) {
+RowContext row_context_of(const Flights& flights, std::vector<double> noise_sd) {
   RowContext s;
   s.noise_sd = std::move(noise_sd);
-  for (const PredictedFlight& f : flights) {
-    s.beats.push_back(f.beats());
-    s.beats_Hz.push_back(f.beats_Hz());
+  for (const auto& f : flights) {
+    s.beats.push_back(f->beats());
+    s.beats_Hz.push_back(f->beats_Hz());
     s.covered.emplace_back();
-    for (std::size_t j = 0; j < f.beats(); ++j)
-      for (int channel = 0; channel < kChannels; ++channel) s.covered.back().push_back(f.covers(j, channel) ? 1 : 0);
+    for (std::size_t j = 0; j < f->beats(); ++j)
+      for (int channel = 0; channel < kChannels; ++channel) s.covered.back().push_back(f->covers(j, channel) ? 1 : 0);
   }
   for (int g = 0; g < kGroups; ++g)
-    s.rows.push_back(!flights.empty() && flights.front().has_rows(g / kCoefficients, g % kCoefficients) ? 1 : 0);
+    s.rows.push_back(!flights.empty() && flights.front()->has_rows(g / kCoefficients, g % kCoefficients) ? 1 : 0);
   // those that all flights have
   const auto gather = [&](std::vector<RegimeQuantity> (PredictedFlight::*of)() const, std::vector<Quantity>& to) {
-    for (const PredictedFlight& f : flights)
-      for (RegimeQuantity& own : (f.*of)()) {
+    for (const auto& f : flights)
+      for (RegimeQuantity& own : ((*f).*of)()) {
         auto at = std::ranges::find(to, own.name, &Quantity::name);
         if (at == to.end()) at = to.insert(at, {own.name, own.unit, {}});
         at->values.push_back(std::move(own.values));
@@ -251,25 +240,14 @@ RowContext row_context_of(const std::vector<PredictedFlight>& flights, std::vect
   return s;
 }
 
-std::vector<GapLocation> locate(const RowContext& around, const Residuals& residual, const std::string& stage) {
-  std::vector<GapLocation> places;
+std::vector<ResidualLocation> locate(const RowContext& around, const Residuals& residual, Stage stage) {
+  std::vector<ResidualLocation> places;
   for (int channel = 0; channel < kChannels; ++channel) ChannelRows(around, residual, channel, stage).test_all(places);
   std::vector<double> p_values;
-  for (const GapLocation& p : places) p_values.push_back(p.p_value);
+  for (const ResidualLocation& p : places) p_values.push_back(p.p_value);
   const std::vector<char> found = discoveries(p_values, kFalseDiscoveries);
   for (std::size_t i = 0; i < places.size(); ++i) places[i].discovered = found[i] != 0;
   return places;
-}
-
-std::vector<GapLocation> largest_discoveries(const std::vector<GapLocation>& places, const std::string& stage,
-                                             std::size_t most) {
-  std::vector<GapLocation> list;
-  for (const GapLocation& p : places)
-    if (p.stage == stage && p.discovered && p.test != "input" && p.test != "whiteness") list.push_back(p);
-  std::ranges::stable_sort(list, std::greater{},
-                           [](const GapLocation& p) { return p.gap / std::max(p.noise_floor, 1e-300); });
-  if (list.size() > most) list.resize(most);
-  return list;
 }
 
 }  // namespace flappy::gap

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "gap/evidence/evidence.hpp"
+#include "gap/result/diagnosis.hpp"
 
 namespace flappy::gap {
 
@@ -43,24 +44,10 @@ struct RowContext {
     return covered[flight][beat * kChannels + static_cast<std::size_t>(channel)] != 0;
   }
 };
-RowContext row_context_of(const std::vector<PredictedFlight>& flights, std::vector<double> noise_sd);
+RowContext row_context_of(const Flights& flights, std::vector<double> noise_sd);
 
-/// One line. `gap` and `noise_floor`: rms of the rows, and what it would be of noise alone, in the channel's unit; of an input, of what is
-/// proportional to it.
-struct GapLocation {
-  std::string stage, test;
-  int channel = 0;
-  std::string regime;
-  double gap = 0, noise_floor = 0, p_value = 1;
-  bool discovered = false;
-};
-const char* channel_unit(int channel);
-
-/// All lines of one stage. `residual` may lack flights that a vehicle did not survive.
-std::vector<GapLocation> locate(const RowContext& around, const Residuals& residual, const std::string& stage);
-
-/// Of a stage, discoveries that say where, the largest beside its noise first.
-std::vector<GapLocation> largest_discoveries(const std::vector<GapLocation>& places, const std::string& stage,
-                                             std::size_t most);
+/// All rows of the table of a stage. `residual`: [flight], empty where the vehicle came apart. Of an input, `gap` and `noise_floor` are of what
+/// is proportional to it.
+std::vector<ResidualLocation> locate(const RowContext& around, const Residuals& residual, Stage stage);
 
 }  // namespace flappy::gap

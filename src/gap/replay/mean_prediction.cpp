@@ -169,21 +169,21 @@ const MeanPrediction::Driven& MeanPrediction::driven(std::size_t input, double d
   return d;
 }
 
-std::vector<Rows> MeanPrediction::predict(const std::vector<const Candidate*>& candidates) const {
+std::vector<Rows> MeanPrediction::predict(const std::vector<const VehicleHypothesis*>& vehicles) const {
   std::vector<Rows> all;
-  for (const Candidate* c : candidates) all.push_back(predict(*c));
+  for (const VehicleHypothesis* v : vehicles) all.push_back(predict(*v));
   return all;
 }
 
-Rows MeanPrediction::predict(const Candidate& candidate) const {
-  model::Vehicle v = candidate.vehicle;
+Rows MeanPrediction::predict(const VehicleHypothesis& hypothesis) const {
+  model::Vehicle v = hypothesis.vehicle;
   const model::BeatAveraged& b = *v.beat_averaged;
   struct Acting {
     const model::EffectEntry* entry;
     std::vector<double> values;
   };
   std::vector<Acting> acting;
-  for (const auto& [id, values] : candidate.vehicle.effects) {
+  for (const auto& [id, values] : hypothesis.vehicle.effects) {
     const model::EffectEntry* e = model::find_effect(v, id);
     if (e == nullptr) continue;
     acting.push_back({e, e->values(values)});
@@ -199,12 +199,12 @@ Rows MeanPrediction::predict(const Candidate& candidate) const {
   for (const model::BeatAveraged::Actuator& a : b.actuators) {
     const auto input = std::ranges::find(b.inputs, a.input, &model::BeatAveraged::Input::name) - b.inputs.begin();
     driven_by.push_back(
-        &driven(static_cast<std::size_t>(input), drive.delay_s - candidate.lag_s, a.lag_s + drive.lag_s));
+        &driven(static_cast<std::size_t>(input), drive.delay_s - hypothesis.lag_s, a.lag_s + drive.lag_s));
   }
   // inputs were late, and so is what was predicted of them
   std::vector<const Driven*> loads;
   for (std::size_t k = 0; k < predicted_.size(); ++k)
-    loads.push_back(&driven(b.inputs.size() + k, -candidate.lag_s, 0));
+    loads.push_back(&driven(b.inputs.size() + k, -hypothesis.lag_s, 0));
   const Vec com{v.torso.com_m.x, v.torso.com_m.y, v.torso.com_m.z};
   const model::InertiaTensor& i = v.torso.inertia_kg_m2;
   Eigen::Matrix3d inertia;
@@ -305,9 +305,16 @@ std::vector<double> MeanPrediction::each(const Value& value) const {
 
 std::vector<RegimeFunction> MeanPrediction::functions() const {
   std::vector<RegimeFunction> list;
+  // a product is named after its second factor
+  const auto quantity_of = [](const std::string& name, BasisFunction kind) -> std::string {
+    const std::string last = kind == BasisFunction::product ? name.substr(name.find(' ') + 1) : name;
+    if (kind == BasisFunction::rate) return "rate";
+    const bool velocity = kind >= BasisFunction::velocity_x || last.starts_with("velocity");
+    return velocity ? "velocity" : last;
+  };
   const auto put = [&](const std::string& name, BasisFunction kind, const std::vector<double>& values) {
-    list.push_back(
-        {name, kind, Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()))});
+    list.push_back({name, quantity_of(name, kind), kind,
+                    Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()))});
   };
   const auto add = [&](const std::string& name, BasisFunction kind, auto&& value) { put(name, kind, each(value)); };
   static const char* const kAxes[] = {"x", "y", "z"};

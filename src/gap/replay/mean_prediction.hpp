@@ -1,4 +1,4 @@
-// A recorded flight, predicted by vehicles that are known by the beat (model/beat_averaged.hpp): at each instant the recorded motion and inputs
+// A recorded flight, predicted by vehicles that are beat-averaged (model/beat_averaged.hpp): at each instant the recorded motion and inputs
 // give force and moment, and these the specific force and the angular acceleration that motion capture should have shown,
 //   f = F / m + a x d + w x (w x d),  d: from the centre of mass to the torso's origin      I a = M - w x I w,  M: about the centre of mass
 // each seen through the filter that the motion went through (flightlog/mean_motion.hpp). Nothing is integrated, so nothing drifts. Rows are as
@@ -22,7 +22,7 @@
 
 namespace flappy::gap {
 
-class MeanPrediction final : public Predictor {
+class MeanPrediction final : public PredictedFlight {
  public:
   /// `nominal`: the vehicle that is believed to have flown; `channels`: that alone have rows, none: all. io::InputError naming `folder` where the log lacks its inputs, or too little of
   /// it was seen.
@@ -40,12 +40,13 @@ class MeanPrediction final : public Predictor {
   }
   const Rows& measured() const override { return measured_; }
   const Rows& signal() const override { return measured_; }
-  std::vector<Rows> predict(const std::vector<const Candidate*>& candidates) const override;
+  std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const override;
   Rows declared_noise(std::uint64_t seed) const override;
   std::vector<RegimeFunction> functions() const override;
   std::vector<std::pair<std::string, std::string>> products() const override { return {}; }
   std::vector<RegimeQuantity> regimes() const override;
   std::vector<RegimeQuantity> inputs() const override;
+  const DiagnosisPolicy& policy() const override { return kBeatAveragedPolicy; }
 
  private:
   /// An input as an actuator sees it, or a column of predicted.csv, by the rows: late, behind a lag, low-passed.
@@ -56,7 +57,7 @@ class MeanPrediction final : public Predictor {
   /// Of actuators, motion, and columns of predicted.csv.
   model::MeanWrench wrench_of(const model::BeatAveraged& vehicle) const;
   Rows rows_of(const flightlog::MeanMotion& motion) const;
-  Rows predict(const Candidate& candidate) const;
+  Rows predict(const VehicleHypothesis& hypothesis) const;
   template <class Value>
   std::vector<double> each(const Value& value) const;
 

@@ -1,5 +1,5 @@
-// A recorded flight that candidate vehicles predict, as rows: one for each beat, sorted by channel and by coefficient of the beat. Two kinds of
-// vehicle do so, each in its own way: one of wings and motors (reset_prediction.hpp), and one that is known by the beat (mean_prediction.hpp).
+// A recorded flight that vehicles predict, as rows: one for each beat, sorted by channel and by coefficient of the beat. There are two
+// implementations: for vehicles with wings and motors (reset_prediction.hpp), and for beat-averaged ones (mean_prediction.hpp).
 #pragma once
 
 #include <memory>
@@ -8,6 +8,7 @@
 
 #include "flappy/vehicle.hpp"
 #include "gap/replay/beat_rows.hpp"
+#include "gap/replay/policy.hpp"
 #include "gap/replay/recording.hpp"
 #include "gap/replay/sensor_correction.hpp"
 
@@ -36,18 +37,17 @@ enum Channel : int {
   kChannels
 };
 const char* channel_name(int channel);
+const char* channel_unit(int channel);
 
 /// Rows of one flight: [beat][channel][coefficient].
 using Rows = std::vector<double>;
 inline constexpr std::size_t kRowsPerBeat = static_cast<std::size_t>(kChannels) * kCoefficients;
 
-/// What flies a recording once more.
-struct Candidate {
+/// A vehicle that may have flown a recording, and how its sensors may differ from the headers of the log.
+struct VehicleHypothesis {
   model::Vehicle vehicle;
-  /// By which the sensors are later, against the voltages, than the header says.
-  double lag_s = 0;
-  /// What its sensors are off by beyond the headers (gap/replay/sensor_correction.hpp).
-  EffectValues sensors;
+  double lag_s = 0;      ///< the sensors are later, against the voltages, than the header says
+  EffectValues sensors;  ///< errors of sensors beyond the headers (gap/replay/sensor_correction.hpp)
 };
 
 /// Kinds of functions of the regime (gap/evidence/evidence.hpp).
@@ -57,7 +57,7 @@ enum class BasisFunction {
   rate,
   product,
   place,
-  flight,  ///< one of several, as a whole
+  flight,  ///< an offset of one flight
   velocity_x,
   velocity_y,
   velocity_z,
@@ -70,20 +70,22 @@ enum class BasisFunction {
 /// A function of what a flight did, beat by beat.
 struct RegimeFunction {
   std::string name;
+  std::string
+      quantity;  ///< what it depends on: a name, amplitude, velocity, rate, height, ceiling, wall, heading, time, ...
   BasisFunction kind;
   Eigen::VectorXd values;  ///< [beat]
 };
 
-/// What beats of a flight are sorted by.
+/// A quantity by which the beats of a flight are sorted.
 struct RegimeQuantity {
   std::string name, unit;
   std::vector<double> values;  ///< [beat]
 };
 
-/// How vehicles of one kind predict a flight.
-class Predictor {
+class PredictedFlight {
  public:
-  virtual ~Predictor() = default;
+  virtual ~PredictedFlight() = default;
+  /// Of the log's folder.
   virtual const std::string& name() const = 0;
   virtual std::size_t beats() const = 0;
   virtual double beats_Hz() const = 0;
@@ -91,67 +93,31 @@ class Predictor {
   /// Whether a channel has rows of this coefficient.
   virtual bool has_rows(int channel, int coefficient) const = 0;
   virtual const Rows& measured() const = 0;
+  /// What moved: as measured, and for torques the angular acceleration of the recorded motion. Of these `measured` holds nothing, for the
+  /// prediction is the difference already.
   virtual const Rows& signal() const = 0;
-  virtual std::vector<Rows> predict(const std::vector<const Candidate*>& candidates) const = 0;
+  /// Rows as the sensors of each vehicle would have shown them; empty for one that came apart.
+  virtual std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const = 0;
   /// Weighs rows of samples that were predicted elsewhere as `measured` and `predict` do.
   virtual void weigh(Rows& /*rows*/) const {}
+  /// Rows of the sensors' declared noise alone: one of its many realisations, the same for a seed.
   virtual Rows declared_noise(std::uint64_t seed) const = 0;
   virtual std::vector<RegimeFunction> functions() const = 0;
-  /// Pairs of functions, by name, whose product says what they do not.
+  /// Pairs of functions, by name, whose products complete the regime basis.
   virtual std::vector<std::pair<std::string, std::string>> products() const = 0;
   virtual std::vector<RegimeQuantity> regimes() const = 0;
   virtual std::vector<RegimeQuantity> inputs() const = 0;
-  /// Null where vehicles are known by the beat.
+  virtual const DiagnosisPolicy& policy() const = 0;
+  /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }
+  /// The same beats of another log of the flight. Null for beat-averaged vehicles.
+  virtual std::shared_ptr<const PredictedFlight> with_log(flightlog::FlightLog /*log*/) const { return nullptr; }
+  /// The same beats after these effects of sensors are undone in the log. Null for beat-averaged vehicles, whose sensors are part of their
+  /// prediction.
+  virtual std::shared_ptr<const PredictedFlight> corrected(const EffectValues& /*sensors*/) const { return nullptr; }
 };
 
-/// A recording that vehicles predict, with what its own sensors showed, as rows.
-class PredictedFlight {
- public:
-  /// Of vehicles of wings and motors.
-  explicit PredictedFlight(Recording recording);
-  explicit PredictedFlight(std::shared_ptr<const Predictor> predictor) : predictor_(std::move(predictor)) {}
-
-  /// Of its folder.
-  const std::string& name() const { return predictor_->name(); }
-  std::size_t beats() const { return predictor_->beats(); }
-  double beats_Hz() const { return predictor_->beats_Hz(); }
-  bool covers(std::size_t beat, int channel) const { return predictor_->covers(beat, channel); }
-  bool has_rows(int channel, int coefficient) const { return predictor_->has_rows(channel, coefficient); }
-  /// As measured.
-  const Rows& measured() const { return predictor_->measured(); }
-  /// What moved: as measured, and for torques the angular acceleration of the recorded motion, of which `measured` holds
-  /// nothing, for there the prediction is already the difference.
-  const Rows& signal() const { return predictor_->signal(); }
-
-  /// As every candidate's sensors would have shown it; empty for one that came apart.
-  std::vector<Rows> predict(const std::vector<const Candidate*>& candidates) const {
-    return predictor_->predict(candidates);
-  }
-
-  void weigh(Rows& rows) const { predictor_->weigh(rows); }
-
-  /// Rows of the sensors' declared noise alone: one of its many courses, the same for a seed.
-  Rows declared_noise(std::uint64_t seed) const { return predictor_->declared_noise(seed); }
-  std::vector<RegimeFunction> functions() const { return predictor_->functions(); }
-  std::vector<std::pair<std::string, std::string>> products() const { return predictor_->products(); }
-  std::vector<RegimeQuantity> regimes() const { return predictor_->regimes(); }
-  std::vector<RegimeQuantity> inputs() const { return predictor_->inputs(); }
-
-  /// Of a flight whose vehicles have wings and motors.
-  bool within_the_beat() const { return predictor_->recording() != nullptr; }
-  const Recording& recording() const { return *predictor_->recording(); }
-  /// The same beats as another log of the flight shows them.
-  PredictedFlight with_log(flightlog::FlightLog log) const {
-    return PredictedFlight(Recording(recording(), std::move(log)));
-  }
-
- private:
-  std::shared_ptr<const Predictor> predictor_;
-};
-
-/// All flights under all candidates on all processors: [candidate][flight].
-std::vector<std::vector<Rows>> predict_all(const std::vector<PredictedFlight>& flights,
-                                           const std::vector<Candidate>& candidates, int threads);
+/// The flights of one robot.
+using Flights = std::vector<std::shared_ptr<const PredictedFlight>>;
 
 }  // namespace flappy::gap

@@ -194,7 +194,7 @@ void Recording::read_regimes() {
     double n = 0, left = 0, right = 0, left_cos = 0, right_cos = 0, left_sin2 = 0, right_sin2 = 0;
   };
   std::vector<Sum> sums(beats);
-  regimes.assign(beats, Regime{0, 0, 0, 0, 0, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), 0});
+  regimes.assign(beats, BeatMotion{0, 0, 0, 0, 0, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), 0});
   std::vector<double> count(beats, 0);
   std::size_t step = 0;
   double from_s = begin_s;
@@ -215,7 +215,7 @@ void Recording::read_regimes() {
     const auto j = static_cast<std::size_t>(beat[k]);
     const TorsoAt& t = torso[k + 1];
     const Eigen::Quaterniond q(t.attitude[0], t.attitude[1], t.attitude[2], t.attitude[3]);
-    Regime& r = regimes[j];
+    BeatMotion& r = regimes[j];
     count[j] += 1;
     r.t_s += end_s[k];
     r.velocity_B_m_s += q.conjugate() * Vector3d(t.velocity_m_s);
@@ -226,7 +226,7 @@ void Recording::read_regimes() {
   }
   for (std::size_t j = 0; j < beats; ++j) {
     const Sum& s = sums[j];
-    Regime& r = regimes[j];
+    BeatMotion& r = regimes[j];
     if (s.n == 0 || count[j] == 0) continue;
     r.t_s /= count[j];
     r.velocity_B_m_s /= count[j];

@@ -23,8 +23,8 @@ inline constexpr double kSpinUpBeats = 6;
 /// Lower than this over its stand a vehicle may still be touching the ground, which no hypothesis knows.
 inline constexpr double kLeastClearance_m = 0.01;
 
-/// Means over whole beats of what a flight did, which residuals are sorted by.
-struct Regime {
+/// Means over a beat of what a flight did.
+struct BeatMotion {
   double t_s = 0, amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
   Eigen::Vector3d velocity_B_m_s, rate_rad_s, position_m;
   double heading_rad = 0;
@@ -51,9 +51,9 @@ struct Recording {
   std::vector<double> left_V, right_V;      ///< of every physics step
 
   // the beats
-  std::vector<double> beat;     ///< at the middle of each interval: whole beats since the start, and the phase
-  std::size_t beats = 0;        ///< whole ones
-  std::vector<Regime> regimes;  ///< of each
+  std::vector<double> beat;         ///< at the middle of each interval: whole beats since the start, and the phase
+  std::size_t beats = 0;            ///< whole ones
+  std::vector<BeatMotion> regimes;  ///< of each
 
   /// `nominal`: the vehicle that is believed to have flown. InputError naming `folder` where nothing of it can be replayed.
   Recording(const std::filesystem::path& folder, flightlog::FlightLog flight_log, const model::Vehicle& nominal);

@@ -233,12 +233,12 @@ bool ResetPrediction::covers(std::size_t beat, int channel) const {
   return imu_.covers(beat);
 }
 
-std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& candidates) const {
+std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypothesis*>& vehicles) const {
   const Recording& r = recording_;
   const ResetBlock reset = *reset_block_kernels[sim::place_of("")];
   const ProjectBlock project = *project_block_kernels[sim::place_of("")];
   const auto driven = [&](std::size_t i) {
-    model::Vehicle vehicle = candidates[std::min(i, candidates.size() - 1)]->vehicle;
+    model::Vehicle vehicle = vehicles[std::min(i, vehicles.size() - 1)]->vehicle;
     vehicle.air_density_kg_m3 *= r.density_ratio;
     vehicle.driver.hold_s = kPredictionStep_s;
     return vehicle;
@@ -249,7 +249,7 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
   for (std::size_t i = 0; i < kVehicles; ++i) {
     batch.set_vehicle(i, driven(i));
     batch.reset(i, {});
-    shifted.emplace_back(candidates[std::min(i, candidates.size() - 1)]->lag_s / kPredictionStep_s);
+    shifted.emplace_back(vehicles[std::min(i, vehicles.size() - 1)]->lag_s / kPredictionStep_s);
   }
   auto& storage = sim::storage_of(batch);
   sim::Block<Flown>& block = storage.blocks[0];
@@ -297,8 +297,8 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
   });
   Rows metered_together(r.log.power ? r.beats * kCoefficients * kMetered * kVehicles : 0, 0);
   if (r.log.power) power_.project(power.data(), kMetered * kVehicles, metered_together.data());
-  std::vector<Rows> result(candidates.size());
-  for (std::size_t lane = 0; lane < candidates.size(); ++lane) {
+  std::vector<Rows> result(vehicles.size());
+  for (std::size_t lane = 0; lane < vehicles.size(); ++lane) {
     if (batch.status(lane) & sim::kFrozen) continue;
     Rows& rows = result[lane];
     rows.resize(r.beats * kRowsPerBeat);
@@ -312,14 +312,14 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const Candidate*>& 
 template <class Value>
 std::vector<double> ResetPrediction::each(const Value& value) const {
   std::vector<double> list;
-  for (const Regime& r : recording_.regimes) list.push_back(value(recording_, r));
+  for (const BeatMotion& r : recording_.regimes) list.push_back(value(recording_, r));
   return list;
 }
 
 namespace {
 
 using R = const Recording&;
-using S = const Regime&;
+using S = const BeatMotion&;
 
 /// How far what is near a surface reaches: a wing's length.
 constexpr double kReach_m = 0.07;
@@ -349,36 +349,36 @@ double battery_V(R r, S s) {
 
 std::vector<RegimeFunction> ResetPrediction::functions() const {
   std::vector<RegimeFunction> list;
-  const auto add = [&](const char* name, BasisFunction kind, auto&& value) {
+  const auto add = [&](const char* name, const char* quantity, BasisFunction kind, auto&& value) {
     const std::vector<double> values = each(value);
-    list.push_back(
-        {name, kind, Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()))});
+    list.push_back({name, quantity, kind,
+                    Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()))});
   };
-  add("amplitude", BasisFunction::input, [](R, S s) { return s.amplitude_V; });
-  add("difference", BasisFunction::input, [](R, S s) { return s.difference_V; });
-  add("bias", BasisFunction::input, [](R, S s) { return s.bias_V; });
-  add("split_cycle", BasisFunction::input, [](R, S s) { return s.split_cycle; });
-  add("velocity_x", BasisFunction::velocity_x, [](R, S s) { return s.velocity_B_m_s.x(); });
-  add("velocity_y", BasisFunction::velocity_y, [](R, S s) { return s.velocity_B_m_s.y(); });
-  add("velocity_z", BasisFunction::velocity_z, [](R, S s) { return s.velocity_B_m_s.z(); });
-  add("rate_x", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.x(); });
-  add("rate_y", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.y(); });
-  add("rate_z", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.z(); });
-  add("|velocity| velocity_x", BasisFunction::drag_x,
+  add("amplitude", "amplitude", BasisFunction::input, [](R, S s) { return s.amplitude_V; });
+  add("difference", "difference", BasisFunction::input, [](R, S s) { return s.difference_V; });
+  add("bias", "bias", BasisFunction::input, [](R, S s) { return s.bias_V; });
+  add("split_cycle", "split_cycle", BasisFunction::input, [](R, S s) { return s.split_cycle; });
+  add("velocity_x", "velocity", BasisFunction::velocity_x, [](R, S s) { return s.velocity_B_m_s.x(); });
+  add("velocity_y", "velocity", BasisFunction::velocity_y, [](R, S s) { return s.velocity_B_m_s.y(); });
+  add("velocity_z", "velocity", BasisFunction::velocity_z, [](R, S s) { return s.velocity_B_m_s.z(); });
+  add("rate_x", "rate", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.x(); });
+  add("rate_y", "rate", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.y(); });
+  add("rate_z", "rate", BasisFunction::rate, [](R, S s) { return s.rate_rad_s.z(); });
+  add("|velocity| velocity_x", "velocity", BasisFunction::drag_x,
       [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.x(); });
-  add("|velocity| velocity_y", BasisFunction::drag_y,
+  add("|velocity| velocity_y", "velocity", BasisFunction::drag_y,
       [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.y(); });
-  add("|velocity| velocity_z", BasisFunction::drag_z,
+  add("|velocity| velocity_z", "velocity", BasisFunction::drag_z,
       [](R, S s) { return s.velocity_B_m_s.norm() * s.velocity_B_m_s.z(); });
-  add("near ground", BasisFunction::place,
+  add("near ground", "height", BasisFunction::place,
       [](R r, S s) { return std::exp(-std::max(0.0, s.position_m.z() - r.world.ground_z_m) / kReach_m); });
-  add("near ceiling", BasisFunction::place,
+  add("near ceiling", "ceiling", BasisFunction::place,
       [](R r, S s) { return std::exp(-std::max(0.0, r.world.ceiling_z_m - s.position_m.z()) / kReach_m); });
-  add("near wall", BasisFunction::place, near_wall);
-  add("height", BasisFunction::place, [](R, S s) { return s.position_m.z(); });
-  add("cos heading", BasisFunction::place, [](R, S s) { return std::cos(s.heading_rad); });
-  add("sin heading", BasisFunction::place, [](R, S s) { return std::sin(s.heading_rad); });
-  add("time", BasisFunction::place, [](R r, S s) { return s.t_s - r.begin_s; });
+  add("near wall", "wall", BasisFunction::place, near_wall);
+  add("height", "height", BasisFunction::place, [](R, S s) { return s.position_m.z(); });
+  add("cos heading", "heading", BasisFunction::place, [](R, S s) { return std::cos(s.heading_rad); });
+  add("sin heading", "heading", BasisFunction::place, [](R, S s) { return std::sin(s.heading_rad); });
+  add("time", "time", BasisFunction::place, [](R r, S s) { return s.t_s - r.begin_s; });
   return list;
 }
 
@@ -406,6 +406,23 @@ std::vector<RegimeQuantity> ResetPrediction::regimes() const {
       {"heading", "rad", each([](R, S s) { return s.heading_rad; })}};
   if (recording_.log.power) list.push_back({"battery", "V", each(battery_V)});
   return list;
+}
+
+std::shared_ptr<const PredictedFlight> ResetPrediction::with_log(flightlog::FlightLog log) const {
+  return std::make_shared<ResetPrediction>(Recording(recording_, std::move(log)));
+}
+
+std::shared_ptr<const PredictedFlight> ResetPrediction::corrected(const EffectValues& sensors) const {
+  {
+    const std::scoped_lock lock(mutex_);
+    for (const auto& [effects, flight] : corrected_)
+      if (effects == sensors) return flight;
+  }
+  std::shared_ptr<const PredictedFlight> flight = with_log(without(sensors, recording_.log));
+  const std::scoped_lock lock(mutex_);
+  corrected_.emplace_front(sensors, flight);
+  if (corrected_.size() > kMaxCorrected) corrected_.pop_back();
+  return flight;
 }
 
 }  // namespace flappy::gap

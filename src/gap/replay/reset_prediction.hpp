@@ -7,11 +7,14 @@
 // difference of positions over three beats, which weighs the beats in between as 1 2 3 2 1, does not. A prediction is weighed alike.
 #pragma once
 
+#include <deque>
+#include <mutex>
+
 #include "gap/replay/predicted_flight.hpp"
 
 namespace flappy::gap {
 
-class ResetPrediction final : public Predictor {
+class ResetPrediction final : public PredictedFlight {
  public:
   explicit ResetPrediction(Recording recording);
 
@@ -22,14 +25,19 @@ class ResetPrediction final : public Predictor {
   bool has_rows(int channel, int coefficient) const override { return channel < kPathX || coefficient == 0; }
   const Rows& measured() const override { return measured_; }
   const Rows& signal() const override { return signal_; }
-  std::vector<Rows> predict(const std::vector<const Candidate*>& candidates) const override;
+  std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const override;
   void weigh(Rows& rows) const override;
   Rows declared_noise(std::uint64_t seed) const override;
   std::vector<RegimeFunction> functions() const override;
   std::vector<std::pair<std::string, std::string>> products() const override;
   std::vector<RegimeQuantity> regimes() const override;
   std::vector<RegimeQuantity> inputs() const override;
+  const DiagnosisPolicy& policy() const override { return kWingPolicy; }
   const Recording* recording() const override { return &recording_; }
+  std::shared_ptr<const PredictedFlight> with_log(flightlog::FlightLog log) const override;
+  /// The last kMaxCorrected of them are kept.
+  std::shared_ptr<const PredictedFlight> corrected(const EffectValues& sensors) const override;
+  static constexpr std::size_t kMaxCorrected = 8;
 
  private:
   /// One number of each beat.
@@ -52,6 +60,8 @@ class ResetPrediction final : public Predictor {
   std::vector<std::size_t> power_sample_, power_step_;  ///< of power.csv on the grid; the step that begins with it
   std::vector<double> power_late_;                      ///< or so many steps later
   Rows measured_, signal_;
+  mutable std::mutex mutex_;
+  mutable std::deque<std::pair<EffectValues, std::shared_ptr<const PredictedFlight>>> corrected_;
 };
 
 }  // namespace flappy::gap

@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include "gap/replay/reset_prediction.hpp"
 #include "rollout/fly_fixture.hpp"
 #include "rollout/simulated_flight.hpp"
 
@@ -23,10 +24,11 @@ rollout::FlyConfig hover(const std::vector<std::string>& more = {}) {
   return rollout::read_fly_config(source_path("configs/fly/hover.toml"), all);
 }
 
-PredictedFlight flown(const rollout::FlyConfig& config, const model::Vehicle& vehicle, double from_s) {
+std::shared_ptr<const PredictedFlight> flown(const rollout::FlyConfig& config, const model::Vehicle& vehicle,
+                                             double from_s) {
   std::vector<rollout::SimulatedFlight> flights = simulate(config, vehicle, 1, from_s);
   EXPECT_FALSE(flights[0].lost);
-  return PredictedFlight(Recording("flight", *flights[0].log, nominal()));
+  return std::make_shared<ResetPrediction>(Recording("flight", *flights[0].log, nominal()));
 }
 
 std::map<std::string, ClosedLoop> by_quantity(const std::vector<ClosedLoop>& rows) {
@@ -47,7 +49,7 @@ constexpr double kTrim_V = 0.04, kTrimSplit = 0.002;
 
 TEST(ClosedLoop, TheVehicleThatFlewPredictsItsOwnHover) {
   const model::Vehicle truth = heavy_in_front();
-  std::vector<PredictedFlight> flights;
+  Flights flights;
   flights.push_back(flown(hover(), truth, 4));
   const auto list = predict_closed_loop(flights, nominal(), truth, hover());
   EXPECT_EQ(list.front().quantity, "mean_amplitude_V");
@@ -73,7 +75,7 @@ TEST(ClosedLoop, AVehicleFliesTheRecordedPath) {
       rollout::read_fly_config(source_path("configs/fly/waypoints.toml"),
                                {"vehicle=../vehicles/hummingbird_nominal.toml", "flight.duration_s=14"});
   const model::Vehicle truth = heavy_in_front();
-  std::vector<PredictedFlight> flights;
+  Flights flights;
   flights.push_back(flown(path, truth, 4));
   auto rows = by_quantity(predict_closed_loop(flights, nominal(), truth, hover()));
   EXPECT_NEAR(rows["mean_bias_V"].corrected, rows["mean_bias_V"].recorded, kTrim_V);
@@ -92,7 +94,7 @@ TEST(ClosedLoop, AConfigurationFliesItsOwnPathAndExcitation) {
   rollout::FlyConfig shaken =
       rollout::read_fly_config(source_path("configs/fly/identify_multisine.toml"),
                                {"vehicle=../vehicles/hummingbird_nominal.toml", "flight.duration_s=9"});
-  std::vector<PredictedFlight> flights;
+  Flights flights;
   flights.push_back(flown(shaken, nominal(), 0));
   shaken.fleet.seed = 7;  // other noise
   auto own = by_quantity(predict_closed_loop(flights, heavy_in_front(), nominal(), shaken, {.own_path = true}));
@@ -106,7 +108,7 @@ TEST(ClosedLoop, AConfigurationFliesItsOwnPathAndExcitation) {
 TEST(ClosedLoop, HeadingCountsWholeTurns) {
   const rollout::FlyConfig turn =
       rollout::read_fly_config(source_path("configs/gap/experiments/yaw_turn.toml"), {"flight.duration_s=5.9"});
-  std::vector<PredictedFlight> flights;
+  Flights flights;
   flights.push_back(flown(turn, nominal(), 2));
   auto rows = by_quantity(predict_closed_loop(flights, nominal(), nominal(), hover()));
   // the last second is nearly once round
@@ -118,7 +120,7 @@ TEST(ClosedLoop, WhatCannotFlyIsNoNumber) {
   rollout::FlyConfig high = hover();  // nothing below: it falls for as long as it is asked to hover
   high.fleet.batch.world.ground_z_m = -1000;
   high.fleet.task.start.kind = sim::Start::flying;
-  std::vector<PredictedFlight> flights;
+  Flights flights;
   flights.push_back(flown(high, nominal(), 4));
   model::Vehicle lead = nominal();
   lead.torso.mass_kg *= 3;
@@ -129,7 +131,7 @@ TEST(ClosedLoop, WhatCannotFlyIsNoNumber) {
 }
 
 TEST(ClosedLoop, IsTheSameForAnyNumberOfThreads) {
-  std::vector<PredictedFlight> flights;
+  Flights flights;
   flights.push_back(flown(hover(), nominal(), 5));
   const auto one = predict_closed_loop(flights, nominal(), heavy_in_front(), hover(), {.threads = 1});
   const auto two = predict_closed_loop(flights, nominal(), heavy_in_front(), hover(), {.threads = 2});

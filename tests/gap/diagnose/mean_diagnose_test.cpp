@@ -102,28 +102,28 @@ void simulate(const flightlog::FlightLog& log, const std::filesystem::path& fold
                                     columns));
 }
 
-Diagnosis diagnose_robot(const Robot& r, std::vector<std::string> withheld = {},
+Inference diagnose_robot(const Robot& r, std::vector<std::string> withheld = {},
                          const model::Vehicle& vehicle = nimble()) {
-  std::vector<PredictedFlight> flights;
+  Flights flights;
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     const std::filesystem::path folder = testing::TempDir() + "/flight_" + std::to_string(seed);
     const flightlog::FlightLog log = fly(r, seed);
     if (vehicle.beat_averaged->predicted) simulate(log, folder);
-    flights.emplace_back(std::make_shared<MeanPrediction>(folder, log, vehicle));
+    flights.push_back(std::make_shared<MeanPrediction>(folder, log, vehicle));
   }
   const std::string configs = test::source_path("configs/gap/beat_averaged/");
-  return diagnose(flights, sim::read_randomisation(vehicle, io::Config::load(configs + "priors.toml").root()),
-                  {.finalists = 20,
-                   .most_effects = 4,
-                   .withheld = std::move(withheld),
-                   .progress = {},
-                   .discrepancy = read_model_discrepancy(configs + "model_discrepancy.toml"),
-                   .rule = read_verdict_rule(configs + "verdict.toml")});
+  return infer(flights, sim::read_randomisation(vehicle, io::Config::load(configs + "priors.toml").root()),
+               {.max_finalists = 20,
+                .max_effects = 4,
+                .withheld = std::move(withheld),
+                .progress = {},
+                .discrepancy = read_model_discrepancy(configs + "model_discrepancy.toml"),
+                .rule = read_verdict_rule(configs + "verdict.toml")});
 }
 
-/// 90 % interval of a size.
-bool holds(const Diagnosis& d, const std::string& name, double truth) {
-  const ScoredHypothesis& a = d.hypotheses[d.conclusion.hypothesis];
+/// Whether the 90 % interval of a magnitude holds the truth.
+bool holds(const Inference& d, const std::string& name, double truth) {
+  const ScoredHypothesis& a = d.conclusion();
   const sim::Randomisation exact(nimble());
   const Hypothesis h(exact, a.effects);
   const Eigen::VectorXd mean = a.fit.mean();
@@ -141,18 +141,18 @@ bool holds(const Diagnosis& d, const std::string& name, double truth) {
 }
 
 const Robot kLacking{.drag_x = 3, .drag_y = 2, .heave = 1, .dihedral = 20};
-const Diagnosis& lacking() {
-  static const Diagnosis d = diagnose_robot(kLacking);
+const Inference& lacking() {
+  static const Inference d = diagnose_robot(kLacking);
   return d;
 }
 
 TEST(MeanDiagnosis, NamesWhatTheFileLacksWithItsSize) {
-  const Diagnosis& d = lacking();
-  ASSERT_EQ(d.conclusion.kind, Conclusion::Kind::effect);
-  std::vector<std::string> named = d.conclusion.effects;
+  const Inference& d = lacking();
+  ASSERT_EQ(d.verdict.kind, VerdictKind::effect);
+  std::vector<std::string> named = d.verdict.effects;
   std::ranges::sort(named);
   EXPECT_EQ(named, (std::vector<std::string>{"flapping_counter_force", "stroke_plane_actuation"}));
-  EXPECT_GT(d.conclusion.probability, 0.9);
+  EXPECT_GT(d.verdict.probability, 0.9);
   EXPECT_TRUE(holds(d, "x_per_s", 3));
   EXPECT_TRUE(holds(d, "y_per_s", 2));
   EXPECT_TRUE(holds(d, "z_per_s", 1));
@@ -174,15 +174,15 @@ TEST(MeanDiagnosis, NamesWhatTheFileLacksWithItsSize) {
 }
 
 TEST(MeanDiagnosis, SaysTheSameOfForcesThatItsSimulatorPredicted) {
-  const Diagnosis &by_equations = lacking(), d = diagnose_robot(kLacking, {}, by_simulator());
-  EXPECT_EQ(d.conclusion.kind, by_equations.conclusion.kind);
-  EXPECT_EQ(d.conclusion.effects, by_equations.conclusion.effects);
-  EXPECT_NEAR(d.conclusion.probability, by_equations.conclusion.probability, 1e-3);
-  const auto sizes = [](const Diagnosis& of) {
-    const Eigen::VectorXd mean = of.hypotheses[of.conclusion.hypothesis].fit.mean();
+  const Inference &by_equations = lacking(), d = diagnose_robot(kLacking, {}, by_simulator());
+  EXPECT_EQ(d.verdict.kind, by_equations.verdict.kind);
+  EXPECT_EQ(d.verdict.effects, by_equations.verdict.effects);
+  EXPECT_NEAR(d.verdict.probability, by_equations.verdict.probability, 1e-3);
+  const auto magnitudes = [](const Inference& of) {
+    const Eigen::VectorXd mean = of.conclusion().fit.mean();
     return Eigen::VectorXd(mean.tail(5));  // of both effects
   };
-  EXPECT_LT((sizes(d) - sizes(by_equations)).cwiseAbs().maxCoeff(), 1e-3);
+  EXPECT_LT((magnitudes(d) - magnitudes(by_equations)).cwiseAbs().maxCoeff(), 1e-3);
   for (std::size_t f = 0; f < d.nominal.size(); ++f)
     for (std::size_t i = 0; i < d.nominal[f].size(); i += kRowsPerBeat)
       for (std::size_t k = i + kForceX * kCoefficients; k <= i + kForceZ * kCoefficients; k += kCoefficients)
@@ -193,23 +193,23 @@ TEST(MeanDiagnosis, SaysTheSameOfForcesThatItsSimulatorPredicted) {
 }
 
 TEST(MeanDiagnosis, NamesNothingWhereNothingIsMissing) {
-  const Diagnosis d = diagnose_robot({});
-  EXPECT_TRUE(d.conclusion.kind == Conclusion::Kind::none || d.conclusion.kind == Conclusion::Kind::parameters)
-      << kind_name(d.conclusion.kind);
+  const Inference d = diagnose_robot({});
+  EXPECT_TRUE(d.verdict.kind == VerdictKind::none || d.verdict.kind == VerdictKind::parameters)
+      << name_of(d.verdict.kind);
 }
 
 TEST(MeanDiagnosis, KnowsThatItDoesNotKnow) {
   // a side force by the square of the pitch rate, which no entry has; and one whose entries are withheld
-  EXPECT_EQ(diagnose_robot({.drag_x = 0, .squared_rate = 5}).conclusion.kind, Conclusion::Kind::unknown);
+  EXPECT_EQ(diagnose_robot({.drag_x = 0, .squared_rate = 5}).verdict.kind, VerdictKind::unknown);
   EXPECT_EQ(
-      diagnose_robot({.drag_x = 3, .drag_y = 2, .heave = 1}, {"flapping_counter_force", "body_drag"}).conclusion.kind,
-      Conclusion::Kind::unknown);
+      diagnose_robot({.drag_x = 3, .drag_y = 2, .heave = 1}, {"flapping_counter_force", "body_drag"}).verdict.kind,
+      VerdictKind::unknown);
 }
 
 /// What is left of the rms of each channel where a candidate predicts a flight.
 std::array<double, 6> left(const MeanPrediction& flight, const model::Vehicle& vehicle) {
-  const Candidate candidate{vehicle};
-  const Rows rows = flight.predict(std::vector<const Candidate*>{&candidate})[0];
+  const VehicleHypothesis candidate{vehicle};
+  const Rows rows = flight.predict(std::vector<const VehicleHypothesis*>{&candidate})[0];
   std::array<double, 6> rms{};
   for (int channel = 0; channel < 6; ++channel) {
     double n = 0;

@@ -25,20 +25,20 @@ ScoredHypothesis hypothesis(const sim::Randomisation& prior, const std::vector<s
                             const std::vector<double>& sizes, double probability, double sd = 0.1) {
   const Hypothesis h(prior, effects);
   ScoredHypothesis a;
-  a.kind = effects.empty() ? ScoredHypothesis::Kind::parameters : ScoredHypothesis::Kind::effect;
+  a.kind = effects.empty() ? HypothesisKind::parameters : HypothesisKind::effect;
   a.effects = effects;
   a.probability = probability;
-  a.fit.point.at = h.start();
-  for (std::size_t i = 0; i < sizes.size(); ++i) a.fit.point.at[h.shared() + static_cast<Eigen::Index>(i)] = sizes[i];
-  a.fit.point.directions = Fitter::axes(h);
-  a.fit.point.residual.resize(1);
+  a.fit.at = h.start();
+  for (std::size_t i = 0; i < sizes.size(); ++i) a.fit.at[h.shared() + static_cast<Eigen::Index>(i)] = sizes[i];
+  a.fit.directions = Fitter::axes(h);
+  a.fit.residual.resize(1);
   a.fit.posterior.mean = Eigen::VectorXd::Zero(h.size());
   a.fit.posterior.covariance = sd * sd * Eigen::MatrixXd::Identity(h.size(), h.size());
   return a;
 }
 
-Diagnosis diagnosis(const sim::Randomisation& prior, std::vector<ScoredHypothesis> hypotheses) {
-  Diagnosis d;
+Inference diagnosis(const sim::Randomisation& prior, std::vector<ScoredHypothesis> hypotheses) {
+  Inference d;
   d.hypotheses = std::move(hypotheses);
   d.parameters = hypothesis(prior, {}, {}, 0).fit;
   return d;
@@ -99,7 +99,7 @@ TEST(NextExperiment, PairsCountByTheirProbabilities) {
   const auto choice = library({"ceiling_steps", "ground_steps"});
   const auto rank = [&](double ground, double ceiling) {
     ScoredHypothesis unknown;
-    unknown.kind = ScoredHypothesis::Kind::unknown;
+    unknown.kind = HypothesisKind::unknown;
     unknown.probability = 0.5;
     return rank_experiments(
         diagnosis(prior, {unknown, hypothesis(prior, {}, {}, 0.4), hypothesis(prior, {"ground_effect"}, {1}, ground),
@@ -119,10 +119,10 @@ TEST(NextExperiment, PrefersWhatShowsManyRivals) {
     ScoredHypothesis a = hypothesis(prior, {effect}, {}, probability, 0.01);
     const Hypothesis h(prior, {effect});
     for (Eigen::Index i = h.shared(); i < h.size(); ++i) a.fit.posterior.covariance(i, i) = 0.25;
-    a.fit.point.residual.clear();
+    a.fit.residual.clear();
     return a;
   };
-  const Diagnosis d = diagnosis(prior, {hypothesis(prior, {}, {}, 0.4, 0.01), open("ground_effect", 0.22),
+  const Inference d = diagnosis(prior, {hypothesis(prior, {}, {}, 0.4, 0.01), open("ground_effect", 0.22),
                                         open("ceiling_effect", 0.2), open("wall_effect", 0.18)});
   const auto ranked = rank_experiments(d, prior, library({"ceiling_steps", "dash", "ground_steps", "tour"}));
   ASSERT_EQ(ranked.size(), 4u);
@@ -140,7 +140,7 @@ TEST(NextExperiment, ProposesNothingWithoutRivalsOrWhereOneIsLost) {
   const sim::Randomisation prior = uncertain();
   auto choice = library({"ground_steps"});
   EXPECT_TRUE(rank_experiments(diagnosis(prior, {hypothesis(prior, {}, {}, 1)}), prior, choice).empty());
-  const Diagnosis d =
+  const Inference d =
       diagnosis(prior, {hypothesis(prior, {"ground_effect"}, {1}, 0.6), hypothesis(prior, {}, {}, 0.4)});
   choice[0].config.fleet.task.path.back().coefficients[0][0] = 2;  // metres, at once
   EXPECT_TRUE(rank_experiments(d, prior, choice).empty());

@@ -128,8 +128,8 @@ double difference(const Rows& a, const Rows& b) {
 }
 
 /// What a diagnosis tries of a vehicle.
-std::vector<Candidate> candidates(const model::Vehicle& v) {
-  std::vector<Candidate> all(8, {v, 0, {}});
+std::vector<VehicleHypothesis> candidates(const model::Vehicle& v) {
+  std::vector<VehicleHypothesis> all(8, {v, 0, {}});
   for (BeatAveraged::Coefficient& c : all[1].vehicle.beat_averaged->coefficients) c.value = 1.2 * c.value + 0.01;
   all[2].vehicle.torso.mass_kg *= 1.1;
   all[2].vehicle.torso.com_m = {0.01, -0.02, 0.03};
@@ -144,7 +144,7 @@ std::vector<Candidate> candidates(const model::Vehicle& v) {
 TEST(PredictedLoads, ShowTheRowsOfTheEquationsTheyWereMadeFrom) {
   const MeanPrediction equations(folder(), log_of(), by_equations());
   const MeanPrediction file = flight(by_file(), csv_of(predicted(by_file())));
-  const std::vector<Candidate> a = candidates(by_equations()), b = candidates(by_file());
+  const std::vector<VehicleHypothesis> a = candidates(by_equations()), b = candidates(by_file());
   const Rows plain = file.predict({&b[0]})[0];
   for (std::size_t i = 0; i < a.size(); ++i) {
     SCOPED_TRACE(i);
@@ -163,7 +163,7 @@ TEST(PredictedLoads, MayBeMadeAtOtherCoefficientsThanTheVehiclesFileHasNow) {
   const model::Vehicle again = model::read_any_vehicle(file);
   EXPECT_TRUE(again.beat_averaged->predicted);
   const MeanPrediction equations(folder(), log_of(), by_equations());
-  const Candidate a{by_equations(), 0, {}}, b{again, 0, {}};
+  const VehicleHypothesis a{by_equations(), 0, {}}, b{again, 0, {}};
   EXPECT_LT(difference(equations.predict({&a})[0], flight(again, csv_of(predicted(made))).predict({&b})[0]), 1e-9);
 }
 
@@ -171,7 +171,7 @@ TEST(PredictedLoads, MayHaveTheirOwnSampling) {
   const MeanPrediction same = flight(by_file(), csv_of(predicted(by_file())));
   const MeanPrediction rarer = flight(by_file(), csv_of(predicted(by_file(), 25)));
   const MeanPrediction finer = flight(by_file(), csv_of(predicted(by_file(), 1000, 0.2)));
-  const Candidate c{by_file(), 0, {}};
+  const VehicleHypothesis c{by_file(), 0, {}};
   const Rows rows = same.predict({&c})[0];
   EXPECT_LT(difference(rows, rarer.predict({&c})[0]), 0.1);
   EXPECT_LT(difference(rows, finer.predict({&c})[0]), 0.03);  // the wings' own 2 m/s^2 stay out
@@ -183,7 +183,7 @@ TEST(PredictedLoads, LetEffectsActOnlyByWhatIsKnown) {
   bare.beat_averaged->actuators.clear();
   const std::string csv = csv_of(predicted(bare));
   const MeanPrediction with = flight(by_file(), csv), without = flight(bare, csv);
-  const std::vector<Candidate> a = candidates(by_file()), b = candidates(bare);
+  const std::vector<VehicleHypothesis> a = candidates(by_file()), b = candidates(bare);
   const Rows plain = without.predict({&b[0]})[0];
   EXPECT_LT(difference(with.predict({&a[0]})[0], plain), 1e-12);
   EXPECT_EQ(difference(plain, without.predict({&b[4]})[0]), 0);
@@ -192,7 +192,7 @@ TEST(PredictedLoads, LetEffectsActOnlyByWhatIsKnown) {
   EXPECT_TRUE(without.inputs().empty());
   EXPECT_EQ(with.inputs().size(), 4U);
   // what is between inputs and wings is in the forces already
-  Candidate late = a[4];
+  VehicleHypothesis late = a[4];
   late.vehicle.effects["command_delay"] = {{"delay_s", 0.1}};
   EXPECT_EQ(difference(with.predict({&a[4]})[0], with.predict({&late})[0]), 0);
 }

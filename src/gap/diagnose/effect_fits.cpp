@@ -1,0 +1,346 @@
+#include "gap/diagnose/effect_fits.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "io/parallel.hpp"
+#include "model/effects/registry.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Hypotheses that are tried with a remainder, and effects beside which the parameters are fitted again.
+constexpr std::size_t kMaxRemainders = 3, kMaxMoved = 3;
+constexpr int kFitIterations = 6;
+/// Log evidence of a hypothesis that no vehicle flies.
+constexpr double kRefuted = -1e9;
+/// A magnitude that changes no row by more than this, in its unit, does not show.
+constexpr double kNoChange = 1e-9;
+
+ScoredHypothesis baseline(HypothesisKind kind, double log_evidence, double prior) {
+  ScoredHypothesis a;
+  a.kind = kind;
+  a.log_prior = std::log(prior);
+  a.log_evidence = log_evidence + a.log_prior;
+  return a;
+}
+
+/// Blocks that are free, each by the function that takes most of it; the largest gain first.
+std::vector<FreeBlock> free_blocks(const ScaledEvidence& w, const RegimeBasis& basis, double penalty_nats) {
+  std::vector<FreeBlock> blocks;
+  for (std::size_t block = 0; block < w.scales.free.size(); ++block) {
+    if (!w.scales.free[block]) continue;
+    double sum = 0, most = 0;
+    FreeBlock b{static_cast<int>(block) / kClasses / (kHarmonics + 1),
+                static_cast<int>(block) / kClasses % (kHarmonics + 1)};
+    for (int g = 0; g < kGroups; ++g)
+      for (int i = 0; i < basis.size(); ++i) {
+        if (Evidence::block_of(g, basis.kind(i)) != static_cast<int>(block)) continue;
+        const double square = std::pow(w.delta(g, i), 2);
+        sum += square;
+        if (square > most) most = square, b.function = i;
+      }
+    b.times = w.scales.blocks[block] / w.scales.robot;
+    b.gain_nats = 0.5 * sum * (b.times * b.times - 1) - penalty_nats;
+    blocks.push_back(b);
+  }
+  std::ranges::sort(blocks, std::greater{}, &FreeBlock::gain_nats);
+  return blocks;
+}
+
+/// Evidence where blocks may be free. A cause that does not show while models are off by little may show where they are off by much: so the search
+/// starts from `start` and from the scales of an unknown cause alone, if they are known.
+ScaledEvidence weigh_freely(const RobotFit& robot, const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
+                            const Scales* unknown_scales, double penalty_nats) {
+  ScaledEvidence w = robot.weigh(hypothesis, fit, start, penalty_nats);
+  if (unknown_scales == nullptr) return w;
+  ScaledEvidence other = robot.weigh(hypothesis, fit, *unknown_scales, penalty_nats);
+  return other.posterior.log_evidence > w.posterior.log_evidence ? other : w;
+}
+
+/// The function of the place along which a law deviates most.
+FreeBlock largest_deviation(const ScaledEvidence& w, const RegimeBasis& basis) {
+  FreeBlock most;
+  for (int g = 0; g < kGroups; ++g)
+    for (int i = 0; i < basis.size(); ++i) {
+      const double gain = 0.5 * std::pow(w.delta(g, i), 2);
+      if (regimes_of(basis.kind(i)) == Regimes::place && gain > most.gain_nats)
+        most = {g / kCoefficients, (g % kCoefficients + 1) / 2, i, w.law_factor, gain};
+    }
+  return most;
+}
+
+/// Effects without a stage for the mean of a beat, or that change nothing here, as a battery's where none was logged.
+std::vector<std::string> untestable(const RobotFit& robot, const std::vector<std::string>& withheld) {
+  std::vector<std::string> list;
+  const model::Vehicle& vehicle = robot.uncertain().nominal();
+  for (const model::EffectEntry& e : model::catalogue_of(vehicle)) {
+    double most = 0;
+    for (const MagnitudeColumn& m : robot.magnitudes())
+      if (m.effect == e.info.id) most = std::max(most, m.change.cwiseAbs().maxCoeff());
+    if (!(most > kNoChange)) list.emplace_back(e.info.id);
+  }
+  for (const model::EffectEntry& e : model::effects())
+    if (model::find_effect(vehicle, e.info.id) == nullptr) list.emplace_back(e.info.id);
+  std::erase_if(list, [&](const std::string& id) { return std::ranges::count(withheld, id) > 0; });
+  return list;
+}
+
+}  // namespace
+
+Baselines weigh_baselines(const RobotFit& robot, const VerdictRule& rule) {
+  const Hypothesis& h = robot.no_effects();
+  const Scales& scales = robot.fitter().scales();
+  const double penalty = rule.unknown.penalty_nats;
+  Baselines b;
+  b.none =
+      baseline(HypothesisKind::none, robot.weigh(h, robot.nominal(), scales).posterior.log_evidence, rule.prior.none);
+  b.parameters = baseline(HypothesisKind::parameters, robot.weigh(h, robot.parameters(), scales).posterior.log_evidence,
+                          rule.prior.parameters);
+  const ScaledEvidence unknown = weigh_freely(robot, h, robot.parameters(), scales, nullptr, penalty);
+  b.unknown = baseline(HypothesisKind::unknown, unknown.posterior.log_evidence, rule.prior.unknown);
+  b.unknown.unexplained = free_blocks(unknown, robot.evidence().basis(), penalty);
+  if (!b.unknown.has_remainder()) b.unknown.log_evidence -= penalty;  // a cause has to show somewhere
+  b.unknown.fit.law_factor = unknown.law_factor;
+  b.unknown_scales = unknown.scales;
+  return b;
+}
+
+ScreenedCatalogue screen_catalogue(const RobotFit& robot, const InferenceOptions& options) {
+  ScreenedCatalogue c;
+  if (robot.evidence().policy().validate) c.untestable = untestable(robot, options.withheld);
+  for (ScreenedEffect& s : screen(robot.fitter(), robot.parameters(), robot.magnitudes())) {
+    if (std::ranges::count(c.untestable, s.effect)) continue;
+    const bool finalist = static_cast<int>(c.finalists.size()) < options.max_finalists;
+    (finalist ? c.finalists : c.others).push_back(std::move(s));
+  }
+  return c;
+}
+
+EffectFits::EffectFits(const RobotFit& robot, const Baselines& baselines, const InferenceOptions& options, int threads)
+    : robot_(robot),
+      baselines_(baselines),
+      options_(options),
+      rule_(options.rule),
+      threads_(threads),
+      catalogue_size_(model::catalogue_of(robot.uncertain().nominal()).size()) {}
+
+double EffectFits::log_prior_of_one() const {
+  return std::log(rule_.prior.effect / static_cast<double>(catalogue_size_));
+}
+
+/// What the last effect of a set gains by chance.
+double EffectFits::gain_by_chance(const ScoredHypothesis& a) const { return rule_.gain.chance_of(a.effects.back()); }
+
+/// Coordinates from which a set was screened, with the parameters where they are.
+VectorXd EffectFits::start(const Hypothesis& h, const std::vector<ScreenedEffect>& set) const {
+  VectorXd at = h.start();
+  at.head(h.shared()) = robot_.parameters().at.head(h.shared());
+  Index next = h.shared();
+  for (const ScreenedEffect& s : set) {
+    at.segment(next, s.coordinates.size()) = s.coordinates;
+    next += s.coordinates.size();
+  }
+  return h.bounded(at);
+}
+
+Fit EffectFits::fit_jointly(const Hypothesis& h, const std::vector<ScreenedEffect>& set, const Fitter& fitter) const {
+  return fitter.fit_given(h, start(h, set), robot_.parameters(), kFitIterations);
+}
+
+ScoredHypothesis EffectFits::fitted(const std::vector<ScreenedEffect>& set, const Fitter& fitter) const {
+  ScoredHypothesis a;
+  a.kind = HypothesisKind::effect;
+  for (const ScreenedEffect& s : set) a.effects.push_back(s.effect);
+  a.log_evidence = kRefuted;  // until a vehicle flies
+  const Hypothesis h(robot_.uncertain(), a.effects);
+  a.log_prior = log_prior_of_one();
+  for (std::size_t i = 1; i < set.size(); ++i)
+    a.log_prior += std::log(rule_.prior.further_effect / static_cast<double>(catalogue_size_));
+  for (Index i = h.shared(); i < h.size(); ++i) {
+    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+    if (u.magnitude && u.low >= 0) a.log_prior += std::log(2.0);
+  }
+  const bool effects_first = robot_.evidence().policy().move_parameters;
+  take(h, effects_first ? fitter.fit_effects(h, start(h, set), robot_.parameters()) : fit_jointly(h, set, fitter),
+       fitter.scales(), a);
+  return a;
+}
+
+/// Fits the parameters again, jointly with the effects, if that explains more. A beat-averaged vehicle was fitted jointly already.
+void EffectFits::move_parameters(const std::vector<ScreenedEffect>& set, const Fitter& fitter,
+                                 ScoredHypothesis& a) const {
+  if (!robot_.evidence().policy().move_parameters) return;
+  const Hypothesis h(robot_.uncertain(), a.effects);
+  take(h, fit_jointly(h, set, fitter), fitter.scales(), a);
+}
+
+/// Unless the vehicle comes apart, or another fit explains as much.
+void EffectFits::take(const Hypothesis& h, Fit fit, const Scales& scales, ScoredHypothesis& a) const {
+  if (!fit.flown()) return;
+  const ScaledEvidence w = robot_.weigh(h, fit, scales);
+  if (a.fitted() && w.posterior.log_evidence + a.log_prior <= a.log_evidence) return;
+  fit.law_factor = w.law_factor;
+  a.log_evidence = w.posterior.log_evidence + a.log_prior;
+  a.fit = std::move(fit);
+  a.other_law.reset();
+  if (w.law_factor > 1) a.other_law = largest_deviation(w, robot_.evidence().basis());
+}
+
+/// An effect that would gain nothing: what the flights do not say of it stays as its prior has it.
+ScoredHypothesis EffectFits::linear(const ScreenedEffect& s) const {
+  ScoredHypothesis a;
+  a.kind = HypothesisKind::effect;
+  a.effects = {s.effect};
+  const Hypothesis h(robot_.uncertain(), a.effects);
+  std::vector<BasisCoefficients> columns(static_cast<std::size_t>(h.size() - h.shared()));
+  for (const MagnitudeColumn& m : robot_.magnitudes())
+    if (m.effect == s.effect) columns[static_cast<std::size_t>(m.unknown)] = m.change;
+  a.fit = robot_.fitter().fit_linear(h, robot_.parameters(), columns);
+  a.log_prior = log_prior_of_one();
+  a.log_evidence = baselines_.parameters.explained() + std::min(s.gain, 0.0) + a.log_prior;
+  Posterior& p = a.fit.posterior;
+  const Index first = h.shared();
+  if (h.unknowns()[static_cast<std::size_t>(first)].low < 0) return a;
+  // the mean of its first magnitude, given that it is positive, and of all else given that
+  const double mean = p.mean[first], sd = std::sqrt(p.covariance(first, first)), t = mean / sd;
+  const double beyond =
+      std::exp(-0.5 * t * t) / (std::sqrt(std::numbers::pi / 2) * std::erfc(-t / std::numbers::sqrt2));
+  p.mean += p.covariance.col(first) / sd * (t > -5 ? beyond : -t);
+  return a;
+}
+
+/// Whether a fit left all magnitudes of one of its effects as the vehicle file has them.
+bool EffectFits::vanished(const ScoredHypothesis& a) const {
+  if (!a.fitted()) return true;
+  const Hypothesis h(robot_.uncertain(), a.effects);
+  const VectorXd file = h.start();
+  for (const std::string& e : a.effects) {
+    double largest = 0;
+    for (Index i = h.shared(); i < h.size(); ++i) {
+      const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+      if (u.effect == e && u.magnitude) largest = std::max(largest, std::abs(a.fit.at[i] - file[i]));
+    }
+    if (largest < rule_.gain.vanished_magnitude) return true;
+  }
+  return false;
+}
+
+/// Where a fit left its effects, to go on from.
+std::vector<ScreenedEffect> EffectFits::coordinates(const ScoredHypothesis& a) const {
+  std::vector<ScreenedEffect> list;
+  Index at = robot_.no_effects().size();
+  for (const std::string& e : a.effects) {
+    const Hypothesis h(robot_.uncertain(), {e});
+    const Index n = h.size() - h.shared();
+    list.push_back({e, 0, a.fit.at.segment(at, n)});
+    at += n;
+  }
+  return list;
+}
+
+std::vector<ScoredHypothesis> EffectFits::single_effects(const ScreenedCatalogue& catalogue, bool by_simulation) const {
+  const std::vector<ScreenedEffect>& finalists = catalogue.finalists;
+  std::vector<ScoredHypothesis> singles;
+  std::vector<ScreenedEffect> open = catalogue.others;
+  if (by_simulation) {
+    // also those that promise nothing: where the parameters make up for an effect, a linear model sees nothing of it
+    std::vector<ScoredHypothesis> fits(finalists.size());
+    io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fitted({finalists[i]}, robot_.fitter()); });
+    std::vector<std::size_t> order(fits.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) { return fits[i].log_evidence; });
+    order.resize(std::min(order.size(), kMaxMoved));
+    io::parallel_for(order.size(), threads_,
+                     [&](std::size_t i) { move_parameters({finalists[order[i]]}, robot_.fitter(), fits[order[i]]); });
+    for (std::size_t i = 0; i < fits.size(); ++i)
+      // a fit that explains less than the linear model found nothing
+      if (vanished(fits[i]) || fits[i].log_evidence < linear(finalists[i]).log_evidence) open.push_back(finalists[i]);
+      else singles.push_back(std::move(fits[i]));
+  } else {
+    open.insert(open.end(), finalists.begin(), finalists.end());
+  }
+  for (const ScreenedEffect& s : open) singles.push_back(linear(s));
+  std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::explained);
+  return singles;
+}
+
+EffectFits::Sets EffectFits::combine(std::vector<ScoredHypothesis> singles,
+                                     const std::function<bool(double, const std::string&)>& progress) const {
+  Sets sets{std::move(singles), robot_.fitter().scales()};
+  if (!sets.hypotheses.empty() && sets.hypotheses.front().fitted() &&
+      sets.hypotheses.front().explained() > baselines_.parameters.explained() + gain_by_chance(sets.hypotheses.front()))
+    join_further(progress, sets);
+  std::ranges::sort(sets.hypotheses, std::greater{}, &ScoredHypothesis::explained);
+  return sets;
+}
+
+void EffectFits::join_further(const std::function<bool(double, const std::string&)>& progress, Sets& sets) const {
+  std::vector<ScoredHypothesis>& all = sets.hypotheses;
+  ScoredHypothesis best = all.front();
+  for (int n = 2; n <= options_.max_effects; ++n) {
+    if (!progress(0.7 + 0.3 * (n - 1) / options_.max_effects, "fitting another jointly with " + best.effects.back()))
+      break;
+    // what else is missing hides behind the scales of models with the best set in force, not without it
+    sets.scales = robot_.find_scales(Hypothesis(robot_.uncertain(), best.effects), best.fit, sets.scales);
+    const Fitter fitter = robot_.fitter().with_scales(sets.scales);
+    std::vector<MagnitudeColumn> others = robot_.magnitudes();
+    std::erase_if(others, [&](const MagnitudeColumn& m) { return std::ranges::count(best.effects, m.effect) > 0; });
+    std::vector<ScreenedEffect> further = screen(fitter, best.fit, others);
+    std::erase_if(further, [&](const ScreenedEffect& s) { return s.gain < rule_.gain.further_screened_nats; });
+    further.resize(std::min(further.size(), static_cast<std::size_t>(robot_.evidence().policy().max_further)));
+    std::vector<ScoredHypothesis> more(further.size());
+    std::vector<std::vector<ScreenedEffect>> starts(further.size(), coordinates(best));
+    io::parallel_for(more.size(), threads_, [&](std::size_t i) {
+      starts[i].push_back(further[i]);
+      more[i] = fitted(starts[i], fitter);
+    });
+    if (const auto first = std::ranges::max_element(more, {}, &ScoredHypothesis::explained); first != more.end())
+      move_parameters(starts[static_cast<std::size_t>(first - more.begin())], fitter, *first);
+    std::erase_if(more, [&](const ScoredHypothesis& a) {
+      return vanished(a) || a.explained() < best.explained() + gain_by_chance(a);
+    });
+    if (more.empty()) break;
+    for (const ScoredHypothesis& a : more) {  // an effect that shows jointly with another may be all there is
+      const ScreenedEffect last = coordinates(a).back();
+      const auto single = std::ranges::find(all, std::vector{last.effect}, &ScoredHypothesis::effects);
+      if (single == all.end() || single->fitted()) continue;
+      if (ScoredHypothesis alone = fitted({last}, fitter); alone.fitted()) *single = std::move(alone);
+    }
+    all.insert(all.end(), more.begin(), more.end());
+    best = *std::ranges::max_element(more, {}, &ScoredHypothesis::explained);
+  }
+  sets.scales = robot_.find_scales(robot_.no_effects(), robot_.parameters(), sets.scales);
+}
+
+std::vector<ScoredHypothesis> EffectFits::with_remainders(const std::vector<ScoredHypothesis>& hypotheses,
+                                                          const Scales& scales) const {
+  std::size_t asked = 0;
+  while (asked < std::min(hypotheses.size(), kMaxRemainders) && hypotheses[asked].fitted() &&
+         hypotheses[asked].explained() >= baselines_.parameters.explained())
+    ++asked;
+  const double penalty = rule_.unknown.penalty_nats;
+  std::vector<ScoredHypothesis> found(asked);
+  io::parallel_for(asked, threads_, [&](std::size_t i) {
+    const ScoredHypothesis& a = hypotheses[i];
+    const Hypothesis h(robot_.uncertain(), a.effects);
+    const ScaledEvidence w = weigh_freely(robot_, h, a.fit, scales, &baselines_.unknown_scales, penalty);
+    std::vector<FreeBlock> blocks = free_blocks(w, robot_.evidence().basis(), penalty);
+    if (blocks.empty()) return;
+    found[i] = a;
+    found[i].unexplained = std::move(blocks);
+    found[i].jointly_with = a.effects;
+    found[i].fit.law_factor = w.law_factor;
+    found[i].log_prior = a.log_prior + std::log(rule_.prior.remainder);
+    found[i].log_evidence = w.posterior.log_evidence + found[i].log_prior;
+  });
+  std::erase_if(found, [](const ScoredHypothesis& a) { return !a.has_remainder(); });
+  return found;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,63 @@
+// The middle stages of a diagnosis: hypotheses with effects are screened, fitted, and combined.
+#pragma once
+
+#include "gap/diagnose/inference.hpp"
+
+namespace flappy::gap {
+
+/// Hypotheses without effects.
+struct Baselines {
+  ScoredHypothesis none, parameters, unknown;
+  Scales unknown_scales;  ///< of the unknown cause
+};
+Baselines weigh_baselines(const RobotFit& robot, const VerdictRule& rule);
+
+/// Effects in the order of what they would gain.
+struct ScreenedCatalogue {
+  std::vector<ScreenedEffect> finalists, others;
+  std::vector<std::string> untestable;  ///< they cannot show in these logs; only where the policy asks
+};
+ScreenedCatalogue screen_catalogue(const RobotFit& robot, const InferenceOptions& options);
+
+class EffectFits {
+ public:
+  EffectFits(const RobotFit& robot, const Baselines& baselines, const InferenceOptions& options, int threads);
+
+  /// A hypothesis for each effect: finalists are fitted by simulation if `by_simulation`, all others linearly. The best first.
+  std::vector<ScoredHypothesis> single_effects(const ScreenedCatalogue& catalogue, bool by_simulation) const;
+
+  /// Sets of several effects: one effect after another joins the set that explains most, as long as that gains. Also the scales of the parameters,
+  /// searched on from those of the last set.
+  struct Sets {
+    std::vector<ScoredHypothesis> hypotheses;  ///< singles and sets
+    Scales scales;
+  };
+  Sets combine(std::vector<ScoredHypothesis> singles,
+               const std::function<bool(double, const std::string&)>& progress) const;
+
+  /// The hypotheses that explain most, with a remainder beside their effects, where one is found.
+  std::vector<ScoredHypothesis> with_remainders(const std::vector<ScoredHypothesis>& hypotheses,
+                                                const Scales& scales) const;
+
+ private:
+  void join_further(const std::function<bool(double, const std::string&)>& progress, Sets& sets) const;
+  double log_prior_of_one() const;
+  Eigen::VectorXd start(const Hypothesis& hypothesis, const std::vector<ScreenedEffect>& set) const;
+  ScoredHypothesis fitted(const std::vector<ScreenedEffect>& set, const Fitter& fitter) const;
+  ScoredHypothesis linear(const ScreenedEffect& effect) const;
+  Fit fit_jointly(const Hypothesis& hypothesis, const std::vector<ScreenedEffect>& set, const Fitter& fitter) const;
+  void move_parameters(const std::vector<ScreenedEffect>& set, const Fitter& fitter, ScoredHypothesis& a) const;
+  void take(const Hypothesis& hypothesis, Fit fit, const Scales& scales, ScoredHypothesis& a) const;
+  bool vanished(const ScoredHypothesis& a) const;
+  std::vector<ScreenedEffect> coordinates(const ScoredHypothesis& a) const;
+  double gain_by_chance(const ScoredHypothesis& a) const;
+
+  const RobotFit& robot_;
+  const Baselines& baselines_;
+  const InferenceOptions& options_;
+  const VerdictRule& rule_;
+  int threads_;
+  std::size_t catalogue_size_;
+};
+
+}  // namespace flappy::gap

@@ -1,0 +1,104 @@
+#include "gap/diagnose/inference.hpp"
+
+#include <algorithm>
+
+#include "gap/diagnose/effect_fits.hpp"
+#include "gap/diagnose/held_out.hpp"
+#include "gap/diagnose/verdict.hpp"
+#include "io/parallel.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Eigen::VectorXd;
+
+/// Halvings of the way to a vehicle that no vehicle file may hold.
+constexpr int kMaxHalvings = 10;
+
+/// Calls the user's progress; remembers that it stopped.
+class Progress {
+ public:
+  explicit Progress(const InferenceOptions& options) : told_(options.progress) {}
+  bool operator()(double share, const std::string& what) {
+    stopped_ = stopped_ || (told_ && !told_(share, what));
+    return !stopped_;
+  }
+  bool stopped() const { return stopped_; }
+
+ private:
+  const std::function<bool(double, const std::string&)>& told_;
+  bool stopped_ = false;
+};
+
+/// The most probable coordinates of a fit without background magnitudes.
+VectorXd without_background(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) {
+  if (!fitter.evidence().policy().background_in_corrected)
+    return fitter.joint_fit(hypothesis, fit, fitter.all_flights(), false).at;
+  VectorXd at = fitter.refit_without_background(hypothesis, fit).at;
+  // parameters of a body that each move on their own may be those of no body
+  for (int n = 0; n < kMaxHalvings && model::physical_fault(hypothesis.vehicle(at).vehicle); ++n)
+    at = (at + fit.at) / 2;
+  return at;
+}
+
+/// Coordinates of what is concluded, and the sensors' errors given that.
+void correct(const RobotFit& robot, const Fitter& fitter, Inference& d) {
+  const ScoredHypothesis& answer = d.predicting();
+  const Hypothesis h(robot.uncertain(), answer.effects);
+  const bool fitted = answer.fitted();
+  d.sensors = fitted ? robot.sensors(fitter, h, answer.fit) : robot.sensors(fitter, robot.no_effects(), d.parameters);
+  if (fitted) d.corrected = without_background(fitter, h, answer.fit);
+  else if (answer.kind == HypothesisKind::effect) d.corrected = h.bounded(answer.fit.mean());
+  else d.corrected = without_background(fitter, robot.no_effects(), d.parameters);
+}
+
+}  // namespace
+
+const ScoredHypothesis& Inference::predicting() const {
+  const ScoredHypothesis& c = conclusion();
+  if (c.predicted_with.empty()) return c;
+  return *std::ranges::find_if(hypotheses, [&](const ScoredHypothesis& a) {
+    return a.fitted() && a.effects == c.predicted_with && a.has_remainder() == c.has_remainder();
+  });
+}
+
+Inference infer(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options) {
+  const int threads = io::thread_count(options.threads);
+  const VerdictRule& rule = options.rule;
+  Progress progress(options);
+
+  progress(0, "fitting parameters");
+  const RobotFit robot(flights, uncertain, options.discrepancy, options.withheld, threads);
+  const Baselines baselines = weigh_baselines(robot, rule);
+
+  progress(0.3, "screening effects");
+  const ScreenedCatalogue catalogue = screen_catalogue(robot, options);
+
+  const bool go_on = progress(0.4, "fitting effects");
+  const EffectFits fits(robot, baselines, options, threads);
+  EffectFits::Sets sets = fits.combine(fits.single_effects(catalogue, go_on), std::ref(progress));
+  std::vector<ScoredHypothesis> remainders = fits.with_remainders(sets.hypotheses, sets.scales);
+  const Fitter fitter = robot.fitter().with_scales(sets.scales);
+
+  Inference d;
+  d.complete = !progress.stopped();
+  d.untestable = catalogue.untestable;
+  d.parameters = robot.parameters();
+  d.minors = robot.uncertain().minors();
+  d.nominal = robot.nominal().residual;
+  for (int g = 0; g < kGroups; ++g) d.noise_sd.push_back(robot.evidence().noise_sd(g));
+  d.hypotheses = {baselines.none, baselines.parameters, baselines.unknown};
+  for (auto* part : {&sets.hypotheses, &remainders})
+    for (ScoredHypothesis& a : *part) {
+      if (a.fitted()) widen(a.fit, Hypothesis(robot.uncertain(), a.effects), rule);
+      d.hypotheses.push_back(std::move(a));
+    }
+
+  hold_out(fitter, robot.uncertain(), flights, threads, d);
+  decide(robot, fitter, flights, rule, d);
+  correct(robot, fitter, d);
+  if (robot.evidence().policy().validate) d.validation = validate(fitter, robot.uncertain(), flights, d, threads);
+  return d;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,141 @@
+#include "gap/diagnose/result.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "gap/diagnose/verdict.hpp"
+#include "gap/localise/closure.hpp"
+
+namespace flappy::gap {
+namespace {
+
+/// Half of 90 % of a normal law, in standard deviations.
+constexpr double kHalf90 = 1.645;
+/// Smallest error of a sensor that is reported, in its prior standard deviations.
+constexpr double kMinSensorError = 0.25;
+
+std::vector<std::pair<std::string, double>> moved_parameters(const Fit& fit, const Hypothesis& hypothesis) {
+  std::vector<std::pair<std::string, double>> moved;
+  const Eigen::VectorXd mean = fit.mean();
+  for (Eigen::Index i = 0; i < hypothesis.parameters(); ++i)
+    moved.emplace_back(hypothesis.unknowns()[static_cast<std::size_t>(i)].name, mean[i]);
+  std::ranges::stable_sort(moved, std::greater{}, [](const auto& m) { return std::abs(m.second); });
+  return moved;
+}
+
+/// The most probable hypothesis that was fitted; null: none.
+const ScoredHypothesis* best_fitted(const Inference& d) {
+  const auto best = std::ranges::find_if(d.hypotheses, &ScoredHypothesis::fitted);
+  return best == d.hypotheses.end() ? nullptr : &*best;
+}
+
+UnexplainedTerm term_of(const FreeBlock& b, const RegimeBasis& basis) {
+  return {channel_name(b.channel),    b.harmonic, basis.name(b.function),
+          basis.quantity(b.function), b.times,    b.gain_nats};
+}
+
+/// Hypotheses with their losses, and the losses of the stages.
+void add_hypotheses(const RowContext& context, const sim::Randomisation& uncertain, const Inference& d, Diagnosis& r) {
+  r.noise_floor = huber_floor();
+  const Losses refit = losses_of(context, d.refit);
+  r.nominal_loss = losses_of(context, d.nominal).mean();
+  r.refit_loss = refit.mean();
+  std::vector<RankedHypothesis> without_effects;
+  for (const ScoredHypothesis& a : d.hypotheses) {
+    const bool effect = a.kind == HypothesisKind::effect;
+    RankedHypothesis h;
+    h.kind = a.kind;
+    h.effects = a.effects;
+    h.group = effect ? pool_name(a.effects) : name_of(a.kind);
+    h.remainder = effect && a.has_remainder();
+    h.probability = a.probability;
+    h.log_evidence = a.log_evidence;
+    h.log_prior = a.log_prior;
+    if (effect) h.parameters = estimates_of(a, uncertain);
+    if (a.fitted()) {
+      const Losses left = losses_of(context, a.held_out);
+      h.loss = left.mean();
+      h.loss_gain_sd = sd_of_difference(refit, left);
+      h.closure = closure_of(refit, left, r.noise_floor);
+      if (&a == best_fitted(d)) r.effect_loss = h.loss, r.closure = h.closure;
+    }
+    (effect ? r.hypotheses : without_effects).push_back(std::move(h));
+  }
+  r.hypotheses.insert(r.hypotheses.end(), without_effects.begin(), without_effects.end());
+}
+
+}  // namespace
+
+std::vector<Estimate> estimates_of(const ScoredHypothesis& hypothesis, const sim::Randomisation& uncertain) {
+  std::vector<Estimate> estimates;
+  if (hypothesis.fit.at.size() == 0) return estimates;
+  const Hypothesis h(uncertain, hypothesis.effects);
+  const Eigen::VectorXd mean = hypothesis.fit.mean();
+  const Eigen::MatrixXd covariance = hypothesis.fit.covariance();
+  for (Eigen::Index i = h.shared(); i < h.size(); ++i) {
+    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
+    const double reach = kHalf90 * std::sqrt(covariance(i, i));
+    estimates.push_back({u.effect + "." + u.name, u.value(mean[i]), u.value(mean[i] - reach), u.value(mean[i] + reach),
+                         unit_of(u.name)});
+  }
+  return estimates;
+}
+
+Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flights,
+                    const sim::Randomisation& uncertain, const Inference& d) {
+  Diagnosis r;
+  r.flights = folders;
+  r.complete = d.complete;
+  r.verdict = d.verdict;
+  r.validation = d.validation;
+  r.untestable = d.untestable;
+  const RowContext context = row_context_of(flights, d.noise_sd);
+  add_hypotheses(context, uncertain, d, r);
+
+  const ScoredHypothesis& concluded = d.conclusion();
+  const ScoredHypothesis& unknown =
+      concluded.has_remainder() ? concluded
+                                : *std::ranges::find(d.hypotheses, HypothesisKind::unknown, &ScoredHypothesis::kind);
+  const RegimeBasis basis(flights);
+  for (const FreeBlock& b : unknown.unexplained) r.unexplained.push_back(term_of(b, basis));
+  if (concluded.other_law) r.other_law = term_of(*concluded.other_law, basis);
+  r.jointly_with = unknown.jointly_with;
+
+  for (const SensorFinding& s : d.sensors) {
+    const double reach = kHalf90 * s.sd;
+    if (std::abs(s.value) > std::max(reach, kMinSensorError * s.prior_sd))
+      r.sensors.push_back({s.name, s.value, s.value - reach, s.value + reach, unit_of(s.name)});
+  }
+  const ScoredHypothesis& predicting = d.predicting();
+  const bool effects = predicting.kind == HypothesisKind::effect;
+  r.moved_parameters =
+      moved_parameters(effects ? predicting.fit : d.parameters, Hypothesis(uncertain, predicting.effects));
+  if (effects) r.background = estimates_of(predicting, uncertain);
+  std::erase_if(r.background, [&](const Estimate& e) {
+    return std::ranges::any_of(concluded.effects,
+                               [&](const std::string& effect) { return e.name.starts_with(effect + "."); });
+  });
+
+  const ScoredHypothesis* best = best_fitted(d);
+  const std::pair<Stage, const Residuals*> stages[] = {{Stage::nominal, &d.nominal},
+                                                       {Stage::refit, &d.refit},
+                                                       {Stage::effect, best != nullptr ? &best->held_out : nullptr}};
+  for (const auto& [stage, residual] : stages) {
+    if (residual == nullptr) continue;
+    std::vector<ResidualLocation> locations = locate(context, *residual, stage);
+    r.locations.insert(r.locations.end(), std::make_move_iterator(locations.begin()),
+                       std::make_move_iterator(locations.end()));
+  }
+  return r;
+}
+
+Diagnosis result_of(const std::vector<std::string>& folders, std::vector<flightlog::DataFault> faults) {
+  Diagnosis r;
+  r.flights = folders;
+  r.faults = std::move(faults);
+  r.verdict.kind = VerdictKind::data;
+  r.verdict.probability = 1;
+  return r;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,70 @@
+#include "gap/replay/residuals.hpp"
+
+#include <algorithm>
+#include <map>
+
+#include "gap/replay/reset_kernel.hpp"
+#include "io/parallel.hpp"
+
+namespace flappy::gap {
+namespace {
+
+/// [vehicle][flight].
+std::vector<Residuals> predict_all(const Flights& flights, const std::vector<const VehicleHypothesis*>& vehicles,
+                                   int threads) {
+  const std::size_t blocks = (vehicles.size() + kVehicles - 1) / kVehicles;
+  std::vector<Residuals> result(vehicles.size(), Residuals(flights.size()));
+  io::parallel_for(blocks * flights.size(), threads, [&](std::size_t job) {
+    const std::size_t flight = job % flights.size(), first = job / flights.size() * kVehicles;
+    const std::size_t last = std::min(first + kVehicles, vehicles.size());
+    std::vector<Rows> rows = flights[flight]->predict(
+        {vehicles.begin() + static_cast<std::ptrdiff_t>(first), vehicles.begin() + static_cast<std::ptrdiff_t>(last)});
+    for (std::size_t i = 0; i < rows.size(); ++i) result[first + i][flight] = std::move(rows[i]);
+  });
+  return result;
+}
+
+/// Errors of sensors that are undone in the log. A beat-averaged vehicle has its sensors in its prediction.
+EffectValues sensors_of(const VehicleHypothesis& h) {
+  EffectValues sensors = h.vehicle.beat_averaged ? EffectValues() : sensor_effects(h.vehicle.effects);
+  sensors.insert(h.sensors.begin(), h.sensors.end());
+  return sensors;
+}
+
+}  // namespace
+
+std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads) {
+  // vehicles whose sensors agree share a log
+  std::map<EffectValues, std::vector<std::size_t>> by_sensors;
+  for (std::size_t i = 0; i < vehicles.size(); ++i) by_sensors[sensors_of(vehicles[i])].push_back(i);
+  std::vector<Residuals> list(vehicles.size());
+  const auto compare = [&](const Flights& seen, const std::vector<std::size_t>& which, int at_once) {
+    std::vector<const VehicleHypothesis*> group;
+    for (const std::size_t i : which) group.push_back(&vehicles[i]);
+    std::vector<Residuals> predicted = predict_all(seen, group, at_once);
+    for (std::size_t g = 0; g < which.size(); ++g) {
+      Residuals& s = predicted[g];
+      const bool whole = std::ranges::none_of(s, [](const Rows& rows) { return rows.empty(); });
+      for (std::size_t f = 0; whole && f < seen.size(); ++f)
+        for (std::size_t i = 0; i < s[f].size(); ++i) s[f][i] = seen[f]->measured()[i] - s[f][i];
+      if (whole) list[which[g]] = std::move(s);
+    }
+  };
+  std::vector<std::pair<EffectValues, std::vector<std::size_t>>> corrected;
+  for (auto& [sensors, which] : by_sensors) {
+    if (sensors.empty()) compare(flights, which, threads);
+    else corrected.emplace_back(sensors, which);
+  }
+  // few logs leave threads to their flights
+  const int at_once =
+      std::max(1, io::thread_count(threads) / static_cast<int>(std::max<std::size_t>(1, corrected.size())));
+  io::parallel_for(corrected.size(), threads, [&](std::size_t k) {
+    Flights seen(flights.size());
+    io::parallel_for(flights.size(), at_once,
+                     [&](std::size_t f) { seen[f] = flights[f]->corrected(corrected[k].first); });
+    compare(seen, corrected[k].second, at_once);
+  });
+  return list;
+}
+
+}  // namespace flappy::gap

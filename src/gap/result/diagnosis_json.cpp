@@ -1,0 +1,284 @@
+#include "gap/result/diagnosis_json.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "io/files.hpp"
+#include "io/schema.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Rows of "where": the most remarkable of all locations, for a reader who wants no more.
+constexpr std::size_t kMaxWhere = 20;
+constexpr const char* kThirds[] = {"all", "low", "middle", "high"};
+
+// ---- numbers that may be missing
+
+Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+std::optional<double> optional_of(const Json& json) {
+  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
+}
+
+double number_of(const Json& json) {
+  return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
+}
+
+/// The value of an enumeration by its name.
+template <class Enum, std::size_t count>
+Enum value_named(const Json& json, const char* (*name)(Enum), const Enum (&all)[count]) {
+  const std::string text = json.get<std::string>();
+  for (const Enum value : all)
+    if (text == name(value)) return value;
+  throw Json::other_error::create(500, "unknown value \"" + text + "\"", &json);
+}
+
+constexpr HypothesisKind kHypotheses[] = {HypothesisKind::none, HypothesisKind::parameters, HypothesisKind::effect,
+                                          HypothesisKind::unknown};
+constexpr VerdictKind kVerdicts[] = {VerdictKind::effect, VerdictKind::group,   VerdictKind::parameters,
+                                     VerdictKind::none,   VerdictKind::unknown, VerdictKind::data};
+constexpr Stage kStages[] = {Stage::nominal, Stage::refit, Stage::effect};
+constexpr ResidualTest kTests[] = {ResidualTest::channel,   ResidualTest::regime, ResidualTest::phase,
+                                   ResidualTest::frequency, ResidualTest::input,  ResidualTest::whiteness};
+
+// ---- parts that appear more than once
+
+Json to_json(const std::vector<Estimate>& list) {
+  Json json = Json::object();
+  for (const Estimate& e : list)
+    json[e.name] = {{"value", e.value}, {"low", e.low}, {"high", e.high}, {"unit", e.unit}};
+  return json;
+}
+
+std::vector<Estimate> estimates_of(const Json& json) {
+  std::vector<Estimate> list;
+  for (const auto& [name, e] : json.items())
+    list.push_back({name, e.at("value"), e.at("low"), e.at("high"), e.at("unit")});
+  return list;
+}
+
+Json to_json(const std::optional<Closure>& c) {
+  return c ? Json{{"value", c->value}, {"low", c->low}, {"high", c->high}} : Json(nullptr);
+}
+
+std::optional<Closure> closure_of(const Json& json) {
+  if (json.is_null()) return std::nullopt;
+  return Closure{json.at("value"), json.at("low"), json.at("high")};
+}
+
+Json to_json(const UnexplainedTerm& t) {
+  return {{"channel", t.channel}, {"harmonic", t.harmonic},       {"function", t.function},
+          {"regime", t.regime},   {"times_usual", t.times_usual}, {"gain_nats", t.gain_nats}};
+}
+
+UnexplainedTerm term_of(const Json& json) {
+  return {json.at("channel"), json.at("harmonic"),    json.at("function"),
+          json.at("regime"),  json.at("times_usual"), json.at("gain_nats")};
+}
+
+Json to_json(const ResidualLocation& l) {
+  return {{"stage", name_of(l.stage)},
+          {"test", name_of(l.test)},
+          {"channel", l.channel},
+          {"unit", l.unit},
+          {"regime",
+           {{"quantity", l.regime.quantity},
+            {"third", kThirds[static_cast<int>(l.regime.third)]},
+            {"low", optional(l.regime.low)},
+            {"high", optional(l.regime.high)},
+            {"unit", l.regime.unit}}},
+          {"gap", l.gap},
+          {"noise_floor", l.noise_floor},
+          {"p_value", l.p_value},
+          {"discovered", l.discovered}};
+}
+
+ResidualLocation location_of(const Json& json) {
+  const Json& regime = json.at("regime");
+  const std::string third = regime.at("third");
+  const auto at = std::ranges::find(kThirds, third);
+  if (at == std::end(kThirds)) throw Json::other_error::create(500, "unknown third \"" + third + "\"", &regime);
+  return {value_named(json.at("stage"), name_of, kStages),
+          value_named(json.at("test"), name_of, kTests),
+          json.at("channel"),
+          json.at("unit"),
+          {regime.at("quantity"), static_cast<Regime::Third>(at - std::begin(kThirds)), optional_of(regime.at("low")),
+           optional_of(regime.at("high")), regime.at("unit")},
+          json.at("gap"),
+          json.at("noise_floor"),
+          json.at("p_value"),
+          json.at("discovered")};
+}
+
+Json to_json(const RankedHypothesis& h) {
+  return {{"kind", name_of(h.kind)},
+          {"effects", h.effects},
+          {"group", h.group},
+          {"remainder", h.remainder},
+          {"probability", h.probability},
+          {"log_evidence", h.log_evidence},
+          {"log_prior", h.log_prior},
+          {"parameters", to_json(h.parameters)},
+          {"loss", optional(h.loss)},
+          {"loss_gain_sd", h.loss_gain_sd},
+          {"closure", to_json(h.closure)}};
+}
+
+RankedHypothesis hypothesis_of(const Json& json) {
+  return {value_named(json.at("kind"), name_of, kHypotheses),
+          json.at("effects"),
+          json.at("group"),
+          json.at("remainder"),
+          json.at("probability"),
+          json.at("log_evidence"),
+          json.at("log_prior"),
+          estimates_of(json.at("parameters")),
+          optional_of(json.at("loss")),
+          json.at("loss_gain_sd"),
+          closure_of(json.at("closure"))};
+}
+
+Json to_json(const Validation& v) {
+  Json ladder = Json::array(), controls = Json::array(), agreements = Json::array();
+  for (const Validation::Rung& r : v.ladder) {
+    Json errors = Json::object();
+    for (const HeldOutError& e : r.errors)
+      errors[e.channel] = {{"rms", e.rms}, {"low", e.low}, {"high", e.high}, {"by_type", e.by_type}};
+    ladder.push_back({{"added", r.added}, {"held_out", errors}});
+  }
+  for (const Validation::Control& c : v.controls)
+    controls.push_back(
+        {{"effect", c.effect}, {"channel", c.channel}, {"gain", c.gain}, {"best_of_shifted", c.best_of_shifted}});
+  for (const Validation::Agreement& a : v.agreements)
+    agreements.push_back({{"name", a.name}, {"value", a.value}, {"sd", a.sd}, {"p_value", finite(a.p_value)}});
+  return {{"ladder", ladder}, {"controls", controls}, {"agreements", agreements}};
+}
+
+Validation validation_of(const Json& json) {
+  Validation v;
+  for (const Json& r : json.at("ladder")) {
+    v.ladder.push_back({r.at("added"), {}});
+    for (const auto& [channel, e] : r.at("held_out").items())
+      v.ladder.back().errors.push_back({channel, e.at("rms"), e.at("low"), e.at("high"), e.at("by_type")});
+  }
+  for (const Json& c : json.at("controls"))
+    v.controls.push_back({c.at("effect"), c.at("channel"), c.at("gain"), c.at("best_of_shifted")});
+  for (const Json& a : json.at("agreements"))
+    v.agreements.push_back({a.at("name"), a.at("value"), a.at("sd"), number_of(a.at("p_value"))});
+  return v;
+}
+
+Json to_json(const NextExperiment& n) {
+  Json courses = Json::array();
+  for (const Course& c : n.courses)
+    courses.push_back({{"quantity", c.quantity}, {"first", c.first}, {"second", c.second}});
+  return {{"manoeuvre", n.manoeuvre},     {"separates", n.separates},         {"expected_nats", n.expected_nats},
+          {"information", n.information}, {"course_step_s", n.course_step_s}, {"courses", courses}};
+}
+
+NextExperiment next_of(const Json& json) {
+  NextExperiment n{json.at("manoeuvre"),   json.at("separates"),     json.at("expected_nats"),
+                   json.at("information"), json.at("course_step_s"), {}};
+  for (const Json& c : json.at("courses")) n.courses.push_back({c.at("quantity"), c.at("first"), c.at("second")});
+  return n;
+}
+
+Diagnosis read(const Json& json) {
+  Diagnosis d;
+  d.flights = json.at("flights");
+  for (const Json& f : json.at("data_faults")) d.faults.push_back({f.at("file"), f.at("line"), f.at("what")});
+  d.complete = json.at("complete");
+  const Json& verdict = json.at("verdict");
+  d.verdict = {value_named(verdict.at("kind"), name_of, kVerdicts), verdict.at("effects"), verdict.at("remainder"),
+               verdict.at("probability")};
+  for (const Json& h : json.at("hypotheses")) d.hypotheses.push_back(hypothesis_of(h));
+  for (const Json& t : json.at("unexplained").at("terms")) d.unexplained.push_back(term_of(t));
+  d.jointly_with = json.at("unexplained").at("jointly_with");
+  if (const Json& t = json.at("other_law"); !t.is_null()) d.other_law = term_of(t);
+  d.background = estimates_of(json.at("background"));
+  d.sensors = estimates_of(json.at("sensors"));
+  for (const auto& [name, sd] : json.at("moved_parameters").items()) d.moved_parameters.emplace_back(name, sd);
+  for (const Json& l : json.at("locations")) d.locations.push_back(location_of(l));
+  const Json& gap = json.at("gap");
+  d.nominal_loss = optional_of(gap.at("nominal"));
+  d.refit_loss = optional_of(gap.at("refit"));
+  d.effect_loss = optional_of(gap.at("effect"));
+  d.noise_floor = gap.at("noise_floor");
+  d.closure = closure_of(gap.at("closure"));
+  d.untestable = json.at("untestable");
+  if (const Json& v = json.at("validation"); !v.is_null()) d.validation = validation_of(v);
+  for (const Json& c : json.at("closed_loop"))
+    d.closed_loop.push_back({c.at("flight"), c.at("quantity"), number_of(c.at("recorded")), number_of(c.at("nominal")),
+                             number_of(c.at("corrected"))});
+  if (const Json& n = json.at("next_experiment"); !n.is_null()) d.next = next_of(n);
+  return d;
+}
+
+}  // namespace
+
+Json to_json(const Diagnosis& d) {
+  Json faults = Json::array(), hypotheses = Json::array(), terms = Json::array(), where = Json::array(),
+       locations = Json::array(), closed_loop = Json::array(), moved = Json::object();
+  for (const flightlog::DataFault& f : d.faults)
+    faults.push_back({{"file", f.file}, {"line", f.line}, {"what", f.what}});
+  for (const RankedHypothesis& h : d.hypotheses) hypotheses.push_back(to_json(h));
+  for (const UnexplainedTerm& t : d.unexplained) terms.push_back(to_json(t));
+  for (const ResidualLocation& l : largest_discoveries(d, Stage::refit, kMaxWhere)) where.push_back(to_json(l));
+  for (const ResidualLocation& l : d.locations) locations.push_back(to_json(l));
+  for (const auto& [name, sd] : d.moved_parameters) moved[name] = sd;
+  for (const ClosedLoop& c : d.closed_loop)
+    closed_loop.push_back({{"flight", c.flight},
+                           {"quantity", c.quantity},
+                           {"recorded", finite(c.recorded)},
+                           {"nominal", finite(c.nominal)},
+                           {"corrected", finite(c.corrected)}});
+  return {{"schema", kDiagnosisSchema},
+          {"flights", d.flights},
+          {"data_faults", faults},
+          {"complete", d.complete},
+          {"verdict",
+           {{"kind", name_of(d.verdict.kind)},
+            {"effects", d.verdict.effects},
+            {"remainder", d.verdict.remainder},
+            {"probability", d.verdict.probability}}},
+          {"hypotheses", hypotheses},
+          {"unexplained", {{"jointly_with", d.jointly_with}, {"terms", terms}}},
+          {"other_law", d.other_law ? to_json(*d.other_law) : Json(nullptr)},
+          {"background", to_json(d.background)},
+          {"sensors", to_json(d.sensors)},
+          {"moved_parameters", moved},
+          {"where", where},
+          {"gap",
+           {{"nominal", optional(d.nominal_loss)},
+            {"refit", optional(d.refit_loss)},
+            {"effect", optional(d.effect_loss)},
+            {"noise_floor", d.noise_floor},
+            {"closure", to_json(d.closure)}}},
+          {"closed_loop", closed_loop},
+          {"next_experiment", d.next ? to_json(*d.next) : Json(nullptr)},
+          {"untestable", d.untestable},
+          {"validation", d.validation ? to_json(*d.validation) : Json(nullptr)},
+          {"locations", locations}};
+}
+
+Diagnosis diagnosis_from(const Json& json, const std::filesystem::path& file) {
+  try {
+    if (const Json& schema = json.at("schema"); schema != kDiagnosisSchema)
+      throw io::InputError(file.string() + ": schema " +
+                           io::other_schema(schema.get<std::int64_t>(), kDiagnosisSchema) + "; accepted: schema " +
+                           std::to_string(kDiagnosisSchema) + ", as flappy-gap diagnose writes it");
+    return read(json);
+  } catch (const Json::exception& e) {
+    // "[json.exception.out_of_range.403] key 'where' not found"
+    const std::string what = e.what();
+    const std::size_t bracket = what.find("] ");
+    throw io::InputError(file.string() + ": " + (bracket == std::string::npos ? what : what.substr(bracket + 2)) +
+                         "; accepted: what flappy-gap diagnose wrote");
+  }
+}
+
+}  // namespace flappy::gap

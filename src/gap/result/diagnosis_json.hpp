@@ -1,0 +1,18 @@
+// diagnosis.json: the one writer and reader of a diagnosis (docs/reference/formats.md).
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "gap/result/diagnosis.hpp"
+
+namespace flappy::gap {
+
+inline constexpr int kDiagnosisSchema = 2;
+
+nlohmann::ordered_json to_json(const Diagnosis& diagnosis);
+
+/// `file` stands for the place in errors. io::InputError where it is no diagnosis, or one of another schema.
+Diagnosis diagnosis_from(const nlohmann::ordered_json& json, const std::filesystem::path& file);
+
+}  // namespace flappy::gap

@@ -1,0 +1,38 @@
+#include "gap/evidence/learn_discrepancy.hpp"
+
+#include <gtest/gtest.h>
+
+#include "gap/evidence/synthetic_flight.hpp"
+
+namespace flappy::gap::learn_discrepancy_test {
+namespace {
+
+// Robots whose vertical force has, beside the model's, a part that follows the velocity: of each robot another coefficient, drawn with a standard
+// deviation of 6 % of the signal. From eight of them the standard deviation is known to a quarter; the forward force, which is alike, takes part.
+TEST(LearnDiscrepancy, FindsHowFarModelsAreOff) {
+  const sim::Randomisation priors = synthetic_priors();
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal(0, 0.06 * SyntheticFlight::kSignal);
+  std::vector<Flights> robots;
+  for (int r = 0; r < 8; ++r) {
+    const double off = normal(random);
+    const auto flight = std::make_shared<SyntheticFlight>("robot", static_cast<std::uint64_t>(r + 1), synthetic_law);
+    flight->fly({synthetic_vehicle()});
+    flight->add_measured(kForceZ, 0, off * flight->velocity);
+    robots.push_back({flight});
+  }
+  ModelDiscrepancy start = read_model_discrepancy();
+  start.nuisances.clear();
+  const ModelDiscrepancy learnt = learn_discrepancy(robots, priors, start, 2);
+  const double share = learnt.share(kForceZ, 0, BasisFunction::velocity_x);
+  EXPECT_GT(share, 0.02);
+  EXPECT_LT(share, 0.12);
+  // where models are not off, the least that is learnt, and what like channels have
+  EXPECT_LT(learnt.share(kTorqueY, 1, BasisFunction::velocity_x), 0.5 * share);
+  EXPECT_EQ(learnt.spread.robot_sd, start.spread.robot_sd) << "other parameters stay";
+  // no robot has an effect: backgrounds become smaller than what was believed, or stay as small
+  EXPECT_LE(learnt.background_sd("wind"), std::max(start.background_sd("wind"), 0.3));
+}
+
+}  // namespace
+}  // namespace flappy::gap::learn_discrepancy_test

@@ -1,0 +1,58 @@
+#include <gtest/gtest.h>
+
+#include "gap/evidence/synthetic_flight.hpp"
+
+namespace flappy::gap::regime_basis_test {
+namespace {
+
+int index_of(const RegimeBasis& basis, const std::string& name) {
+  for (int i = 0; i < basis.size(); ++i)
+    if (basis.name(i) == name) return i;
+  return -1;
+}
+
+TEST(RegimeBasis, HasFunctionsOfMeanZeroAndRmsOne) {
+  const auto made = synthetic_flights(2, synthetic_law);
+  const Flights flights = as_flights(made);
+  const RegimeBasis basis(flights);
+  // constant, four functions, the offset of the second flight, two products
+  ASSERT_EQ(basis.size(), 8);
+  EXPECT_EQ(basis.kind(0), BasisFunction::constant);
+  EXPECT_EQ(basis.quantity(0), "always");
+  EXPECT_TRUE((basis.values(0).col(0).array() == 1).all());
+  for (int i = 1; i < basis.size(); ++i) {
+    const double n = 2 * 120, mean = (basis.values(0).col(i).sum() + basis.values(1).col(i).sum()) / n,
+                 square = (basis.values(0).col(i).squaredNorm() + basis.values(1).col(i).squaredNorm()) / n;
+    EXPECT_NEAR(mean, 0, 1e-12) << basis.name(i);
+    EXPECT_NEAR(square, 1, 1e-12) << basis.name(i);
+  }
+  const int product = index_of(basis, "amplitude velocity_x");
+  ASSERT_GE(product, 0);
+  EXPECT_EQ(basis.quantity(product), "velocity");
+  EXPECT_EQ(basis.kind(product), BasisFunction::product);
+}
+
+TEST(RegimeBasis, TellsFlightsFromHeights) {
+  const Flights flights = {std::make_shared<SyntheticFlight>("low", 1, synthetic_law, 0),
+                           std::make_shared<SyntheticFlight>("high", 2, synthetic_law, 5)};
+  const RegimeBasis basis(flights);
+  const int offset = index_of(basis, "flight high");
+  ASSERT_GE(offset, 0);
+  EXPECT_EQ(basis.kind(offset), BasisFunction::flight);
+  const auto first = basis.values(0).col(offset), second = basis.values(1).col(offset);
+  EXPECT_NEAR((first.array() - first[0]).abs().maxCoeff(), 0, 1e-12);
+  EXPECT_NEAR((second.array() + first[0]).abs().maxCoeff(), 0, 1e-12) << "as many beats in both";
+  EXPECT_EQ(index_of(RegimeBasis({flights[0]}), "flight low"), -1);
+}
+
+TEST(RegimeBasis, LeavesOutWhatNeverChanges) {
+  auto flight = std::make_shared<SyntheticFlight>("hover", 1, synthetic_law);
+  flight->velocity.setConstant(0.3);
+  const RegimeBasis basis({flight});
+  EXPECT_EQ(index_of(basis, "velocity_x"), -1);
+  EXPECT_EQ(index_of(basis, "amplitude amplitude"), -1) << "no product where a factor never changes";
+  EXPECT_EQ(basis.size(), 4);
+}
+
+}  // namespace
+}  // namespace flappy::gap::regime_basis_test
